@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # In a living room with physics, where its pictures can be rendered; else one line says what that needs.
 run: $(VENV)/.installed
-	$(BIN)/gazerig run --mock $$($(BIN)/python -m gazerig.robot.app.world.first_world)
+	$(BIN)/gazerig run --mock $$($(BIN)/python -m gazerig.features.world.run.first_world)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --workers auto

@@ -13,17 +13,17 @@ from world_scripts import shipped_world
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.sim_mock.world.gl_context import import_mujoco
+from gazerig.features.world.gl_context import import_mujoco
 
 import_mujoco()
 
 import mujoco  # noqa: E402
 from world_rigs import rig_in_world  # noqa: E402
 
-from gazerig.sim_mock.world.figure import Figures  # noqa: E402
-from gazerig.sim_mock.world.figure_model import PlacedPeople  # noqa: E402
-from gazerig.sim_mock.world.model import world_model  # noqa: E402
-from gazerig.sim_mock.world.renderer import Renderer, RendererParams  # noqa: E402
+from gazerig.features.world.figure import Figures  # noqa: E402
+from gazerig.features.world.figure_model import PlacedPeople  # noqa: E402
+from gazerig.features.world.model import world_model  # noqa: E402
+from gazerig.features.world.renderer import Renderer, RendererParams  # noqa: E402
 
 PICTURE = Path(__file__).parent / "world-people.webp"
 _SIZE = (480, 320)

@@ -28,21 +28,15 @@ from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.scenes.registry import scenes
-from gazerig.sim_mock.world.camera_params import WorldCameraParams
-from gazerig.sim_mock.world.script import (
-    HEAD,
-    Act,
-    Do,
-    PersonScript,
-    PlaceScript,
-    ThingScript,
-    WorldScript,
-)
 
 # The documents describe every feature: without one of them, they cannot be compared with it.
 design = pytest.importorskip("gazerig.features.study.design")
 questionnaire = pytest.importorskip("gazerig.features.study.questionnaire")
 HOME = pytest.importorskip("gazerig.features.study.shipped").HOME
+script = pytest.importorskip("gazerig.features.world.script")
+camera_params = pytest.importorskip("gazerig.features.world.camera_params")
+WORLDS = pytest.importorskip("gazerig.features.world.shipped").HOME
+pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
 
 FOLDERS = ("api", "config", "drivers", "features", "gaze", "robot", "sim_mock")
@@ -144,7 +138,7 @@ def test_yaml_shown_has_keys_that_there_are() -> None:
             _fits(Shape("params", params=Gesture), data, "gesture")
             continue
         if "people" in data:
-            _fits(Shape("params", params=WorldScript), data, "world")
+            _fits(Shape("params", params=script.WorldScript), data, "world")
             continue
         if "conditions" in data or "items" in data:
             form = design.StudyDesign if "conditions" in data else questionnaire.Questionnaire
@@ -291,16 +285,19 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper == EMULATOR:
         return  # its tables are held against the emulator below
     words = {*keys(), *defined(), *SERVOS, *scenes(), *EXAMPLES, *_modes()}
-    words |= {field.name for field in fields(WorldCameraParams)}
+    words |= {field.name for field in fields(camera_params.WorldCameraParams)}
     words |= {*RENAMED, *RENAMED.values(), "rules.*.pull"}
     words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
         *DYNAMIXEL.registers,
         *FEETECH.registers,
     }
     words |= {field.name for field in (*fields(KeyFrame), *fields(Gesture))} | {*LID_GROUPS}
-    scripts = (WorldScript, PersonScript, PlaceScript, ThingScript, Act)
-    words |= {field.name for script in scripts for field in fields(script)}
-    words |= {*get_args(Do), *shipped_names("worlds"), HEAD}
+    scripts = (
+        *(script.WorldScript, script.PersonScript, script.PlaceScript),
+        *(script.ThingScript, script.Act),
+    )
+    words |= {field.name for one in scripts for field in fields(one)}
+    words |= {*get_args(script.Do), *shipped_names("worlds", WORLDS), script.HEAD}
     forms = (
         *(design.StudyDesign, design.Presentation, design.Trials, design.StatisticalPlan),
         *(design.Exclusion, design.Privacy, questionnaire.Questionnaire, questionnaire.Item),
@@ -310,8 +307,8 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
             continue
-        if script := re.match(r"(?:PYTHONPATH=\S+ )?python (\S+\.py)", span):
-            assert (ROOT / script[1]).exists(), f"{paper.name}: {span}"
+        if named := re.match(r"(?:PYTHONPATH=\S+ )?python (\S+\.py)", span):
+            assert (ROOT / named[1]).exists(), f"{paper.name}: {span}"
             continue
         if call := re.match(r"(gazerig|head)\.([a-z]\w*)(?=[(]|$)", span):
             place: object = gazerig if call[1] == "gazerig" else gazerig.SimulatedHead

@@ -99,9 +99,9 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
 @with_mujoco
 def test_sending_shapes_of_a_world_loads_no_mujoco(python: LightPython, tmp_path: Path) -> None:
     code = (
-        "import sys, pickle; from gazerig.robot.app.world.run_world import world_scene;"
-        "from gazerig.sim_mock.world.shapes import shapes_of;"
-        "from gazerig.sim_mock.world.world_spec import WorldSpec;"
+        "import sys, pickle; from gazerig.features.world.run.run_world import world_scene;"
+        "from gazerig.features.world.shapes import shapes_of;"
+        "from gazerig.features.world.world_spec import WorldSpec;"
         "found = shapes_of(WorldSpec(world_scene('living-room', 0).figures, ()));"
         "pickle.dumps(found); found.poses(1.0); print('mujoco' in sys.modules)"
     )

@@ -68,7 +68,7 @@ from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from gazerig.robot.app.world.run_world import RunWorld
+    from gazerig.features.world.run.run_world import RunWorld
 
 T = TypeVar("T")
 
@@ -243,7 +243,7 @@ def _world(rig: Rig, options: RunOptions) -> "RunWorld | None":
     """Return the world that was asked for, None without one."""
     if options.world is None:
         return None
-    from gazerig.robot.app.world.run_world import world_of  # with the people in it
+    from gazerig.features.world.run.run_world import world_of  # with the people in it
 
     return world_of(rig, options)
 

@@ -25,9 +25,9 @@ from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 
 if TYPE_CHECKING:
-    from gazerig.robot.app.world.poses import SimulatedPoses, WorldPoses
-    from gazerig.robot.app.world.run_world import RunWorld
-    from gazerig.sim_mock.world.physics import World
+    from gazerig.features.world.physics import World
+    from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
+    from gazerig.features.world.run.run_world import RunWorld
 
 TrueSteps = Callable[[], Mapping[str, float]]
 """Returns the true positions of the servos now in steps, by joint."""
@@ -113,7 +113,7 @@ def _on_terminals(rig: Rig, lines: Mapping[str, Emulated], world: "RunWorld | No
 
 def _seen_from_here(rig: Rig, buses: PtyBuses, number: int) -> "WorldPoses":
     """Return where the head of one of the rigs is in the world of a server's process."""
-    from gazerig.robot.app.world.poses import RigInState, WorldPoses
+    from gazerig.features.world.run.poses import RigInState, WorldPoses
 
     return WorldPoses(buses.state, RigInState(kinematics_of(rig), buses.joints[number]))
 
@@ -127,7 +127,7 @@ def _in_world(rig: Rig, clock: Clock, lines: Mapping[str, Emulated], run: "RunWo
 
 def _seen_in(world: "World", rig: Rig, clock: Clock, number: int) -> "SimulatedPoses":
     """Return where the head of one of a world's rigs is."""
-    from gazerig.robot.app.world.poses import RigInState, SimulatedPoses
+    from gazerig.features.world.run.poses import RigInState, SimulatedPoses
 
     joints = RigInState(kinematics_of(rig), world.model.rigs[number].qpos)
     return SimulatedPoses(world, clock, joints)
@@ -135,7 +135,7 @@ def _seen_in(world: "World", rig: Rig, clock: Clock, number: int) -> "SimulatedP
 
 def _ideal_in_world(rig: Rig, clock: Clock, run: "RunWorld") -> RunBus:
     """Return ideal servos in a world in this process, on the clock of the run."""
-    from gazerig.robot.app.world.rig import world_ideal_bus
+    from gazerig.features.world.run.rig import world_ideal_bus
 
     world, names = run.computed(clock), rig.names
     ideal = world_ideal_bus(rig, world, run.number)

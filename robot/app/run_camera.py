@@ -19,7 +19,7 @@ from gazerig.robot.model.kinematics import Kinematics
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from gazerig.robot.app.world.run_world import RunWorld
+    from gazerig.features.world.run.run_world import RunWorld
 
 
 class Sight(NamedTuple):
@@ -74,7 +74,7 @@ def run_camera(
         return real_camera(rig, options, clock, placed, sight.turns, own)
     locate = locator_of(placed)
     if world is not None and wires.head is not None:
-        from gazerig.robot.app.world.sight import RenderedWorld, world_camera
+        from gazerig.features.world.run.sight import RenderedWorld, world_camera
 
         rendered = RenderedWorld(
             world.spec, scene, sight.mount, placed, rng, world.camera, world.number

@@ -48,7 +48,7 @@ def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
     """
     scene: Scene | None = scenes().get(options.scene or "")
     if options.world is not None:
-        from gazerig.robot.app.world.run_world import world_scene  # with the people in it
+        from gazerig.features.world.run.run_world import world_scene  # with the people in it
 
         scene = world_scene(options.world, options.seed)
     rules = rig.gaze.top_down

@@ -94,7 +94,7 @@ def _begun_world(
     options: RunOptions, seed: int, begins_s: Callable[[], float | None]
 ) -> Callable[[], "WorldInfo | None"]:
     """Return what tells the world of a run, once its people have begun."""
-    from gazerig.robot.app.world.recorded_world import world_info  # with the people in it
+    from gazerig.features.world.run.recorded_world import world_info  # with the people in it
 
     info = world_info(options, seed)
 

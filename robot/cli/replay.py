@@ -222,7 +222,7 @@ def _world(recording: "RunRecording") -> "WorldShapes | None":
     """Return how the recorded run's world looked; None without one, or, said why, if it is lost."""
     if recording.world is None:
         return None
-    from gazerig.robot.app.world.recorded_world import recorded_shapes
+    from gazerig.features.world.run.recorded_world import recorded_shapes
 
     try:
         return recorded_shapes(recording.world, recording.info.stands)

@@ -27,7 +27,7 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.control.joint_faults import JointFault, named
 
 if TYPE_CHECKING:
-    from gazerig.robot.app.world.head_group import HeadGroup
+    from gazerig.features.world.run.head_group import HeadGroup
 
 app = typer.Typer()
 
@@ -99,7 +99,7 @@ def _group(asked: RunOptions) -> "HeadGroup | None":
     """Return the heads of a world that has several, None without."""
     if asked.world is None:
         return None
-    from gazerig.robot.app.world.head_group import compose_group, has_other_heads
+    from gazerig.features.world.run.head_group import compose_group, has_other_heads
 
     return compose_group(asked) if has_other_heads(asked) else None
 

@@ -14,8 +14,8 @@ from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 if TYPE_CHECKING:
+    from gazerig.features.world.world_spec import WorldSpec
     from gazerig.sim_mock.pty.served_folder import ServedFolder
-    from gazerig.sim_mock.world.world_spec import WorldSpec
 
 STOP_S = 2.0
 

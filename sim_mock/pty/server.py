@@ -31,12 +31,12 @@ from gazerig.sim_mock.devices import unpacked
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 
 if TYPE_CHECKING:
-    from gazerig.sim_mock.world.served_world import ServedWorld
+    from gazerig.features.world.served_world import ServedWorld
 
 
 _LOOK_MS = 200
 WORLD_COMMANDS = ("push",)
-"""Commands that are the world's, whatever bus; ``gazerig.sim_mock.world.commands`` has them."""
+"""Commands that are the world's, whatever bus; ``gazerig.features.world.commands`` has them."""
 
 
 @dataclass(frozen=True)
@@ -184,11 +184,11 @@ def _ended_with_client(until_eof: bool) -> Iterator[None]:
 
 def _world(files: WorldFiles) -> "ServedWorld":
     """Return the world that all servos are in."""
-    from gazerig.sim_mock.world.gl_context import import_mujoco
+    from gazerig.features.world.gl_context import import_mujoco
 
     import_mujoco()
-    from gazerig.sim_mock.world.served_world import ServedWorld
-    from gazerig.sim_mock.world.world_spec import WorldSpec
+    from gazerig.features.world.served_world import ServedWorld
+    from gazerig.features.world.world_spec import WorldSpec
 
     return ServedWorld(WorldSpec.read(Path(files.spec)), Path(files.state), time.monotonic)
 

@@ -30,19 +30,19 @@ from world_scripts import WORLDS, shipped_world
 from gazerig.config.schema import load_rig
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
+from gazerig.features.world.figure import Figures
+from gazerig.features.world.model import world_model
+from gazerig.features.world.physics import World
+from gazerig.features.world.run.rig import rig_in_world
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app import run_bus
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.world.rig import rig_in_world
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.true_gaze import gaze_off_rad, true_part
-from gazerig.sim_mock.world.figure import Figures
-from gazerig.sim_mock.world.model import world_model
-from gazerig.sim_mock.world.physics import World
 
 NEAR_DEG = 1.0
 Goal = Callable[[float], float]

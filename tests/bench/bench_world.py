@@ -41,17 +41,18 @@ from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view  # noq
 from gazerig.drivers.types import FaceDetector  # noqa: E402
 from gazerig.drivers.vision.face.detector import face_detector  # noqa: E402
 from gazerig.drivers.vision.face.params import FaceDetectorParams  # noqa: E402
+from gazerig.features.world.script import Act, PersonScript, PlaceScript, WorldScript  # noqa: E402
+from gazerig.features.world.shipped import HOME  # noqa: E402
+from gazerig.features.world.world_scene import WorldScene  # noqa: E402
 from gazerig.gaze.angles import compose, rotation  # noqa: E402
 from gazerig.gaze.types import Mat3  # noqa: E402
 from gazerig.robot.model.intrinsics import project  # noqa: E402
 from gazerig.robot.model.scene_view import PinholeView  # noqa: E402
 from gazerig.sim_mock.cameras.optics import CameraMotion, OpticsParams, expose  # noqa: E402
 from gazerig.sim_mock.scenes.scene import ScenePerson  # noqa: E402
-from gazerig.sim_mock.world.script import Act, PersonScript, PlaceScript, WorldScript  # noqa: E402
-from gazerig.sim_mock.world.world_scene import WorldScene  # noqa: E402
 
 if TYPE_CHECKING:
-    from gazerig.sim_mock.world.picture import WorldPicture
+    from gazerig.features.world.picture import WorldPicture
 
 YUNET_FILE = TESTS.parents[1] / "shared" / "models" / "face_detection_yunet_2026may.onnx"
 AWAY_M = (0.6, 1.0, 1.5, 2.0, 2.5, 3.0)
@@ -74,7 +75,7 @@ def main() -> None:
 
 def costs(args: argparse.Namespace) -> None:
     """Print what a picture costs by size and by what it shows."""
-    from gazerig.sim_mock.world.renderer import RendererParams
+    from gazerig.features.world.renderer import RendererParams
 
     rounds = 5 if args.quick else 15
     shown = {
@@ -148,10 +149,10 @@ def _one_person() -> "WorldPicture":
 
 def _played(script: WorldScript) -> "WorldPicture":
     """Return pictures of a script."""
-    from gazerig.sim_mock.world.figure import Figures
-    from gazerig.sim_mock.world.figure_model import PlacedPeople
-    from gazerig.sim_mock.world.model import world_model
-    from gazerig.sim_mock.world.picture import WorldPicture
+    from gazerig.features.world.figure import Figures
+    from gazerig.features.world.figure_model import PlacedPeople
+    from gazerig.features.world.model import world_model
+    from gazerig.features.world.picture import WorldPicture
 
     figures = Figures(script, 0)
     model = world_model(figures, ()).mj
@@ -231,7 +232,7 @@ def _detectors(yunet: Path) -> dict[str, FaceDetector]:
 
 def motion(args: argparse.Namespace) -> None:
     """Print what the motion detector finds in an empty room, and of somebody who waves."""
-    from gazerig.sim_mock.world.renderer import RendererParams
+    from gazerig.features.world.renderer import RendererParams
 
     seconds = 4.0 if args.quick else 12.0
     waves = tuple(Act(at_s=at, do="wave", for_s=2.4) for at in np.arange(0.5, seconds - 2.5, 3.0))
@@ -261,7 +262,7 @@ def scripts(args: argparse.Namespace) -> None:
     for name in ("living-room", "conversation", "boxing", "crowd"):
         found = {key: np.zeros(3, int) for key in _detectors(args.yunet) if "640" not in key}
         rng = np.random.default_rng(0)
-        script = load(shipped("worlds", name), WorldScript)
+        script = load(shipped("worlds", name, HOME), WorldScript)
         picture = _played(script)
         scene = WorldScene(name, script, 0)
         detectors = _detectors(args.yunet)

@@ -57,10 +57,10 @@ class HeadPictures:
     """
 
     def __init__(self, rig: Rig, p_viewer_m: Vec3) -> None:
-        from gazerig.sim_mock.world.gl_context import import_mujoco
+        from gazerig.features.world.gl_context import import_mujoco
 
         mujoco: Any = import_mujoco()
-        from gazerig.sim_mock.world.renderer import Renderer, RendererParams
+        from gazerig.features.world.renderer import Renderer, RendererParams
 
         self._description = description_of(rig)
         files = description_files(self._description, ["mjcf"])

@@ -1,0 +1,239 @@
+"""Bodies below the head as meshes: clothes, hands, shoes and gloves, a segment each.
+
+Each lies in the frame of its segment (gazerig.features.world.figure) and follows from the measures
+of its body. Sections are ellipses through which a skin is laid.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import cos, pi, radians, sin
+
+import numpy as np
+
+from gazerig.features.world.measures import ADULT_M, Measures
+from gazerig.gaze.types import Floats
+from gazerig.robot.description.mesh import Mesh, grid
+from gazerig.robot.description.paint import (
+    Colour,
+    Painted,
+    merged,
+    mirrored,
+    mix,
+    painted,
+    spot,
+    step,
+)
+from gazerig.robot.description.person_shape import PersonLook, hand_of
+from gazerig.robot.description.solid import Solid, capsule, ellipsoid, union
+
+_AROUND = 18
+_GLOVE: Colour = (206, 30, 38)
+_HAND_SCALE = 0.104
+_WRIST = 0.74
+
+Row = tuple[float, float, float, float]
+"""Height of a section, how far ahead its middle is, half its depth, half its width."""
+
+
+def loft(rows: Sequence[Row], around: int = _AROUND) -> Mesh:
+    """Return a skin through sections from below to above, closed at both ends."""
+    first, last = rows[0], rows[-1]
+    closed = [(first[0], first[1], 1e-4, 1e-4), *rows, (last[0], last[1], 1e-4, 1e-4)]
+    turn = np.linspace(0.0, 2.0 * pi, around, endpoint=False).tolist()
+    points = [[(x + a * cos(w), b * sin(w), z) for w in turn] for z, x, a, b in closed]
+    return grid(np.array(points), closed=True)
+
+
+def _limb(
+    rows: Sequence[tuple[float, float]], scale: float, length: float, high: float = 1.0
+) -> Mesh:
+    """Return a limb of round sections (share of its length below its joint, radius), rounded.
+
+    Args:
+        rows: its sections from above to below.
+        scale: of the radii.
+        length: from joint to joint, m.
+        high: height of the rounding at its top as a multiple of a ball's.
+    """
+    z0, r0 = rows[0]
+    z1, r1 = rows[-1]
+    ball = ((0.95, 0.3), (0.7, 0.7))
+    top = [(high * r0 * scale * s - z0 * length, r0 * scale * c) for s, c in ball]
+    low = [(-z1 * length - r1 * scale * s, r1 * scale * c) for s, c in ball]
+    middle = [(-z * length, r * scale) for z, r in rows][::-1]
+    return loft([(z, 0.0, r, r) for z, r in (*low, *middle, *top[::-1])], 12)
+
+
+def body_segments(body: Measures, look: PersonLook, gloves: bool) -> Mapping[str, Painted]:
+    """Return the painted segments of a body, without those of the head."""
+    k = body.stature_m / ADULT_M
+    sleeve = look.skin if look.short_sleeves or gloves else look.shirt
+    upper = _limb(
+        ((0.03, 0.046), (0.2, 0.049), (0.45, 0.045), (0.75, 0.041), (1.0, 0.040)),
+        k,
+        body.upper_arm_m,
+        0.42,
+    )
+    fore = _limb(((0.0, 0.040), (0.25, 0.041), (0.7, 0.034), (0.96, 0.031)), k, body.forearm_m)
+    thigh = _limb(((0.0, 0.086), (0.3, 0.082), (0.7, 0.067), (1.0, 0.058)), k, body.thigh_m)
+    shank = _limb(((0.0, 0.058), (0.3, 0.060), (0.7, 0.048), (1.0, 0.044)), k, body.shank_m)
+    found = {
+        "pelvis": painted(loft(_scaled(_PELVIS, k)), look.trousers),
+        "torso": _shirt(look, k),
+        "neck": painted(_neck(body.neck_m, k), _shaded(look.skin)),
+    }
+    right = boxing_glove(k) if gloves else _hand(look, k)
+    for side in ("left", "right"):
+        found[f"{side}_upper_arm"] = painted(upper, look.shirt)
+        found[f"{side}_forearm"] = painted(fore, sleeve)
+        found[f"{side}_hand"] = right if side == "right" else mirrored(right)
+        found[f"{side}_thigh"] = painted(thigh, look.trousers)
+        found[f"{side}_shank"] = painted(shank, look.trousers)
+        found[f"{side}_foot"] = painted(_shoe(body), look.shoes)
+    return found
+
+
+_PELVIS: tuple[Row, ...] = (
+    (-0.100, 0.0, 0.030, 0.050),
+    (-0.085, 0.0, 0.056, 0.090),
+    (-0.045, -0.006, 0.080, 0.150),
+    (0.000, -0.010, 0.094, 0.164),
+    (0.050, -0.004, 0.092, 0.158),
+    (0.100, 0.0, 0.088, 0.144),
+    (0.140, 0.0, 0.080, 0.130),
+    (0.160, 0.0, 0.060, 0.100),
+)
+_TORSO: tuple[Row, ...] = (
+    (-0.115, -0.014, 0.126, 0.182),
+    (-0.055, -0.006, 0.114, 0.165),
+    (0.040, 0.004, 0.106, 0.143),
+    (0.130, 0.010, 0.114, 0.150),
+    (0.210, 0.010, 0.118, 0.163),
+    (0.275, 0.004, 0.110, 0.172),
+    (0.325, -0.002, 0.098, 0.185),
+    (0.350, -0.008, 0.088, 0.182),
+    (0.364, -0.012, 0.078, 0.158),
+    (0.375, -0.014, 0.070, 0.120),
+    (0.384, -0.015, 0.064, 0.084),
+    (0.390, -0.015, 0.061, 0.069),
+)
+_LEANS_M, _LEAN = 0.27, 0.52
+"""From which height on the sections of a torso lean forward, and how steep that of the collar is:
+the neck comes out of a body lower in front than behind."""
+
+
+def _scaled(rows: Sequence[Row], k: float) -> list[Row]:
+    return [(z * k, x * k, a * k, b * k) for z, x, a, b in rows]
+
+
+def _fine(rows: Sequence[Row], each: int) -> list[Row]:
+    """Return so many sections for each of these, on a smooth line through them."""
+    from scipy.interpolate import PchipInterpolator  # where no mesh is made, scipy is not loaded
+
+    at = np.linspace(0.0, len(rows) - 1.0, each * (len(rows) - 1) + 1)
+    smooth = PchipInterpolator(np.arange(len(rows)), np.array(rows))(at)
+    return [(z, x, a, b) for z, x, a, b in smooth.tolist()]
+
+
+def _shirt(look: PersonLook, k: float) -> Painted:
+    mesh = loft(_fine(_TORSO, 3), 28)
+    points = mesh.vertices.copy()
+    height = points[:, 2].copy()
+    top = _TORSO[-1][0]
+    share = np.clip((height - _LEANS_M) / (top - _LEANS_M), 0.0, 1.0)
+    points[:, 2] -= _LEAN * share * share * (points[:, 0] + 0.015)
+    shirt = painted(Mesh(points * k, mesh.faces), look.shirt)
+    pale = _mixed(look.shirt, (255, 255, 255), 0.40)
+    dark = _mixed(look.shirt, (20, 20, 30), 0.35)
+    colours = mix(shirt.colours, pale, step(height - 0.3845, 0.002))
+    return shirt._replace(colours=mix(colours, dark, 0.5 * step(-height - 0.108, 0.004)))
+
+
+def _neck(neck_m: float, k: float) -> Mesh:
+    rows = [
+        (-0.075, 0.000, 0.058), (-0.045, 0.000, 0.059), (-0.020, 0.0, 0.057),
+        (0.35 * neck_m, 0.002, 0.054), (0.75 * neck_m, 0.003, 0.054), (neck_m + 0.03, 0.002, 0.056),
+    ]  # fmt: skip
+    return loft([(z, x, r * k, 1.04 * r * k) for z, x, r in rows], 18)
+
+
+def _hand(look: PersonLook, k: float) -> Painted:
+    """Return a right hand: hanging, its fingers down."""
+    mesh, colours, normals = hand_of(look, 22)
+    size, turn = _HAND_SCALE * k, np.array((1.0, -1.0, -1.0))
+    # Fingers end bluntly, not in the point of an ellipsoid.
+    u = np.clip((mesh.vertices[:, 2] - 0.45) / 0.55, 0.0, 0.99)
+    blunt = np.minimum((1.0 - u**4) ** 0.25 / np.sqrt(1.0 - u**2), 1.9)[:, None]
+    round_off = mesh.vertices * np.hstack([blunt, blunt, np.ones_like(blunt)])
+    points = (round_off + (0.0, 0.0, _WRIST)) * size * turn
+    assert normals is not None
+    return Painted(Mesh(points, mesh.faces), colours, normals * turn)
+
+
+def _shoe(body: Measures) -> Mesh:
+    k = body.foot_m / 0.262
+    low = -body.ankle_m / k
+
+    def field(points: Floats) -> Floats:
+        sole = capsule((-0.035, 0.0, low + 0.036), (0.125, 0.0, low + 0.030), 0.040, 0.042)(points)
+        toe = ellipsoid((0.135, 0.0, low + 0.028), (0.065, 0.046, 0.030))(points)
+        leg = capsule((-0.012, 0.0, low + 0.05), (0.0, 0.0, 0.012), 0.042, 0.040)(points)
+        solid = union(union(sole, toe, 0.03), leg, 0.04)
+        return np.asarray(np.maximum(solid, low + 0.002 - points[:, 2]))
+
+    found = Solid(field, (0.03, 0.0, low + 0.03), 0.30).all_round(11, 16)
+    return grid(found.points * k, closed=True)
+
+
+def boxing_glove(k: float = 1.0) -> Painted:
+    """Return a right boxing glove over a fist, with a white cuff and a patch that shows spin."""
+
+    def field(points: Floats) -> Floats:
+        fist = ellipsoid((0.0, 0.0, -0.090), (0.066, 0.074, 0.086))(points)
+        thumb = capsule((0.030, -0.055, -0.055), (0.046, -0.050, -0.105), 0.028, 0.026)(points)
+        cuff = capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.050), 0.048, 0.050)(points)
+        return union(union(fist, thumb, 0.02), cuff, 0.03)
+
+    found = Solid(field, (0.0, 0.0, -0.06), 0.26).all_round(26, 26)
+    points = found.points.reshape(-1, 3)
+    colours = np.broadcast_to(np.array(_GLOVE, float), points.shape)
+    colours = mix(colours, (240, 238, 232), step(points[:, 2] - 0.005, 0.006))
+    colours = mix(
+        colours, (242, 240, 234), step(spot(points, (-0.066, 0.0, -0.10), 0.05) - 0.62, 0.1)
+    )
+    colours = mix(colours, (120, 14, 20), step(points[:, 0] - 0.05, 0.01))
+    return Painted(
+        Mesh(found.points.reshape(-1, 3) * k, grid(found.points, closed=True).faces),
+        colours,
+        found.normals.reshape(-1, 3),
+    )
+
+
+def cup() -> Painted:
+    """Return a mug about the middle of its height, z up."""
+    rows = [(-0.048, 0.0, 0.030, 0.030), (0.048, 0.0, 0.040, 0.040)]
+    mug = painted(loft(rows, 24), (236, 232, 222))
+    stripe = step(0.014 - np.abs(mug.mesh.vertices[:, 2] + 0.048), 0.004)
+    turn = np.linspace(-0.5 * pi, 0.5 * pi, 8)
+    handle = np.stack([0.038 + 0.026 * np.cos(turn), 0 * turn, 0.028 * np.sin(turn)], axis=1)
+    ring = [(0.006 * cos(w), 0.006 * sin(w)) for w in np.linspace(0, 2 * pi, 8, endpoint=False)]
+    tube = [[(x, y + b, z + a) for a, b in ring] for x, y, z in handle.tolist()]
+    grip = painted(grid(np.array(tube), closed=True), (196, 84, 60))
+    return merged([mug._replace(colours=mix(mug.colours, (196, 84, 60), stripe)), grip])
+
+
+def ball() -> Painted:
+    """Return a ball with stripes."""
+    angles = [radians(d) for d in range(-90, 91, 12)]
+    mesh = loft([(0.06 * sin(a), 0.0, 0.06 * cos(a), 0.06 * cos(a)) for a in angles], 24)
+    plain = painted(mesh, (220, 150, 40))
+    stripe = step(np.sin(5.0 * np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])), 0.3)
+    return plain._replace(colours=mix(plain.colours, (60, 90, 170), stripe))
+
+
+def _mixed(colour: Colour, other: Colour, share: float) -> Colour:
+    r, g, b = (round(a + share * (o - a)) for a, o in zip(colour, other, strict=True))
+    return r, g, b
+
+
+def _shaded(skin: Colour) -> Colour:
+    return _mixed(skin, (120, 60, 44), 0.18)

@@ -1,0 +1,113 @@
+"""People as articulated figures: where every segment of every body is at any time.
+
+A script and a seed say all there is to know, so every process computes the same places from the
+time alone. The motion of a whole round is computed once, a row every 10 ms; a time in between lies
+on the line between two rows. The frames of segments are those of body_motion.
+"""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gazerig.features.world import handed_over
+from gazerig.features.world.body_motion import SEGMENTS as SEGMENTS
+from gazerig.features.world.body_motion import SIDES as SIDES
+from gazerig.features.world.body_motion import BodyMotion
+from gazerig.features.world.gait import RATE_HZ
+from gazerig.features.world.measures import Measures, measures
+from gazerig.features.world.script import WorldScript
+from gazerig.features.world.timeline import TimedAct, timed
+from gazerig.gaze.types import Floats
+
+
+class Segments(NamedTuple):
+    """All segments at one time: places (n, 3) in m, quaternions (n, 4), w first."""
+
+    p_m: Floats
+    quat: Floats
+
+
+class Figures:
+    """All people of a script, and the things that they hold.
+
+    Args:
+        script: checked (see script_faults).
+        seed: of what may vary: blinks, the wandering of the gaze, and acts that say so.
+        shared: the file in which several processes have the motion in common, None for none.
+    """
+
+    def __init__(self, script: WorldScript, seed: int = 0, shared: Path | None = None) -> None:
+        self.script, self.seed, self.shared = script, seed, shared
+        self.names: tuple[str, ...] = (
+            *(f"{name}/{segment}" for name in script.people for segment in SEGMENTS),
+            *(f"thing/{name}" for name in script.things),
+        )
+        self.row = {name: i for i, name in enumerate(self.names)}
+        self._last: tuple[float, Segments] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.script, self.seed, self.shared)
+
+    @cached_property
+    def timelines(self) -> Mapping[str, tuple[TimedAct, ...]]:
+        """Return what each person does when."""
+        return {name: timed(self.script, name, self.seed) for name in self.script.people}
+
+    @cached_property
+    def measures(self) -> Mapping[str, Measures]:
+        """Return the measures of each person."""
+        return {name: measures(one.stature_m) for name, one in self.script.people.items()}
+
+    @cached_property
+    def _table(self) -> Floats:
+        """Return places and quaternions (rows, n, 7) over a round."""
+        if self.shared is not None:
+            with suppress(OSError):  # nobody has written it, or it is gone with the run
+                return np.asarray(np.load(self.shared, mmap_mode="r"))
+        return _round(self)
+
+    def share(self) -> None:
+        """Write the motion into the file for the other processes, where there is one."""
+        if self.shared is not None:
+            half = self.shared.with_suffix(".half.npy")
+            np.save(half, self._table)
+            half.rename(self.shared)
+
+    def segments(self, t_s: float) -> Segments:
+        """Return all segments at a time, which counts on over rounds."""
+        if self._last is not None and self._last[0] == t_s:
+            return self._last[1]
+        at = (t_s % self.script.round_s) * RATE_HZ
+        row = int(at)
+        before, after = self._table[row], self._table[row + 1]
+        now = before + (at - row) * (after - before)
+        quat = now[:, 3:]
+        found = Segments(now[:, :3], quat / np.sqrt((quat * quat).sum(axis=1, keepdims=True)))
+        self._last = (t_s, found)
+        return found
+
+
+def times(round_s: float) -> Floats:
+    """Return the times of a round's rows, the last at its end or just after."""
+    return np.arange(int(np.ceil(round_s * RATE_HZ)) + 2) / RATE_HZ
+
+
+def _round(figures: Figures) -> Floats:
+    script = figures.script
+    t_s = times(script.round_s)
+    bodies = [
+        BodyMotion(script, figures.timelines, name, body, t_s, figures.seed)
+        for name, body in figures.measures.items()
+    ]
+    eyes = {name: body.eyes_about_m for name, body in zip(script.people, bodies, strict=True)}
+    rows = [row for body in bodies for row in body.pose(eyes)]
+    hands = {(body.name, side): body.hands[side] for body in bodies for side in SIDES}
+    ahead = {body.name: body.ahead for body in bodies}
+    for name in script.things:
+        found = handed_over.holders(script, figures.timelines, name)
+        rows.append(handed_over.thing_poses(t_s, found, hands, ahead))
+    return np.stack(rows, axis=1) if rows else np.zeros((len(t_s), 0, 7))

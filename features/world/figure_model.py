@@ -1,0 +1,149 @@
+"""People as bodies of a MuJoCo model: a mocap body a segment, with a mesh and shapes to collide."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from gazerig.features.world.body_shape import ball, body_segments, cup
+from gazerig.features.world.figure import SEGMENTS, Figures
+from gazerig.features.world.measures import Measures
+from gazerig.features.world.script import PersonScript
+from gazerig.gaze.types import Vec3
+from gazerig.robot.description.paint import Painted, moved
+from gazerig.robot.description.person_shape import WORLD_LOOKS, HeadSegments, head_segments
+from gazerig.robot.description.texture import textured
+
+FINENESS = 0.45
+SOLID_GROUP = 3
+"""Group of the shapes that collide, which pictures do not show."""
+_SPECULAR, _SHININESS = 0.12, 0.2
+
+
+def add_people(spec: Any, figures: Figures) -> None:
+    """Add the people of a script and their things to a specification, each body at its name.
+
+    Bodies are mocap bodies with the names of ``figures.names``: their places are set at every time.
+    """
+    gloves = {name: person.gloves for name, person in figures.script.people.items()}
+    for name, shape in figure_shapes(figures).items():
+        body = spec.worldbody.add_body(name=name, mocap=True)
+        add_mesh(spec, body, name, shape)
+        owner, _, segment = name.partition("/")
+        if owner in gloves:
+            _add_solid(body, segment, figures.measures[owner], gloves[owner])
+
+
+def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Painted]:
+    """Return the shape of every segment and thing in its own frame, in the order of the names.
+
+    Args:
+        figures: the people.
+        fineness: of their heads: 1 for a close look, less for fewer triangles.
+    """
+    found: dict[str, Painted] = {}
+    for name, person in figures.script.people.items():
+        parts = _person_shapes(person, figures.measures[name], fineness)
+        found |= {f"{name}/{segment}": parts[segment] for segment in SEGMENTS}
+    for name, thing in figures.script.things.items():
+        found[f"thing/{name}"] = cup() if thing.kind == "cup" else ball()
+    return found
+
+
+class PlacedPeople:
+    """Puts people and things where they are: the mocap poses of MuJoCo's data.
+
+    Args:
+        model: compiled, with these people in it.
+        figures: the people.
+    """
+
+    def __init__(self, model: Any, figures: Figures) -> None:
+        self._figures = figures
+        rows = [int(model.body_mocapid[model.body(name).id]) for name in figures.names]
+        self._rows: Any = np.array(rows)
+        first = rows[0] if rows else 0
+        if rows == list(range(first, first + len(rows))):  # a slice is quicker
+            self._rows = slice(first, first + len(rows))
+
+    def place(self, data: Any, t_s: float) -> None:
+        """Put all where they are at a time of their script."""
+        found = self._figures.segments(t_s)
+        data.mocap_pos[self._rows], data.mocap_quat[self._rows] = found.p_m, found.quat
+
+
+def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
+    """Add a painted mesh that collides with nothing to a body."""
+    mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+    material = spec.add_material(name=name, specular=_SPECULAR, shininess=_SHININESS)
+    if np.ptp(shape.colours, axis=0).max() < 1.0:
+        mesh.uservert = shape.mesh.vertices.ravel()
+        mesh.userface = shape.mesh.faces.ravel()
+        material.rgba = [*(shape.colours[0, :3] / 255.0), 1.0]
+    else:
+        skin = textured(shape)
+        mesh.uservert, mesh.usernormal = skin.vertices.ravel(), skin.normals.ravel()
+        mesh.userface, mesh.usertexcoord = skin.faces.ravel(), skin.uv.ravel()
+        rows, columns = skin.image.shape[:2]
+        texture = spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_2D)
+        texture.width, texture.height, texture.nchannel = columns, rows, 3
+        texture.data = skin.image[:, :, :3].tobytes()
+        textures = list(material.textures)
+        textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = name
+        material.textures = textures
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        material=name,
+        contype=0,
+        conaffinity=0,
+        group=1,
+    )
+
+
+def _person_shapes(person: PersonScript, body: Measures, fineness: float) -> dict[str, Painted]:
+    look = WORLD_LOOKS[person.look]
+    return {
+        **_head_parts(head_segments(look, fineness), body),
+        **body_segments(body, look, person.gloves),
+    }
+
+
+def _head_parts(head: HeadSegments, body: Measures) -> dict[str, Painted]:
+    nose = tuple(-one for one in body.skull_m)
+    here: Vec3 = (0.0, 0.0, 0.0)
+    k = body.head_scale
+    return {
+        "head": moved(head.head, (nose[0], nose[1], nose[2]), k),
+        "lips": moved(head.lips, here, k),
+        **{f"{side}_eye": moved(head.eye, here, k) for side in ("left", "right")},
+        **{f"{side}_lid": moved(head.lid, here, k) for side in ("left", "right")},
+    }
+
+
+def _add_solid(node: Any, segment: str, body: Measures, gloves: bool) -> None:
+    """Add the shape that a segment collides with; small ones have none."""
+    k = body.stature_m / 1.72
+    part = segment.split("_", 1)[-1]
+    capsules = {
+        "upper_arm": (body.upper_arm_m, 0.045 * k),
+        "forearm": (body.forearm_m, 0.036 * k),
+        "hand": (0.13 * k, 0.036 * k),
+        "thigh": (body.thigh_m, 0.075 * k),
+        "shank": (body.shank_m, 0.05 * k),
+        "torso": (-0.30 * k, 0.125 * k),
+    }
+    kind, size, start = mujoco.mjtGeom.mjGEOM_CAPSULE, [0.0, 0.0, 0.0], None
+    pos = [0.0, 0.0, 0.0]
+    if segment == "head":
+        kind, size, pos = mujoco.mjtGeom.mjGEOM_ELLIPSOID, [0.098, 0.078, 0.118], [-0.005, 0, 0.05]
+    elif part == "hand" and gloves:
+        kind, size, pos = mujoco.mjtGeom.mjGEOM_ELLIPSOID, [0.066, 0.074, 0.086], [0, 0, -0.09]
+    elif part in capsules:
+        length, radius = capsules[part]
+        start, size = [0.0, 0.0, 0.0, 0.0, 0.0, -length], [radius, 0.0, 0.0]
+    else:
+        return
+    shape = node.add_geom(type=kind, size=size, pos=pos, group=SOLID_GROUP, rgba=[1, 0, 0, 0.3])
+    if start is not None:
+        shape.fromto = start

@@ -1,0 +1,230 @@
+"""Where a person's hips and feet are over a round: walks, steps, turns, sitting down, standing up.
+
+A foot that stands does not move: it is planted where the hips will be in the middle of its stance,
+and moves to its next place while the other one stands. Not modelled: running, stairs.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import atan2, ceil
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.features.world.measures import Measures
+from gazerig.features.world.room import (
+    SEAT_AHEAD_M,
+    WALK_ENDS_S,
+    WALK_STARTS_S,
+    Place,
+    way_points,
+)
+from gazerig.features.world.time_profiles import hump, rise, smoothed
+from gazerig.features.world.timeline import TimedAct
+from gazerig.gaze.types import Floats
+
+RATE_HZ = 100.0
+"""Rows a second of all tables of motion."""
+
+_STRIDE_S, _SWING_SHARE = 0.52, 0.82
+_PATH_S, _HEADING_S = 0.6, 1.5
+_MIDDLE = 1.0 + 0.5 * _SWING_SHARE
+"""Steps from a foot's lifting to the middle of its next stance."""
+_LIFT_M = 0.06
+_SAME_M = 1e-4
+_BOX_STANCE_M, _BOX_OUT_RAD = 0.16, 0.35
+
+
+class Base(NamedTuple):
+    """Hips and feet of a person, a row a time; heights above the floor.
+
+    hips_m: (n, 2) on the floor; heading_rad: (n,) unwrapped; seated: (n,) 0 standing .. 1 sitting
+    seat_m: (n,) height of the seat that is sat upon; feet_m: (n, 2, 3) ankles' places with z the
+        height a foot is lifted by; feet_rad: (n, 2) where the feet point; left first
+    """
+
+    hips_m: Floats
+    heading_rad: Floats
+    seated: Floats
+    seat_m: Floats
+    feet_m: Floats
+    feet_rad: Floats
+
+
+class _SteppingTime(NamedTuple):
+    """A time within which the feet step."""
+
+    start_s: float
+    end_s: float
+
+
+class _Path:
+    """The hips' way, filled act by act."""
+
+    def __init__(self, t_s: Floats, start: Place, places: Mapping[str, Place]) -> None:
+        self.t_s, self.places, self.at = t_s, places, start
+        rows = len(t_s)
+        x, y = start.ahead(SEAT_AHEAD_M) if start.seat_m is not None else (start.x_m, start.y_m)
+        self.way = np.tile((x, y), (rows, 1))
+        self.heading = np.full(rows, start.facing_rad)
+        sitting = start.seat_m is not None
+        self.seated = np.full(rows, 1.0 if sitting else 0.0)
+        self.seat_m = np.full(rows, start.seat_m if start.seat_m is not None else 0.0)
+        self.stretches: list[_SteppingTime] = []
+
+    def add(self, one: TimedAct) -> None:
+        """Let the person do an act that moves hips or feet."""
+        act, start_s, end_s = one.act, one.start_s, one.end_s
+        rows = self.t_s >= start_s
+        share = rise((self.t_s - start_s) / (end_s - start_s))
+        if act.do in ("sit", "stand"):
+            self.seated[rows] = (share if act.do == "sit" else 1.0 - share)[rows]
+            if act.do == "sit":
+                self.seat_m[rows] = self.at.seat_m or 0.0
+            return
+        x, y = self.way[-1].tolist()
+        facing = float(self.heading[-1])
+        if act.do == "walk":
+            target = self.places[act.to]
+            self._walk(target, [self.places[name] for name in act.via], start_s, end_s)
+            return
+        if act.do == "step":
+            if act.to:
+                target = self.places[act.to]
+                x, y, facing = target.x_m, target.y_m, _nearest(target.facing_rad, facing)
+            else:
+                c, s = np.cos(facing), np.sin(facing)
+                x += act.ahead_m * c - act.left_m * s
+                y += act.ahead_m * s + act.left_m * c
+        elif one.target is not None:
+            facing = _nearest(atan2(one.target[1] - y, one.target[0] - x), facing)
+        self.at = Place(x, y, facing)
+        self.way[rows] = self.way[rows] + share[rows, None] * ((x, y) - self.way[rows])
+        self.heading[rows] += share[rows] * (facing - self.heading[rows])
+        self.stretches.append(_SteppingTime(start_s, end_s))
+
+    def _walk(self, target: Place, via: Sequence[Place], start_s: float, end_s: float) -> None:
+        points = way_points(self.at, target, via, (float(self.way[-1][0]), float(self.way[-1][1])))
+        # One who is there already only turns.
+        longer = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME_M
+        points = points[np.concatenate(((True,), longer))]
+        if len(points) < 2:
+            facing = float(self.heading[-1])
+            points = points + np.outer((0.0, _SAME_M), (np.cos(facing), np.sin(facing)))
+        legs = np.diff(points, axis=0)
+        lengths = np.linalg.norm(legs, axis=1)
+        along = np.concatenate(((0.0,), np.cumsum(lengths)))
+        begin_s, arrive_s = start_s + WALK_STARTS_S, end_s - WALK_ENDS_S
+        gone = along[-1] * _steady((self.t_s - begin_s) / (arrive_s - begin_s), arrive_s - begin_s)
+        rows = self.t_s >= begin_s
+        for axis in (0, 1):
+            self.way[rows, axis] = np.interp(gone[rows], along, points[:, axis])
+        tangents = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
+        tangents += _nearest(tangents[0], float(self.heading[-1])) - tangents[0]
+        which = np.clip(np.searchsorted(along, gone, "right") - 1, 0, len(legs) - 1)
+        walking = rows & (self.t_s < arrive_s)
+        self.heading[walking] = tangents[which][walking]
+        facing = _nearest(target.facing_rad, float(tangents[-1]))
+        self.heading[self.t_s >= arrive_s] = facing
+        self.at = target
+        self.stretches.append(_SteppingTime(start_s, end_s))
+
+
+def base_motion(
+    t_s: Floats,
+    start: Place,
+    acts: Sequence[TimedAct],
+    places: Mapping[str, Place],
+    body: Measures,
+    boxes: bool,
+) -> Base:
+    """Return hips and feet over a round.
+
+    Args:
+        t_s: times of the rows (n,), RATE_HZ a second.
+        start: where the round begins; on a seat, sitting.
+        acts: those that move hips or feet, in order.
+        places: by name.
+        body: measures.
+        boxes: stands as a boxer does, one foot ahead and knees bent.
+    """
+    path = _Path(t_s, start, places)
+    for act in acts:
+        path.add(act)
+    way = smoothed(path.way, round(_PATH_S * RATE_HZ))
+    heading = smoothed(path.heading, round(_HEADING_S * RATE_HZ))
+    feet = _Feet(t_s, way, heading, body, boxes)
+    for stretch in path.stretches:
+        feet.step(stretch)
+    back = SEAT_AHEAD_M * path.seated[:, None]
+    hips = way - back * np.stack((np.cos(heading), np.sin(heading)), axis=1)
+    return Base(hips, heading, path.seated, path.seat_m, feet.p_m, feet.yaw_rad)
+
+
+class _Feet:
+    """Both feet, planted and moved stretch by stretch."""
+
+    def __init__(
+        self, t_s: Floats, way: Floats, heading: Floats, body: Measures, boxes: bool
+    ) -> None:
+        self.t_s, self.way, self.heading = t_s, way, heading
+        self.half, self.boxes = body.half_hips_m * 1.05, boxes
+        self.p_m = np.zeros((len(t_s), 2, 3))
+        self.yaw_rad = np.zeros((len(t_s), 2))
+        for foot in (0, 1):
+            place, yaw = self._home(foot, 0)
+            self.p_m[:, foot, :2], self.yaw_rad[:, foot] = place, yaw
+
+    def step(self, stretch: _SteppingTime) -> None:
+        """Let the feet follow the hips within a stretch, the outer one first."""
+        last = len(self.t_s) - 1
+        begin, end = (min(last, round(s * RATE_HZ)) for s in stretch)
+        turn = self.heading[end] - self.heading[begin]
+        across = self._home(0, end)[0] - self.p_m[begin, 0, :2]
+        aside = across @ (-np.sin(self.heading[begin]), np.cos(self.heading[begin]))
+        first = 0 if turn + 2.0 * aside > 0.0 else 1
+        count = max(2, ceil((stretch.end_s - stretch.start_s) / _STRIDE_S))
+        each_s = (stretch.end_s - stretch.start_s) / count
+        for k in range(count):
+            foot = (first + k) % 2
+            lift_s = stretch.start_s + k * each_s
+            middle_s = lift_s + _MIDDLE * each_s if k < count - 2 else stretch.end_s + 0.6
+            self._move(foot, lift_s, each_s * _SWING_SHARE, min(last, round(middle_s * RATE_HZ)))
+
+    def _move(self, foot: int, lift_s: float, swing_s: float, row: int) -> None:
+        place, yaw = self._home(foot, row)
+        share = (self.t_s - lift_s) / swing_s
+        rows = share >= 0.0
+        moved = rise(share)[rows]
+        before, yaw_before = self.p_m[-1, foot, :2].copy(), float(self.yaw_rad[-1, foot])
+        self.p_m[rows, foot, :2] = before + moved[:, None] * (place - before)
+        self.yaw_rad[rows, foot] = yaw_before + moved * (yaw - yaw_before)
+        far = float(np.linalg.norm(place - before)) + 0.15 * abs(yaw - yaw_before)
+        self.p_m[rows, foot, 2] = _LIFT_M * min(1.0, far / 0.3) * hump(share)[rows]
+
+    def _home(self, foot: int, row: int) -> tuple[Floats, float]:
+        """Return where a foot stands under the hips of a row, and where it points."""
+        heading, side = float(self.heading[row]), 1.0 - 2.0 * foot
+        ahead, aside, out = 0.0, side * self.half, side * 0.10
+        if self.boxes:
+            ahead, aside, out = (
+                side * _BOX_STANCE_M,
+                1.25 * aside,
+                (0.15, -1.0)[foot] * _BOX_OUT_RAD,
+            )
+        c, s = np.cos(heading), np.sin(heading)
+        place = self.way[row] + (ahead * c - aside * s, ahead * s + aside * c)
+        return place, heading + out
+
+
+def _steady(share: Floats, lasts_s: float) -> Floats:
+    """Return a way from 0 to 1 at a steady speed that begins and ends smoothly."""
+    ramp = min(0.5, 0.45 / lasts_s)
+    fine = np.linspace(0.0, 1.0, 400)
+    speed = rise(fine / ramp) * rise((1.0 - fine) / ramp)
+    gone = np.concatenate(((0.0,), np.cumsum(0.5 * (speed[1:] + speed[:-1]))))
+    return np.asarray(np.interp(np.clip(share, 0.0, 1.0), fine, gone / gone[-1]))
+
+
+def _nearest(angle_rad: float, to_rad: float) -> float:
+    """Return an angle plus whole turns, as near to another as it gets."""
+    return angle_rad + 2.0 * np.pi * round((to_rad - angle_rad) / (2.0 * np.pi))

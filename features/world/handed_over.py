@@ -1,0 +1,117 @@
+"""Things that go from hand to hand: who holds one when, and where it is."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from gazerig.features.world.rotations import quaternions, turned, yaw_of, yaw_pitch_roll
+from gazerig.features.world.script import Act, Fault, WorldScript
+from gazerig.features.world.time_profiles import rise
+from gazerig.features.world.timeline import TimedAct
+from gazerig.gaze.types import Floats
+
+GRIP_M = np.array((0.046, 0.0, -0.085))
+"""Middle of what a hand holds, in the hand's frame."""
+_CHANGES_S = 0.3
+Side = Literal["left", "right"]
+_OTHER: Mapping[Side, Side] = {"left": "right", "right": "left"}
+
+Timelines = Mapping[str, tuple[TimedAct, ...]]
+
+
+class Holder(NamedTuple):
+    """From ``from_s`` on a thing is in this hand."""
+
+    from_s: float
+    person: str
+    side: str
+
+
+def holders(script: WorldScript, timelines: Timelines, thing: str) -> list[Holder]:
+    """Return who holds a thing one after the other; it changes hands in the middle of a pass."""
+    first = script.things[thing]
+    found = [Holder(0.0, first.held_by, first.side)]
+    passes = [
+        (0.5 * (one.start_s + one.end_s), one.act)
+        for acts in timelines.values()
+        for one in acts
+        if one.act.do == "pass" and one.act.thing == thing
+    ]
+    for middle_s, act in sorted(passes, key=lambda one: one[0]):
+        found.append(Holder(middle_s, act.to, _OTHER[act.side]))
+    return found
+
+
+def received(timelines: Timelines, name: str) -> list[TimedAct]:
+    """Return what a person does to take what others pass, with the hand on their side."""
+    return [
+        TimedAct(Act(one.act.at_s, "pass", giver, side=_taking(one.act)), one.start_s, one.end_s)
+        for giver, acts in timelines.items()
+        for one in acts
+        if one.act.do == "pass" and one.act.to == name
+    ]
+
+
+def _taking(act: Act) -> Side:
+    return _OTHER[act.side]
+
+
+def held_share(t_s: Floats, found: Sequence[Holder], person: str, side: str) -> Floats:
+    """Return how far a hand is one that holds a thing (n,), 0..1."""
+    total = np.zeros_like(t_s)
+    for i, one in enumerate(found):
+        now = 1.0 if (one.person, one.side) == (person, side) else 0.0
+        since = np.ones_like(t_s) if i == 0 else rise((t_s - one.from_s + 0.6) / 1.2)
+        total = total + since * (now - total)
+    return total
+
+
+def thing_poses(
+    t_s: Floats,
+    found: Sequence[Holder],
+    hands: Mapping[tuple[str, str], tuple[Floats, Floats]],
+    ahead: Mapping[str, Floats],
+) -> Floats:
+    """Return places and quaternions (n, 7) of a thing, which stays upright.
+
+    Args:
+        t_s: times of the rows.
+        found: who holds it.
+        hands: places (n, 3) and rotations (n, 3, 3) of hands by person and side.
+        ahead: (n, 3) where each person is turned.
+    """
+    place, yaw = np.zeros((len(t_s), 3)), np.zeros_like(t_s)
+    for i, one in enumerate(found):
+        p_m, R = hands[one.person, one.side]
+        since = np.ones_like(t_s) if i == 0 else rise((t_s - one.from_s) / _CHANGES_S + 0.5)
+        place = place + since[:, None] * (p_m + turned(R, GRIP_M) - place)
+        turn = np.unwrap(yaw_of(ahead[one.person]))
+        yaw = turn if i == 0 else yaw + since * (turn - yaw)
+    return np.concatenate((place, quaternions(yaw_pitch_roll(yaw, 0.0 * yaw))), axis=1)
+
+
+def passing_faults(script: WorldScript, timelines: Timelines) -> Iterator[Fault]:
+    """Yield who passes what another holds, and what ends the round in another hand."""
+    for thing, first in script.things.items():
+        holder = first.held_by
+        passes = sorted(
+            (one.start_s, name, i, one.act)
+            for name, acts in timelines.items()
+            for i, one in enumerate(acts)
+            if one.act.do == "pass" and one.act.thing == thing
+        )
+        side: str = first.side
+        for _, name, i, act in passes:
+            key = f"people.{name}.acts.{i}"
+            if name != holder:
+                yield f"{key}.thing", f"{holder} holds {thing} then; let {holder} pass it"
+            elif act.side != side:
+                yield f"{key}.side", f"{name} has {thing} in the {side} hand; write side: {side}"
+            holder, side = act.to, _taking(act)
+        if (holder, side) != (first.held_by, first.side):
+            yield (
+                f"things.{thing}.held_by",
+                f"is in {holder}'s {side} hand when the round ends, in {first.held_by}'s "
+                f"{first.side} when it begins; let it be passed back",
+            )

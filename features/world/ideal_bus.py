@@ -1,0 +1,121 @@
+"""Servos without bytes that move a world's joints: goals in, a lag out, whatever they carry."""
+
+from collections.abc import Callable, Sequence
+
+from gazerig.drivers.types import Feedback, ServoConfig
+from gazerig.features.world.shaft import LIMP, SPEED_UNIT, Effort
+from gazerig.features.world.shaft_axis import ShaftAxis
+from gazerig.sim_mock.ideal.bus import LAG_S, WARM_C, IdealBus
+from gazerig.sim_mock.smart_servo.controller import MS_S
+
+ROTOR_KG_M2 = 2e-4
+FRICTION_NM = 0.006
+"""As an XL330 has, so that a limp head does not fall."""
+
+HOLD_NM_S = 2.0
+"""Torque for each rad/s by which the shaft is slower than it should be."""
+MOST_NM = 3.0
+
+
+class IdealShaft:
+    """A shaft that closes the distance to its goal with a time constant.
+
+    Args:
+        axis: the shaft in the world.
+        steps_per_turn: of its servo.
+
+    Attributes:
+        goal: in steps of its servo; None while its torque is off.
+    """
+
+    def __init__(self, axis: ShaftAxis, steps_per_turn: float) -> None:
+        self.axis = axis
+        self.goal: float | None = None
+        self._unit = 4096.0 / steps_per_turn
+        self._x = axis.position()
+        self._v = 0.0
+        axis.build(ROTOR_KG_M2, FRICTION_NM, 0.0)
+
+    @property
+    def place_steps(self) -> float:
+        """Return where it is."""
+        return self.axis.position() / self._unit
+
+    @property
+    def speed_steps_s(self) -> float:
+        """Return how fast it turns."""
+        return self._v / (MS_S * self._unit)
+
+    def command(self) -> Effort:
+        """Return what its motor does in the next millisecond."""
+        if self.goal is None:
+            return LIMP
+        wanted = (self.goal * self._unit - self._x) / (LAG_S * 1000.0)
+        return HOLD_NM_S * wanted / SPEED_UNIT, -HOLD_NM_S, -MOST_NM, MOST_NM
+
+    def sense(self, x: float, v: float) -> None:
+        """Set position (4096 steps a turn) and speed (steps/ms) to what the world has made."""
+        self._x, self._v = x, v
+
+
+class WorldIdealBus(IdealBus):
+    """All servos of a rig in a world; a gazerig.drivers.types.ServoBus.
+
+    Args:
+        configs: of the servos.
+        shafts: of the servos, in the same order.
+        measured: whether each of them has feedback.
+        now_s: the clock of the world.
+    """
+
+    def __init__(
+        self,
+        configs: Sequence[ServoConfig],
+        shafts: Sequence[IdealShaft],
+        measured: Sequence[bool],
+        now_s: Callable[[], float],
+    ) -> None:
+        self._shafts = tuple(shafts)
+        super().__init__(configs, [one.place_steps for one in shafts], measured, now_s)
+        self._feedback_of = tuple(measured)
+
+    def positions_steps(self) -> tuple[float, ...]:
+        """Return the true positions now, in the order of the servos."""
+        self._now_s()
+        return tuple([one.place_steps for one in self._shafts])
+
+    def read(self, now_s: float) -> Feedback:
+        """Return the positions, rounded to steps, and the speeds."""
+        steps, count = self.positions_steps(), len(self._shafts)
+        return Feedback(
+            tuple([float(round(at)) for at in steps]),
+            tuple([one.speed_steps_s for one in self._shafts]),
+            (0.0,) * count,
+            (now_s,) * count,
+            tuple([WARM_C if one else None for one in self._feedback_of]),
+            (None,) * count,
+            tuple([one.goal is not None for one in self._shafts]),
+            ("",) * count,
+            self._feedback_of,
+            (False,) * count,
+            (),
+        )
+
+    def write(self, goals_steps: Sequence[int]) -> None:
+        """Follow these goals, within the limits; with torque off they change nothing."""
+        if self._shafts[0].goal is not None:
+            self._follow(goals_steps)
+
+    def disable_torque(self) -> None:
+        """Let go of the shafts."""
+        self._now_s()
+        for one in self._shafts:
+            one.goal = None
+
+    def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
+        """Lead the shafts to goals from where they are now; return the goals within the limits."""
+        self._now_s()
+        goals = super()._follow(goals_steps)
+        for one, goal in zip(self._shafts, goals, strict=True):
+            one.goal = goal
+        return goals

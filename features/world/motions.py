@@ -1,0 +1,291 @@
+"""Where a person's hands are over a round: hanging, in the lap, on guard, and what acts do.
+
+A hand is given by its wrist, where its fingers point and where its palm faces; the elbow follows.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.features.world.measures import Measures
+from gazerig.features.world.rotations import directed, unit, within
+from gazerig.features.world.time_profiles import blended, hump, rise, there_and_back
+from gazerig.features.world.timeline import TimedAct
+from gazerig.gaze.types import Floats
+
+FIST_M = 0.07
+"""From the wrist to the middle of a hand or fist."""
+PUNCH_ENDS_M = 0.30
+"""A punch stops this far before its target."""
+PUSH_FROM_M, PUSH_BY_M = 0.13, 0.135
+_FOREHEAD = np.array((0.0, 0.0, 0.045))
+
+
+class Frame(NamedTuple):
+    """The body at all times, for an arm.
+
+    shoulder_m, hips_m, chin_m: (n, 3); ahead, left: (n, 3) where the body is turned, level
+    side: 1 the left arm, -1 the right one
+    """
+
+    shoulder_m: Floats
+    hips_m: Floats
+    chin_m: Floats
+    ahead: Floats
+    left: Floats
+    side: float
+    body: Measures
+
+
+class HandPose(NamedTuple):
+    """A hand at all times, rows (n, 3): wrist, where the fingers point, the palm, the elbow."""
+
+    wrist_m: Floats
+    fingers: Floats
+    palm: Floats
+    pole: Floats
+
+    def towards(self, other: "HandPose", share: Floats) -> "HandPose":
+        """Return a hand between two, by a share a row."""
+        return HandPose(*(blended(a, b, share) for a, b in zip(self, other, strict=True)))
+
+
+class PostureShares(NamedTuple):
+    """How much of the time a way of holding the hands is in force (n,), 0..1."""
+
+    seated: Floats
+    guard: Floats
+    holds: Floats
+
+
+UP = np.array((0.0, 0.0, 1.0))
+
+
+def _point(frame: Frame, origin: Floats, ahead: float, out: float, up: float) -> Floats:
+    """Return a point beside an origin; ``out`` is to the arm's own side."""
+    return np.asarray(origin + ahead * frame.ahead + out * frame.side * frame.left + up * UP)
+
+
+def _way(frame: Frame, ahead: float, out: float, up: float) -> Floats:
+    """Return a direction."""
+    return np.asarray(ahead * frame.ahead + out * frame.side * frame.left + up * UP)
+
+
+def resting(frame: Frame, held: PostureShares, swing_rad: Floats, boxes: bool) -> HandPose:
+    """Return a hand with nothing to do: it hangs and swings, lies in the lap, holds, or guards."""
+    arm = frame.body.arm_m
+    swing = swing_rad[:, None]
+    down = 0.965 * arm * (np.sin(swing) * frame.ahead - np.cos(swing) * UP)
+    hanging = HandPose(
+        frame.shoulder_m + down + 0.05 * frame.side * frame.left + 0.03 * frame.ahead,
+        unit(down) + 0.12 * frame.ahead,
+        _way(frame, -0.25, -1.0, 0.0),
+        _way(frame, -1.0, 0.35, 0.0),
+    )
+    thigh = 0.68 * frame.body.thigh_m
+    lap = HandPose(
+        _point(frame, frame.hips_m, thigh, 0.7 * frame.body.half_hips_m + 0.03, 0.115),
+        _way(frame, 1.0, -0.45, -0.15),
+        _way(frame, 0.1, -0.1, -1.0),
+        _way(frame, -0.6, 1.0, -0.3),
+    )
+    ahead = (0.30 if frame.side > 0 else 0.24) if boxes else 0.27
+    guard = HandPose(
+        _point(frame, frame.chin_m, ahead - 0.06, 0.125, -0.235),
+        _way(frame, 0.55, -0.10, 0.85),
+        _way(frame, -0.35, -1.0, 0.1),
+        _way(frame, 0.0, 0.35, -1.0),
+    )
+    chest = frame.shoulder_m - frame.side * frame.body.half_shoulders_m * frame.left
+    holding = HandPose(
+        _point(frame, chest, 0.30, 0.16, -0.28),
+        _way(frame, 1.0, -0.55, 0.1),
+        _way(frame, 0.3, -1.0, 0.0),
+        _way(frame, -0.4, 0.7, -1.0),
+    )
+    return hanging.towards(lap, held.seated).towards(holding, held.holds).towards(guard, held.guard)
+
+
+def _beat(t_s: Floats, start_s: float, rate_hz: float, phase: float) -> Floats:
+    return np.sin(2.0 * np.pi * rate_hz * (t_s - start_s) + phase)[:, None]
+
+
+def _wave(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    swing = _beat(t_s, one.start_s, 1.5, 0.0)
+    to = unit((target - frame.shoulder_m) * (1.0, 1.0, 0.0))
+    aside = frame.side * frame.left
+    wrist = frame.shoulder_m + 0.24 * to + (0.15 + 0.09 * swing) * aside + 0.10 * UP
+    return HandPose(wrist, UP + 0.35 * swing * aside, to, 0.7 * aside - UP)
+
+
+def _gesture(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    phase = 0.9 * frame.side
+    beat, slow = _beat(t_s, one.start_s, 1.3, phase), _beat(t_s, one.start_s, 0.45, 2.0 * phase)
+    wrist = _point(frame, frame.shoulder_m, 0.27, 0.02, -0.27)
+    wrist = wrist + (0.035 * beat + 0.025 * slow) * UP + 0.05 * slow * frame.side * frame.left
+    return HandPose(
+        wrist,
+        _way(frame, 1.0, -0.15, 0.35),
+        _way(frame, 0.1, -0.8, 0.5),
+        _way(frame, -0.2, 0.6, -1.0),
+    )
+
+
+def _point_at(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    to = unit(target - frame.shoulder_m)
+    wrist = frame.shoulder_m + 0.94 * frame.body.arm_m * to
+    return HandPose(wrist, to, _way(frame, 0.0, -0.4, -1.0), _way(frame, 0.0, 0.4, -1.0))
+
+
+def _reach(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    to = unit(target - frame.shoulder_m)
+    return HandPose(
+        target - FIST_M * to, to, _way(frame, 0.1, -0.7, -0.8), _way(frame, 0.0, 0.6, -1.0)
+    )
+
+
+def _pass(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    to = unit(target - frame.shoulder_m)
+    fingers = unit(to * (1.0, 1.0, 0.2) + 0.3 * frame.ahead)
+    palm = _way(frame, 0.2, -1.0, 0.0)
+    return HandPose(target - FIST_M * to, fingers, palm, _way(frame, 0.0, 0.7, -1.0))
+
+
+def _push(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    lasts_s = one.end_s - one.start_s
+    level = unit((target - frame.shoulder_m) * (1.0, 1.0, 0.0))
+    press = there_and_back(t_s, one.start_s + 0.35 * lasts_s, 0.25 * lasts_s, 0.1, 0.25 * lasts_s)
+    middle = target + _FOREHEAD - level * (PUSH_FROM_M - PUSH_BY_M * press[:, None])
+    fingers = unit(UP + 0.6 * level)
+    return HandPose(
+        middle - FIST_M * fingers, fingers, level - 0.4 * UP, _way(frame, 0.0, 0.7, -1.0)
+    )
+
+
+def _punch(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    to = unit(target - frame.shoulder_m)
+    middle = target - PUNCH_ENDS_M * to
+    return HandPose(
+        middle - FIST_M * to, to, _way(frame, 0.0, -0.2, -1.0), _way(frame, 0.0, 0.6, -0.8)
+    )
+
+
+def _feint(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    return now._replace(wrist_m=_point(frame, now.wrist_m, 0.06, 0.15, 0.05))
+
+
+def _open(frame: Frame, one: TimedAct, t_s: Floats, target: Floats, now: HandPose) -> HandPose:
+    return HandPose(
+        _point(frame, frame.shoulder_m, 0.20, 0.14, -0.36),
+        _way(frame, 0.9, -0.1, 0.1),
+        _way(frame, 0.0, -1.0, -0.2),
+        _way(frame, -0.8, 0.6, -0.8),
+    )
+
+
+_Motion = Callable[[Frame, TimedAct, Floats, Floats, HandPose], HandPose]
+_MOTIONS: Mapping[str, _Motion] = {
+    "wave": _wave,
+    "gesture": _gesture,
+    "point": _point_at,
+    "reach": _reach,
+    "pass": _pass,
+    "push": _push,
+    "punch": _punch,
+    "feint": _feint,
+    "open_guard": _open,
+}
+OUT_S: Mapping[str, tuple[float, float]] = {
+    "punch": (0.42, 0.5),
+    "feint": (0.5, 0.5),
+    "push": (0.34, 0.34),
+    "open_guard": (0.25, 0.25),
+    "wave": (0.2, 0.2),
+    "gesture": (0.2, 0.2),
+    "point": (0.28, 0.3),
+    "reach": (0.28, 0.25),
+    "pass": (0.34, 0.34),
+}
+"""Share of an act's time in which the hand goes out, and in which it comes back."""
+
+
+def in_force(one: TimedAct, t_s: Floats) -> Floats:
+    """Return how far a hand is from where it rests to where an act has it (n,), 0..1."""
+    lasts_s = one.end_s - one.start_s
+    out, back = (min(1.2, share * lasts_s) for share in OUT_S[one.act.do])
+    if one.act.do in ("wave", "gesture", "reach", "point"):
+        out, back = min(out, 0.7), min(back, 0.8)
+    return there_and_back(t_s, one.start_s, out, lasts_s - out - back, back)
+
+
+def hand(
+    frame: Frame, t_s: Floats, acts: Sequence[TimedAct], at: Sequence[Floats], rest: HandPose
+) -> HandPose:
+    """Return a hand over a round.
+
+    Args:
+        frame: the body.
+        t_s: times of the rows.
+        acts: of this arm.
+        at: (n, 3) what each of them is directed at.
+        rest: where the hand is without them.
+    """
+    now = rest
+    for one, target in zip(acts, at, strict=True):
+        share = in_force(one, t_s)
+        now = now.towards(_MOTIONS[one.act.do](frame, one, t_s, target, now), share)
+        # A hand that comes up does so before the body, not through it.
+        wide = 0.12 if one.act.do not in ("punch", "feint") else 0.0
+        bow = wide * 4.0 * share * (1.0 - share) * (1.0 - 0.5 * rise(share))
+        now = now._replace(wrist_m=now.wrist_m + bow[:, None] * frame.ahead)
+    return now
+
+
+def is_of_arm(one: TimedAct) -> bool:
+    """Return whether an act moves a hand."""
+    return one.act.do in _MOTIONS
+
+
+def twist_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:
+    """Return how far the chest is turned to the left by what the hands do (n,)."""
+    total = np.zeros_like(t_s)
+    for one in acts:
+        if one.act.do in ("punch", "reach", "push", "point"):
+            most = 0.45 if one.act.do == "punch" else 0.2
+            total += most * (1.0 if one.act.side == "right" else -1.0) * in_force(one, t_s)
+    return total
+
+
+def lean_rad(
+    t_s: Floats, acts: Sequence[TimedAct], at: Sequence[Floats], chest_m: Floats, body: Measures
+) -> Floats:
+    """Return how far the chest leans ahead so that the hands get where they go (n,)."""
+    total = np.zeros_like(t_s)
+    for one, target in zip(acts, at, strict=True):
+        if one.act.do in ("reach", "push", "pass"):
+            short = {"push": PUSH_FROM_M - PUSH_BY_M}.get(one.act.do, 0.0)
+            away = np.linalg.norm(target - chest_m, axis=1) - short - FIST_M - 0.86 * body.arm_m
+            needed = np.clip(away / (0.26 * body.stature_m), 0.0, 0.75)
+            total += in_force(one, t_s) * needed
+        elif one.act.do == "punch":
+            total += 0.10 * in_force(one, t_s)
+        elif one.act.do == "open_guard":
+            total -= 0.04 * in_force(one, t_s)
+    return total
+
+
+def hit_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:
+    """Return how far blows throw the chest back (n,)."""
+    total = np.zeros_like(t_s)
+    for one in acts:
+        if one.act.do == "be_hit":
+            total += 0.10 * hump((t_s - one.start_s) / (one.end_s - one.start_s))
+    return total
+
+
+def hand_axes(hand: HandPose, elbow_m: Floats, wrist_m: Floats) -> Floats:
+    """Return rotations of a hand: x out of the palm, z from the fingers to the wrist."""
+    along = unit(wrist_m - elbow_m)
+    fingers = within(unit(hand.fingers), along, np.radians(55.0))
+    return directed(-fingers, hand.palm)

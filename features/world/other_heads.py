@@ -1,0 +1,108 @@
+"""The other heads of a world as the page draws them: every body of theirs where it truly is.
+
+The emulator's process writes the newest state; whoever draws reads the joints in it, and where the
+bodies are follows from a model of its own.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from gazerig.features.world.rig_in_world import RigInWorld
+from gazerig.features.world.state_file import StateReader
+from gazerig.gaze.types import Vec3
+from gazerig.robot.description.world_shapes import WorldPart
+from gazerig.robot.model.quaternion import Quaternion
+
+if TYPE_CHECKING:
+    from gazerig.features.world.model import WorldModel
+
+Poses = Mapping[str, tuple[Quaternion, Vec3]]
+
+
+class HeadInState(NamedTuple):
+    """Another head than the one that the page leads.
+
+    Attributes:
+        rig: with all that can be seen of it.
+        joints: where each joint stands in the state of the world.
+    """
+
+    rig: RigInWorld
+    joints: Mapping[str, int]
+
+
+class OtherHeads:
+    """Several heads of a world; small to send.
+
+    Args:
+        state: file of the world's newest state.
+        heads: the heads.
+    """
+
+    def __init__(self, state: Path, heads: Sequence[HeadInState]) -> None:
+        self._state, self._heads = state, tuple(heads)
+        self._reader: StateReader | None = None
+        self._model: WorldModel | None = None
+        self._data: Any = None
+        self._bodies: dict[str, int] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._state, self._heads)
+
+    @property
+    def rigs(self) -> tuple[RigInWorld, ...]:
+        """Return the heads as rigs that nothing moves."""
+        return tuple(head.rig._replace(servos=()) for head in self._heads)
+
+    def parts(self, model: "WorldModel", first: int) -> Iterator[WorldPart]:
+        """Yield everything of the heads, each part in the frame of its body.
+
+        Args:
+            model: with ``rigs`` in it.
+            first: number of the first of them in it.
+        """
+        import mujoco
+
+        from gazerig.features.world.geom_shapes import body_parts
+
+        self._model, self._data = model, mujoco.MjData(model.mj)
+        self._rigs = model.rigs[first:]
+        for placed, head in zip(self._rigs, self._heads, strict=True):
+            for name, angle in head.rig.start_rad.items():
+                self._data.qpos[placed.qpos[name]] = angle
+        for body, part in body_parts(model.mj, self.bodies(model, first)):
+            self._bodies[part.name] = body
+            yield part
+
+    @staticmethod
+    def bodies(model: "WorldModel", first: int) -> list[int]:
+        """Return the numbers of all bodies of the heads in a model."""
+        names = tuple(rig.names for rig in model.rigs[first:])
+        there = range(1, model.mj.nbody)
+        return [i for i in there if names and model.mj.body(i).name.startswith(names)]
+
+    def poses(self) -> Poses:
+        """Return where all parts are now; none before ``parts`` was asked for."""
+        if self._model is None:
+            return {}
+        import mujoco
+
+        newest = self._newest()
+        if newest is not None:
+            for placed, head in zip(self._rigs, self._heads, strict=True):
+                for name, at in head.joints.items():
+                    self._data.qpos[placed.qpos[name]] = newest[at]
+        mujoco.mj_kinematics(self._model.mj, self._data)
+        places, turns = self._data.xpos.tolist(), self._data.xquat.tolist()
+        return {name: (tuple(turns[i]), tuple(places[i])) for name, i in self._bodies.items()}
+
+    def _newest(self) -> Any:
+        """Return the coordinates of the newest state, None before the first."""
+        if self._reader is None:
+            try:
+                self._reader = StateReader(self._state)
+            except OSError:  # the emulator has ended, or not begun
+                return None
+        newest = self._reader.newest()
+        return None if newest is None else newest.qpos

@@ -1,0 +1,331 @@
+"""The world in time: MuJoCo in steps of a millisecond, moved by the servos of its rigs."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.errors import SetupError
+from gazerig.errors import Error
+from gazerig.features.world.figure_model import PlacedPeople
+from gazerig.features.world.hobby_shaft import WorldHobbyServo
+from gazerig.features.world.ideal_bus import IdealShaft
+from gazerig.features.world.model import WorldModel
+from gazerig.features.world.shaft import Effort, WorldShaft
+from gazerig.features.world.shaft_axis import ShaftAxis
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
+from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
+from gazerig.sim_mock.smart_servo.controller import MS_S, Motor
+from gazerig.sim_mock.smart_servo.motor import Shaft, own_shaft
+from gazerig.sim_mock.smart_servo.physics import Physics
+from gazerig.sim_mock.smart_servo.span import whole_ms
+
+DEVICE_MS = 5
+"""So often all devices are brought up to date, so that no watchdog trips late; their servos check
+heat and load every 20 ms."""
+
+LONGEST_GAP_MS = 10_000
+"""Of a longer pause in which nobody asked for the time only the end is lived through."""
+
+
+PEOPLE_MS = 4
+"""Every so often people are put where they are."""
+
+
+_UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
+"""MuJoCo's warnings of numbers that have run away; it then begins anew, which no servo may see."""
+
+
+class WorldUnstable(Error):
+    """The numbers of a world have run away; nothing that it says of joints is true any more."""
+
+
+class WorldState(NamedTuple):
+    """Where everything in a world is: with the script of its people, all that a picture needs.
+
+    t_s: time since the script of its people began, 0 before
+    qpos: positions of its joints as MuJoCo orders them, shape (nq,)
+    """
+
+    t_s: float
+    qpos: NDArray[np.float64]
+
+
+class _Push(NamedTuple):
+    """A force on a body in the world's directions, until a time."""
+
+    body: int
+    force_n: NDArray[np.float64]
+    until_ms: int
+
+
+class MovingShaft(Protocol):
+    """A shaft that the world moves."""
+
+    axis: ShaftAxis
+
+    def command(self) -> Effort:
+        """Return what its motor does in the next millisecond."""
+        ...
+
+    def sense(self, x: float, v: float) -> None:
+        """Set position (steps) and speed (steps/ms) to what the world has made of them."""
+        ...
+
+
+def _no_log(text: str) -> None:
+    """Leave a warning of MuJoCo to whoever counts them."""
+
+
+class World:
+    """A world that is brought up to a time on demand; nothing runs by itself.
+
+    The devices built in it share its time: whenever one asks its clock, the world and all other
+    devices come up to date first.
+
+    Args:
+        model: compiled.
+        clock_s: the time.
+    """
+
+    def __init__(self, model: WorldModel, clock_s: Callable[[], float]) -> None:
+        self.model = model
+        self._mj = model.mj
+        self._data: Any = mujoco.MjData(model.mj)
+        # Views of its arrays: each look into MuJoCo's structures costs a call.
+        self._ctrl, self._qpos, self._qvel = self._data.ctrl, self._data.qpos, self._data.qvel
+        self._gain, self._range = model.mj.actuator_biasprm[:, 2], model.mj.actuator_forcerange
+        self._warned = self._data.warning.number
+        # Else MuJoCo writes a file into the user's folder.
+        mujoco.set_mju_user_warning(_no_log)
+        self._clock_s = clock_s
+        self._ms = whole_ms(clock_s())
+        self._begun_ms = self._ms
+        self._busy = False
+        self._devices: list[Device] = []
+        self._shafts: list[MovingShaft] = []
+        self._actuators: slice | NDArray[np.intp] = slice(0, 0)
+        self._pushes: list[_Push] = []
+        figures = model.figures
+        self._people = None if figures is None else PlacedPeople(model.mj, figures)
+        if self._people is not None:
+            self._people.place(self._data, 0.0)
+        for rig in model.rigs:
+            for name, angle in rig.rig.start_rad.items():
+                self._data.qpos[rig.qpos[name]] = angle
+        mujoco.mj_forward(self._mj, self._data)
+
+    # --- devices
+
+    def device(self, line: Emulated, bus: str = "", seed: int = 0, rig: int = 0) -> Device:
+        """Build the servos of one bus, moved by this world.
+
+        Args:
+            line: what is on the bus.
+            bus: its name in the rig.
+            seed: of the random numbers that its faults draw.
+            rig: which one of the world's.
+
+        Raises:
+            ValueError: it cannot exist.
+            SetupError: it is a package's own.
+        """
+        if isinstance(line, PluginLine):
+            raise SetupError(
+                f"a bus of kind {line.kind} has no servos that a world could move: leave --world out"
+            )
+        indices = self.model.rigs[rig]
+        own = {one.id: one for one in indices.rig.servos if one.bus == bus}
+
+        def axis(servo_id: int) -> ShaftAxis | None:
+            servo = own.get(servo_id)
+            return None if servo is None else ShaftAxis(self._mj, self._data, indices, servo)
+
+        def shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
+            at = axis(servo_id)
+            if at is None:
+                return own_shaft(servo_id, model, physics, position_steps)
+            made = WorldShaft(model, physics, at)
+            self._shafts.append(made)
+            return made
+
+        def hobby(spec: HobbySpec) -> HobbyServo:
+            at = axis(spec.channel)
+            if at is None:
+                return HobbyServo(spec)
+            made = WorldHobbyServo(spec, at, own[spec.channel].steps_per_turn)
+            self._shafts.append(made.shaft)
+            return made
+
+        self._busy = True  # no time passes while some of its shafts are in the world and some not
+        try:
+            device = build(line, self.now_s, seed, ShaftMakers(shaft, hobby))
+        finally:
+            self._busy = False
+        self._join()
+        self._devices.append(device)
+        return device
+
+    def ideal_shafts(self, rig: int = 0) -> tuple[IdealShaft, ...]:
+        """Return shafts without servos, in the order of the rig's servos."""
+        indices = self.model.rigs[rig]
+        shafts = tuple(
+            IdealShaft(ShaftAxis(self._mj, self._data, indices, one), one.steps_per_turn)
+            for one in indices.rig.servos
+        )
+        self._shafts += shafts
+        self._join()
+        return shafts
+
+    def _join(self) -> None:
+        """Let all shafts be moved from now on."""
+        numbers = [one.axis.actuator for one in self._shafts]
+        first = min(numbers, default=0)
+        self._actuators = np.array(numbers, dtype=np.intp)
+        if numbers == list(range(first, first + len(numbers))):  # a slice is quicker
+            self._actuators = slice(first, first + len(numbers))
+        self._settle_constants()
+
+    def _settle_constants(self) -> None:
+        """Compute what MuJoCo derives from inertias again: shafts have got their rotors."""
+        kept = np.array(self._data.qpos), np.array(self._data.qvel)
+        mujoco.mj_setConst(self._mj, self._data)
+        self._data.qpos[:], self._data.qvel[:] = kept
+        mujoco.mj_forward(self._mj, self._data)
+
+    # --- time
+
+    def now_s(self) -> float:
+        """Return the time; the world has come up to it."""
+        if self._busy:  # a device asks while the world brings it up to date
+            return self._ms / 1000.0
+        now_s = self._clock_s()
+        self.advance(whole_ms(now_s))
+        return now_s
+
+    def advance(self, until_ms: int) -> None:
+        """Bring the world and its devices up to a time, in steps of a millisecond.
+
+        Raises:
+            WorldUnstable: its numbers have run away.
+        """
+        if self._busy or until_ms <= self._ms:
+            return
+        self._busy = True
+        try:
+            self._ms = max(self._ms, until_ms - LONGEST_GAP_MS)
+            while self._ms < until_ms:
+                self._step()
+        finally:
+            self._busy = False
+
+    def _step(self) -> None:
+        """Let a millisecond pass."""
+        data, shafts = self._data, self._shafts
+        if shafts:
+            efforts = np.array([one.command() for one in shafts])
+            self._ctrl[self._actuators] = efforts[:, 0]
+            self._gain[self._actuators] = efforts[:, 1]
+            self._range[self._actuators] = efforts[:, 2:]
+        if self._pushes:
+            self._apply_pushes()
+        if self._people is not None and self._ms % PEOPLE_MS == 0:
+            self._people.place(data, self._script_s())
+        mujoco.mj_step(self._mj, data)
+        self._ms += 1
+        qpos, qvel = self._qpos.tolist(), self._qvel.tolist()
+        for one in shafts:
+            axis = one.axis
+            slope = axis.slope
+            if slope is not None:
+                one.sense(axis.zero + slope * qpos[axis.qpos], slope * qvel[axis.dof] * MS_S)
+            else:
+                x, speed = axis.motion(qpos, qvel)
+                one.sense(x, speed * MS_S)
+        if self._ms % DEVICE_MS == 0:
+            if self._warned[_UNSTABLE].any():
+                raise WorldUnstable(
+                    f"the world became unstable {self._data.time:.3f} s after its beginning: a body "
+                    "of it is too light or too stiff for steps of 1 ms"
+                )
+            for device in self._devices:
+                device.positions_steps()
+
+    # --- people
+
+    def _script_s(self) -> float:
+        return max(0, self._ms - self._begun_ms) / 1000.0
+
+    def begin(self, at_ms: int) -> None:
+        """Let the script of the people begin at a time; until then they stand at its beginning."""
+        self._begun_ms = at_ms
+
+    # --- from outside
+
+    def push(
+        self, body: str, force_n: tuple[float, float, float], for_s: float, rig: int = 0
+    ) -> None:
+        """Push a body of a rig for a time, at its own origin.
+
+        Args:
+            body: its name in the rig, such as "head", with the prefix that a further rig has.
+            force_n: in the world's directions.
+            for_s: how long.
+            rig: which one of the world's.
+
+        Raises:
+            ValueError: there is no such body.
+        """
+        number = self._body(body, rig)
+        if number < 0:
+            names = self.model.rigs[rig].names
+            bodies = [self._mj.body(i).name for i in range(1, self._mj.nbody)]
+            own = [name[len(names) :] for name in bodies if name.startswith(names)]
+            raise ValueError(f"no body {body!r}: there is {', '.join(own)}")
+        self._pushes.append(_Push(number, np.array(force_n), self._ms + round(for_s * 1000.0)))
+
+    def has_body(self, body: str, rig: int = 0) -> bool:
+        """Return whether a rig has a body of this name, given with the rig's own prefix."""
+        return self._body(body, rig) >= 0
+
+    def _body(self, body: str, rig: int) -> int:
+        """Return the number of a rig's body, -1 where there is none."""
+        placed = self.model.rigs[rig]
+        name = placed.names + body.removeprefix(placed.rig.prefix)
+        if placed.rig.prefix and not body.startswith(placed.rig.prefix):
+            return -1
+        return int(mujoco.mj_name2id(self._mj, mujoco.mjtObj.mjOBJ_BODY, name))
+
+    def move(self, body: str, p_m: tuple[float, float, float]) -> None:
+        """Move a mocap body of a user's world to a place; what it touches is pushed.
+
+        Raises:
+            ValueError: there is no such body.
+        """
+        number = mujoco.mj_name2id(self._mj, mujoco.mjtObj.mjOBJ_BODY, body)
+        place = int(self._mj.body_mocapid[number]) if number >= 0 else -1
+        if place < 0:
+            raise ValueError(f'no body {body!r} with mocap="true"')
+        self._data.mocap_pos[place] = p_m
+
+    def _apply_pushes(self) -> None:
+        """Apply the forces of this millisecond, and take away those whose time is over."""
+        wrenches = self._data.xfrc_applied
+        for one in self._pushes:
+            wrenches[one.body] = 0.0
+        self._pushes = [one for one in self._pushes if self._ms < one.until_ms]
+        for one in self._pushes:
+            lever = self._data.xpos[one.body] - self._data.xipos[one.body]
+            wrenches[one.body, :3] += one.force_n
+            wrenches[one.body, 3:] += np.cross(lever, one.force_n)
+
+    def state(self) -> WorldState:
+        """Return where everything is now."""
+        return WorldState(self._script_s(), np.array(self._data.qpos))
+
+    def joints_rad(self, rig: int = 0) -> dict[str, float]:
+        """Return the true joint angles of a rig now."""
+        return {n: float(self._data.qpos[at]) for n, at in self.model.rigs[rig].qpos.items()}

@@ -1,0 +1,222 @@
+"""Pictures and distances of a MuJoCo world from any camera, without a display.
+
+The camera is the program's own pinhole (gazerig.drivers.camera.pinhole), principal point and all;
+what a lens and a sensor add is gazerig.sim_mock.cameras.optics.
+"""
+
+import threading
+import weakref
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.features.world.gl_context import Backend, Context, open_context
+from gazerig.gaze.types import Floats
+from gazerig.params import Bounds
+from gazerig.robot.model.scene_view import Rendered
+
+_NEAREST_M, _FARTHEST_M = 0.02, 60.0
+_FONT = 100  # the smallest: no text is drawn
+_ALL = 7  # static, dynamic and decorative things
+_UNSEEN = 5  # a group of geoms that is not drawn
+_SHADOWS_REACH_M = 1.5  # behind the camera
+
+
+@dataclass(frozen=True)
+class RendererParams:
+    """What the pictures show; each costs time."""
+
+    # fmt: off
+    shadow_px: Annotated[int, Bounds(0, 8192), "side of the shadow map; 0: no shadows"] = 512
+    samples: Annotated[int, Bounds(0, 16), "samples a pixel against jagged edges; 0: one"] = 4
+    reflections: Annotated[bool, "shiny floors and tables mirror what stands on them"] = False
+    skybox: Annotated[bool, "there is a sky outside the windows"] = True
+    # fmt: on
+
+
+class Renderer:
+    """Renders one model; may be used by several threads, one at a time.
+
+    Args:
+        model: what is rendered.
+        width_px: of the largest picture.
+        height_px: of the largest picture.
+        params: what the pictures show.
+        hidden: names of bodies that are not shown, with all that hangs on them: the head that
+            carries the camera.
+
+    Raises:
+        NoRenderer: nothing on this machine can render.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        width_px: int,
+        height_px: int,
+        params: RendererParams | None = None,
+        hidden: Collection[str] = (),
+    ) -> None:
+        params = params or RendererParams()
+        self._model = model
+        self._lock = threading.Lock()
+        self._size = width_px, height_px
+        model.vis.quality.shadowsize = params.shadow_px
+        model.vis.quality.offsamples = params.samples
+        model.vis.global_.offwidth, model.vis.global_.offheight = width_px, height_px
+
+        def make() -> Any:
+            made = mujoco.MjrContext(model, _FONT)
+            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, made)
+            return made
+
+        self.backend: Backend
+        self.backend, self._context, self._mjr = open_context(make)
+        self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 64)
+        self._option, self._free = mujoco.MjvOption(), mujoco.MjvCamera()
+        flags, names = self._scene.flags, mujoco.mjtRndFlag
+        flags[names.mjRND_SHADOW] = params.shadow_px > 0
+        flags[names.mjRND_REFLECTION] = params.reflections
+        flags[names.mjRND_SKYBOX] = params.skybox
+        self._groups = model.geom_group.copy()
+        self._groups[_geoms_of(model, hidden)] = _UNSEEN
+        self._shadows = params.shadow_px > 0
+        self._finalizer = weakref.finalize(self, _freed, self._context, self._mjr)
+
+    def render(
+        self,
+        data: mujoco.MjData,
+        lens: Intrinsics,
+        R: ArrayLike,
+        p_m: ArrayLike,
+        size_px: tuple[int, int] | None = None,
+        *,
+        depth: bool = False,
+        rows: tuple[int, int] | None = None,
+    ) -> Rendered:
+        """Return what a camera sees, without the lens's distortion.
+
+        Args:
+            data: where everything is; its positions have been computed.
+            lens: for pictures of this size.
+            R: (3, 3) rotation of the camera in the world, its axes optical.
+            p_m: (3,) position of the camera in the world.
+            size_px: width and height; None: the largest.
+            depth: with distances.
+            rows: the first row and the one after the last, where only these are wanted.
+
+        Raises:
+            ValueError: the picture is larger than the renderer was made for, or the renderer is
+                closed.
+        """
+        width, height = size_px or self._size
+        if width > self._size[0] or height > self._size[1]:
+            raise ValueError(
+                f"a picture of {width} x {height} does not fit into {self._size[0]} x "
+                f"{self._size[1]}"
+            )
+        top, bottom = rows or (0, height)
+        rect = mujoco.MjrRect(0, 0, width, bottom - top)
+        rgb = np.empty((bottom - top, width, 3), np.uint8)
+        z = np.empty((bottom - top, width), np.float32) if depth else None
+        with self._lock:
+            if not self._finalizer.alive:
+                raise ValueError("the renderer is closed")
+            turn, place = np.asarray(R, float), np.asarray(p_m, float)
+            self._pick(data, _sides(lens, width, (top, bottom)), turn, place)
+            mujoco.mjv_updateScene(
+                self._model, data, self._option, None, self._free, _ALL, self._scene
+            )
+            self._model.geom_group[:] = self._groups
+            self._look(lens, turn, place, width, (top, bottom))
+            with self._context.as_current():
+                mujoco.mjr_render(rect, self._scene, self._mjr)
+                mujoco.mjr_readPixels(rgb, z, rect, self._mjr)
+        image = np.ascontiguousarray(rgb[::-1, :, ::-1])
+        return Rendered(image, None if z is None else _metres(z[::-1]))
+
+    def close(self) -> None:
+        """Free everything; safe to call twice."""
+        with self._lock:
+            self._finalizer()
+
+    def _pick(self, data: mujoco.MjData, sides: Floats, R: Floats, p_m: Floats) -> None:
+        """Leave out what is wholly outside the picture: MuJoCo would have every triangle drawn."""
+        model = self._model
+        camera = (data.geom_xpos - p_m) @ R
+        out = (camera @ sides.T > model.geom_rbound[:, None]).any(axis=1)
+        if self._shadows:  # what is beside the picture may throw one into it
+            out = camera[:, 2] < -_SHADOWS_REACH_M - model.geom_rbound
+        out &= model.geom_rbound > 0.0  # a plane has no size
+        model.geom_group[:] = np.where(out, _UNSEEN, self._groups)
+
+    def _look(
+        self,
+        lens: Intrinsics,
+        R: Floats,
+        p_m: Floats,
+        width: int,
+        rows: tuple[int, int],
+    ) -> None:
+        """Put the scene's camera, and a light that it carries, where the camera is."""
+        forward, up = R[:, 2], -R[:, 1]
+        # Pixels have their centres at whole numbers: the frame reaches half a pixel further.
+        left = (-0.5 - lens.cx_px) / lens.fx_px * _NEAREST_M
+        right = (width - 0.5 - lens.cx_px) / lens.fx_px * _NEAREST_M
+        for eye in self._scene.camera:
+            eye.pos, eye.forward, eye.up = p_m, forward, up
+            eye.frustum_center = 0.5 * (left + right)
+            eye.frustum_width = 0.5 * (right - left)
+            eye.frustum_top = (lens.cy_px + 0.5 - rows[0]) / lens.fy_px * _NEAREST_M
+            eye.frustum_bottom = (lens.cy_px + 0.5 - rows[1]) / lens.fy_px * _NEAREST_M
+            eye.frustum_near, eye.frustum_far = _NEAREST_M, _FARTHEST_M
+        for light in self._scene.lights[: self._scene.nlight]:
+            if light.headlight:
+                light.pos, light.dir = p_m, forward
+
+
+def _sides(lens: Intrinsics, width: int, rows: tuple[int, int]) -> Floats:
+    """Return the unit vectors (5, 3) out of the sides of what is seen, in the camera's axes."""
+    left, right = (-0.5 - lens.cx_px) / lens.fx_px, (width - 0.5 - lens.cx_px) / lens.fx_px
+    top, bottom = ((row - 0.5 - lens.cy_px) / lens.fy_px for row in rows)
+    out = np.array(
+        [(-1.0, 0.0, left), (1.0, 0.0, -right), (0.0, -1.0, top), (0.0, 1.0, -bottom), (0, 0, -1.0)]
+    )
+    return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
+
+
+def _geoms_of(model: mujoco.MjModel, bodies: Collection[str]) -> NDArray[np.bool_]:
+    """Return which geoms (n,) hang on bodies of these names, or on what hangs on them.
+
+    Raises:
+        ValueError: there is no such body.
+    """
+    hidden = np.zeros(model.nbody, bool)
+    for name in bodies:
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if number < 0:
+            raise ValueError(f"the world has no body {name!r} to be hidden")
+        hidden[number] = True
+    for number in range(1, model.nbody):  # parents come first
+        hidden[number] |= hidden[model.body_parentid[number]]
+    return np.asarray(hidden[model.geom_bodyid])
+
+
+def _metres(z: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return distances along the axis from a depth buffer that is 1 at the nearest, 0 far away."""
+    near, far = _NEAREST_M, _FARTHEST_M
+    out = (near * far / (near + z.astype(np.float64) * (far - near))).astype(np.float32)
+    out[z <= 0.0] = np.inf
+    return out
+
+
+def _freed(context: Context, mjr: Any) -> None:
+    with context.as_current():
+        mjr.free()
+    context.free()

@@ -1,0 +1,278 @@
+"""Several heads in one world, each led by a robot of its own that sees only its own picture.
+
+What ends one of them ends all: each parks and lets go.
+"""
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from gazerig.features.world.heads_scene import HeadsScene, RigFrame
+from gazerig.features.world.run.run_world import RunWorld, world_of, world_scene
+from gazerig.features.world.run.shared_world import (
+    FaceNow,
+    RealTimeWorld,
+    SharedWorld,
+    SimulatedWorld,
+)
+from gazerig.robot.analysis.kept_time import fell_behind
+from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
+from gazerig.robot.app.assemble import SharedPlace
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_rig import run_rig
+from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
+from gazerig.robot.control.heads_together import NamedRobot
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.tick import Tick
+
+FIRST = "first"
+
+
+class _Member(NamedTuple):
+    """One head of a group.
+
+    Attributes:
+        name: in the script; the first one's is ``FIRST``.
+        composed: its robot, put together.
+        frame: where it stands.
+    """
+
+    name: str
+    composed: ComposedRun
+    frame: RigFrame
+
+
+def has_other_heads(options: RunOptions) -> bool:
+    """Return whether other heads are in the world that was asked for.
+
+    Raises:
+        gazerig.config.load.ConfigError: its file is at fault, or there is none of that name.
+        SetupError: they cannot be run as it was asked.
+    """
+    if options.world is None:
+        return False
+    return bool(world_scene(options.world, options.seed).figures.script.heads)
+
+
+def compose_group(options: RunOptions) -> "HeadGroup":
+    """Assemble a run of several heads; nothing moves.
+
+    Raises:
+        gazerig.config.load.ConfigError: the world or one of the rigs is at fault.
+        SetupError: they cannot be run as it was asked.
+    """
+    first = run_rig(options)
+    found = world_of(first, options)
+    assert found is not None  # a world was asked for
+    assert found.spec.figures is not None  # heads stand in a script
+    heads = found.spec.figures.script.heads
+    others = [_other(options, name, n, heads[name].rig) for n, name in enumerate(heads, 1)]
+    each = (options, *others)
+    rigs = [(FIRST, first), *zip(heads, map(run_rig, others), strict=True)]
+    world = SimulatedWorld(found) if options.fast else RealTimeWorld(found, rigs)
+    members: list[_Member] = []
+    try:
+        faces = [world.face(number, rig) for number, (_, rig) in enumerate(rigs)]
+        for number, ((name, _), one) in enumerate(zip(rigs, each, strict=True)):
+            place = _place(world, found, number, faces)
+            members.append(_Member(name, compose(one, shared=place), world.frames[number]))
+    except BaseException:
+        for member in members:
+            member.composed.made.close()
+        world.close()
+        raise
+    pictures = None if options.fast else (found.camera.rate_hz, not options.no_pictures)
+    return HeadGroup(_together(members), world, pictures)
+
+
+def _together(members: Sequence[_Member]) -> list[_Member]:
+    """Return the heads so that who commands the first, from the page too, can stop all."""
+    first, *others = members
+    robots = tuple(NamedRobot(one.name, one.composed.made.robot) for one in others)
+    made = first.composed.made._replace(others=robots)
+    # One parameter store and one remote control for the process: those of the first.
+    alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in others]
+    return [first._replace(composed=first.composed._replace(made=made)), *alone]
+
+
+def _place(
+    world: SharedWorld, found: RunWorld, number: int, faces: Sequence[FaceNow]
+) -> SharedPlace:
+    """Return the place of a head in the world that it shares."""
+    frame = world.frames[number]
+    others = [face for n, face in enumerate(faces) if n != number]
+    scene = HeadsScene(found.scene, frame, others, number == 0)
+    stands = HeadPlace(frame.R, frame.p_m).numbers
+    return SharedPlace(world.seen(number, scene), world.clock(number), stands)
+
+
+def _other(options: RunOptions, name: str, number: int, rig: str) -> RunOptions:
+    """Return the options of another head than the first."""
+    return replace(
+        options,
+        rig=rig or options.rig,
+        seed=options.seed + number,
+        record=None if options.record is None else beside(options.record, name),
+        heatmap=None,
+        summary=None,
+        page=None,
+    )
+
+
+def beside(path: Path, name: str) -> Path:
+    """Return the name of the file of another head: run.mcap, run-other.mcap."""
+    return path.with_name(f"{path.stem}-{name}{path.suffix}")
+
+
+class Following(Interrupts):
+    """Requests to end a head that ends with another one: its own, and those to the other.
+
+    Args:
+        lead: requests to end the other one.
+    """
+
+    def __init__(self, lead: Interrupts) -> None:
+        super().__init__(also=lead, signals=False)
+        self._lead = lead
+
+    @property
+    def requests(self) -> int:
+        """Return how often it was asked to end: the second time skips parking."""
+        return max(super().requests, self._lead.requests)
+
+
+class HeadGroup:
+    """Several heads that run together until one of them ends.
+
+    Args:
+        members: the heads, the first one first.
+        world: in which they are.
+        pictures: in real time how many each camera has a second, and whether they are rendered;
+            None: time is simulated and waits for them.
+
+    Attributes:
+        members: the heads.
+    """
+
+    def __init__(
+        self,
+        members: Sequence[_Member],
+        world: SharedWorld,
+        pictures: tuple[float, bool] | None = None,
+    ) -> None:
+        self.members, self._world = tuple(members), world
+        self._pictures = pictures
+        self._figures: list[dict[str, object] | None] = [None] * len(members)
+        self._failures: list[BaseException] = []
+        self._ending: set[int] = set()
+        self._saying = threading.Lock()
+        places = [HeadPlace(member.frame.R, member.frame.p_m) for member in members]
+        self._traces = [MutualGazeTrace(places[0], other) for other in places[1:]]
+
+    def run(
+        self,
+        stopped: Callable[[], str | None],
+        say: Callable[[str], None],
+        status: Callable[[str], None] | None = None,
+        watch: Callable[[Tick], object] | None = None,
+        browse: Callable[[str], object] | None = None,
+    ) -> dict[str, object]:
+        """Run until one of them ends; return the first one's figures and those of the others.
+
+        Args: as of ``gazerig.robot.app.session.run``; status, watch and browse are of the first.
+
+        Raises:
+            SetupError: before anything moved.
+        """
+        lead = stopped if isinstance(stopped, Interrupts) else Interrupts(also=stopped)
+        following = [Following(lead) for _ in self.members[1:]]
+        threads = [
+            threading.Thread(target=self._follow, args=(number, lead, one, say), name=member.name)
+            for number, (member, one) in enumerate(zip(self.members[1:], following, strict=True), 1)
+        ]
+
+        def end_all(reason: str) -> None:
+            for number, one in enumerate(following, 1):
+                # A further request would skip the parking of one that ends already.
+                if one.requests == 0 and number not in self._ending:
+                    one.request(f"the end of the first head{reason and f' ({reason})'}")
+
+        def ended(reason: str) -> None:
+            if reason != SECONDS:  # that comes for all of them
+                end_all(reason)
+
+        for thread in threads:
+            thread.start()
+        try:
+            self._world.enter(0)
+            self._figures[0] = run(
+                self.members[0].composed, lead, self._said(say), status,
+                lambda tick: self._watch_first(tick, watch), browse, ended,
+            )  # fmt: skip
+        except KeyboardInterrupt:  # it was asked to end before it began, maybe by one that failed
+            if not self._failures:
+                raise
+        finally:
+            lead.never_raise()  # the others are still to park
+            end_all("")
+            self._world.leave(0)
+            for thread in threads:
+                thread.join()
+            self._world.close()
+        if self._failures:
+            raise self._failures[0]
+        names = [member.name for member in self.members]
+        if self._pictures is not None and (
+            line := fell_behind(zip(names, self._figures, strict=True), *self._pictures)
+        ):
+            say(line)
+        return self._joined()
+
+    def _follow(
+        self, number: int, lead: Interrupts, own: Interrupts, say: Callable[[str], None]
+    ) -> None:
+        """Run another head than the first, in its thread."""
+        name = self.members[number].name
+
+        def ended(reason: str) -> None:
+            self._ending.add(number)
+            if own.requests == 0 and reason != SECONDS:
+                lead.request(f"the end of head {name} ({reason})")
+
+        try:
+            self._world.enter(number)
+            self._figures[number] = run(
+                self.members[number].composed, own, self._said(say, f"{name}: "),
+                watch=lambda tick: self._traces[number - 1].update(1, tick), ends=ended,
+            )  # fmt: skip
+        except KeyboardInterrupt:  # it was asked to end before it began
+            lead.request(f"the end of head {name} before it began")
+        except BaseException as error:
+            self._failures.append(error)
+            lead.request(f"the end of head {name} ({type(error).__name__})")
+        finally:
+            self._world.leave(number)
+
+    def _said(self, say: Callable[[str], None], before: str = "") -> Callable[[str], None]:
+        """Return what says whole lines, whichever head's thread says them."""
+
+        def one_by_one(line: str) -> None:
+            with self._saying:
+                say(before + line)
+
+        return one_by_one
+
+    def _watch_first(self, tick: Tick, watch: Callable[[Tick], object] | None) -> None:
+        for trace in self._traces:
+            trace.update(0, tick)
+        if watch is not None:
+            watch(tick)
+
+    def _joined(self) -> dict[str, object]:
+        first, *others = self._figures
+        assert first is not None
+        names = [member.name for member in self.members[1:]]
+        gazes = dict(zip(names, (trace.figures() for trace in self._traces), strict=True))
+        return {**first, "mutual_gaze": gazes, "heads": dict(zip(names, others, strict=True))}

@@ -1,0 +1,114 @@
+"""Where the head truly is in a world with physics: from the joints of the world's state."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from gazerig.drivers.camera.pose_slot import PoseAt
+from gazerig.features.world.state_file import HostState, StateReader
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
+
+if TYPE_CHECKING:
+    from gazerig.features.world.physics import World
+
+_ABSENT = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
+
+
+class RigInState(NamedTuple):
+    """Which numbers of a world's state are the joints of a rig; can be sent to another process.
+
+    Attributes:
+        kinematics: of the rig as it is built, whatever is believed of it later.
+        joints: where each joint stands in the state.
+    """
+
+    kinematics: Kinematics
+    joints: Mapping[str, int]
+
+    def head(self, state: HostState) -> tuple[Mat3, Vec3]:
+        """Return rotation and place of the head in the world."""
+        angles = _ABSENT.copy()
+        for name in angles.keys() & self.joints.keys():
+            angles[name] = float(state.qpos[self.joints[name]])
+        yaw, pitch, roll = (angles[name] for name in NECK)
+        lower_yaw, lower_pitch = (angles[name] for name in LOWER_NECK)
+        return self.kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
+
+
+class WorldPoses:
+    """The head of a rig in a world that another process computes, by the state that it writes.
+
+    Args:
+        path: the file of the newest state.
+        rig: which of its numbers are the rig's joints.
+
+    Attributes:
+        state: what was read last, None before the first.
+    """
+
+    def __init__(self, path: Path, rig: RigInState) -> None:
+        self._path, self._rig = path, rig
+        self._reader: StateReader | None = None
+        self.state: HostState | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._path, self._rig)
+
+    @property
+    def begin_s(self) -> float | None:
+        """Return the host's time at which the script of the people began, None before."""
+        return self._file().begin_s
+
+    @property
+    def first_s(self) -> float:
+        """Return the same, 0 before."""
+        return self.begin_s or 0.0
+
+    def newest(self) -> PoseAt | None:
+        """Return the newest pose, None before the first."""
+        newest = self._file().newest()
+        if newest is None:
+            return None
+        self.state = newest
+        return PoseAt(newest.host_s, *self._rig.head(newest))
+
+    def head(self, t_s: float) -> tuple[Mat3, Vec3]:
+        """Return where the head is now; upright before the first state."""
+        newest = self._file().newest()
+        if newest is None:
+            return self._rig.kinematics.head_pose((0.0, 0.0, 0.0), (0.0, 0.0))
+        return self._rig.head(newest)
+
+    def _file(self) -> StateReader:
+        if self._reader is None:
+            self._reader = StateReader(self._path)
+        return self._reader
+
+
+class SimulatedPoses:
+    """The head of a rig in a world of this process, on the clock of the run.
+
+    Args:
+        world: brought up to the time whenever it is looked at.
+        clock: of the run.
+        rig: which numbers of its state are the rig's joints.
+
+    Attributes:
+        begin_s: when the script of the people began.
+    """
+
+    def __init__(self, world: "World", clock: Clock, rig: RigInState) -> None:
+        self._world, self._clock, self._rig = world, clock, rig
+        self.begin_s = clock.now_s()
+
+    @property
+    def state(self) -> HostState:
+        """Return where everything is now."""
+        now_s = self._world.now_s()
+        return HostState(now_s, *self._world.state())
+
+    def head(self, t_s: float) -> tuple[Mat3, Vec3]:
+        """Return where the head is now."""
+        return self._rig.head(self.state)

@@ -1,0 +1,72 @@
+"""The world of a recorded run: what is kept of it, and how it looked."""
+
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from gazerig.config.load import ConfigError, load
+from gazerig.config.text import params_text
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.extras import extra_hint
+from gazerig.features.world.figure import Figures
+from gazerig.features.world.heads_scene import RigFrame
+from gazerig.features.world.run.run_world import mjcf_of, world_script
+from gazerig.features.world.script import WorldScript
+from gazerig.features.world.script_faults import CHECKS
+from gazerig.features.world.shapes import script_shapes
+from gazerig.features.world.shapes_from import ShapesFrom
+from gazerig.robot.analysis.mutual_gaze import HeadPlace
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.description.world_shapes import WorldShapes
+from gazerig.robot.recording.world_info import WorldInfo
+
+
+def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
+    """Return what a recording keeps of the world of a run, but for its beginning; None without.
+
+    Args:
+        options: of the run.
+        seed: of the world's people; that of the first head where there are several.
+
+    Raises:
+        gazerig.config.load.ConfigError: the script is at fault.
+    """
+    if options.world is None or options.world_name is None:
+        return None
+    own = mjcf_of(options.world) is not None
+    text = "" if own else params_text(world_script(options.world))
+    return WorldInfo(options.world_name, text, seed)
+
+
+def recorded_shapes(info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
+    """Return how the world of a recorded run looked, as from its head's neck base.
+
+    Args:
+        info: of the world.
+        stands: where the head stood in it, as of ``RunInfo.stands``.
+
+    Raises:
+        SetupError: it cannot be shown; says why.
+    """
+    if not info.script_yaml:
+        raise SetupError(
+            f"the room is not shown: {info.name} is in MuJoCo's own format, which a recording has not"
+        )
+    if find_spec("mujoco") is None:
+        hint = extra_hint("mujoco", "world", ModuleNotFoundError(name="mujoco"))
+        raise SetupError(f"the room is not shown: {hint}")
+    shapes = script_shapes(Figures(_script(info), info.seed))
+    return ShapesFrom(shapes, RigFrame(*HeadPlace.of(stands))) if stands else shapes
+
+
+def _script(info: WorldInfo) -> WorldScript:
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / f"{info.name}.yaml"
+        file.write_text(info.script_yaml, encoding="utf-8")
+        try:
+            return load(file, WorldScript, checks=CHECKS)
+        except ConfigError as error:
+            first = str(error).splitlines()[0].replace(f"{folder}/", "")
+            raise SetupError(
+                f"the room is not shown: the recorded world is no longer valid ({first})"
+            ) from None

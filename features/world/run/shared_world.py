@@ -1,0 +1,181 @@
+"""A world that several heads are in: on one simulated clock, or in real time.
+
+In simulated time the world and all heads are in this process, each head in a thread, and one after
+the other (gazerig.features.world.run.lockstep): the same seed gives the same bytes on every bus. In
+real time the emulator's process has the world and the servos of all heads, as it has those of one;
+each head's control loop speaks to its own terminals, on the host's clock.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.world.heads_scene import HeadFace, RigFrame
+from gazerig.features.world.run.lockstep import Lockstep
+from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
+from gazerig.features.world.run.run_world import RunWorld, ServedRig
+from gazerig.gaze.angles import add, rotate, rotation
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.description.head_shape import HeadMeasures
+from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
+from gazerig.sim_mock.scenes.scene import Scene
+
+
+class TrueHeadPose(Protocol):
+    """Tells where a head truly is."""
+
+    def head(self, t_s: float) -> tuple[Mat3, Vec3]:
+        """Return rotation and place of the head now, as from its neck base."""
+        ...
+
+
+@dataclass(frozen=True)
+class FaceNow:
+    """Tells where the face of a head of the world is now; can be sent to another process.
+
+    Attributes:
+        poses: of the head.
+        frame: where its neck base stands.
+        nose_m: tip of its nose in the head's own frame.
+    """
+
+    poses: TrueHeadPose
+    frame: RigFrame
+    nose_m: Vec3
+
+    def __call__(self) -> HeadFace:
+        """Return it."""
+        R, p_m = self.frame.in_world(*self.poses.head(0.0))
+        return HeadFace(R, add(p_m, rotate(R, self.nose_m)))
+
+
+class SharedWorld(Protocol):
+    """The world of a group of heads; a head's number is that of its rig in the world."""
+
+    frames: Sequence[RigFrame]
+    """Where the neck base of each stands."""
+
+    def face(self, number: int, rig: Rig) -> FaceNow:
+        """Return what tells where a head's face is now."""
+        ...
+
+    def seen(self, number: int, scene: Scene) -> RunWorld:
+        """Return the world as one of the heads is in it, with what it has before itself."""
+        ...
+
+    def clock(self, number: int) -> Clock:
+        """Return a head's clock."""
+        ...
+
+    def enter(self, number: int) -> None:
+        """Return when a head may begin, in its own thread."""
+        ...
+
+    def leave(self, number: int) -> None:
+        """Let the others go on without a head from now on; safe to call twice."""
+        ...
+
+    def close(self) -> None:
+        """End it, once all heads have left; safe to call twice."""
+        ...
+
+
+class SimulatedWorld:
+    """The world of several heads in this process, on one simulated clock.
+
+    Args:
+        found: the world.
+    """
+
+    def __init__(self, found: RunWorld) -> None:
+        from gazerig.features.world.physics import World
+
+        self._found = found
+        self._lockstep = Lockstep(len(found.spec.rigs))
+        self._world: World = World(found.spec.compiled(), self._lockstep.now_s)
+        self.frames: Sequence[RigFrame] = [
+            RigFrame(rig.R_world_base, rig.p_world_base_m) for rig in self._world.model.rigs
+        ]
+
+    def face(self, number: int, rig: Rig) -> FaceNow:
+        """Return what tells where a head's face is now."""
+        joints = RigInState(kinematics_of(rig), self._world.model.rigs[number].qpos)
+        poses = SimulatedPoses(self._world, self.clock(number), joints)
+        return FaceNow(poses, self.frames[number], _nose_m(rig))
+
+    def seen(self, number: int, scene: Scene) -> RunWorld:
+        """Return the world as one of the heads is in it."""
+        return self._found._replace(scene=scene, number=number, shared=self._world)
+
+    def clock(self, number: int) -> Clock:
+        """Return a head's clock."""
+        return self._lockstep.clock(number)
+
+    def enter(self, number: int) -> None:
+        """Return when it is a head's first turn."""
+        self._lockstep.enter(number)
+
+    def leave(self, number: int) -> None:
+        """Let the others go on without a head."""
+        self._lockstep.leave(number)
+
+    def close(self) -> None:
+        """Do nothing: it ends with this process."""
+
+
+class RealTimeWorld:
+    """The world of several heads in the emulator's process, in real time.
+
+    Args:
+        found: the world.
+        rigs: of all heads, the first one's first, each with the head's name.
+
+    Raises:
+        SetupError: it cannot be used; says why.
+    """
+
+    def __init__(self, found: RunWorld, rigs: Sequence[tuple[str, Rig]]) -> None:
+        if not has_terminals():
+            raise SetupError("several heads need the pseudo-terminals of Linux, or --fast")
+        self._found = found
+        self.frames: Sequence[RigFrame] = [
+            RigFrame(rotation((rig.yaw_rad, 0.0, 0.0)), rig.p_m) for rig in found.spec.rigs
+        ]
+        self._buses = PtyBuses()
+        lines = [
+            (name if number else "", emulated_lines(rig)) for number, (name, rig) in enumerate(rigs)
+        ]
+        self._paths = self._buses.start_rigs(lines, found.spec)
+
+    def face(self, number: int, rig: Rig) -> FaceNow:
+        """Return what tells where a head's face is now."""
+        joints = RigInState(kinematics_of(rig), self._buses.joints[number])
+        return FaceNow(WorldPoses(self._buses.state, joints), self.frames[number], _nose_m(rig))
+
+    def seen(self, number: int, scene: Scene) -> RunWorld:
+        """Return the world as one of the heads is in it."""
+        served = ServedRig(self._buses, self._paths[number])
+        return self._found._replace(scene=scene, number=number, served=served)
+
+    def clock(self, number: int) -> Clock:
+        """Return the host's clock."""
+        return RealClock()
+
+    def enter(self, number: int) -> None:
+        """Return at once: real time waits for nobody."""
+
+    def leave(self, number: int) -> None:
+        """Do nothing: nobody waits."""
+
+    def close(self) -> None:
+        """End the emulator's process; safe to call twice."""
+        self._buses.stop()
+
+
+def _nose_m(rig: Rig) -> Vec3:
+    return HeadMeasures(rig.geometry.interocular_mm / 1e3).nose_m

@@ -1,0 +1,239 @@
+"""What the rig's camera sees in a world with physics.
+
+In real time the world is another process's. The camera's process renders it from the newest state
+that there is and looks for faces and motion in the picture; the control loop sees neither MuJoCo
+nor a picture. Where nothing on this machine can render, detections are computed instead, as of a
+scene.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from math import radians
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.camera.frame_analysis import Locate
+from gazerig.drivers.camera.pose_buffer import PoseBuffer
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.camera.source import FrameSource
+from gazerig.drivers.camera.worker import CameraParts
+from gazerig.drivers.types import Camera, FaceDetector
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.features.world.camera_params import WorldCameraParams
+from gazerig.features.world.gl_context import NoRenderer, render_in_calling_thread
+from gazerig.features.world.run.camera import WorldCamera, without_pictures
+from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
+from gazerig.features.world.state_file import HostState
+from gazerig.features.world.world_spec import WorldSpec
+from gazerig.gaze.types import Mat3
+from gazerig.robot.app.drawn_camera import (
+    DrawnSource,
+    HeadPose,
+    NoFaces,
+)
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.program_parts import ProgramParts
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
+from gazerig.robot.model.scene_view import PinholeView
+from gazerig.robot.perception.motion_source import motion_finder
+from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from gazerig.robot.model.scene_view import SceneView
+    from gazerig.sim_mock.cameras.rendered import FindMotion, PixelCamera
+
+HEAD_LINK = "head"
+"""The link of a rig that carries its camera, which does not see it."""
+_LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class RenderedWorld(NamedTuple):
+    """What a process needs to render what the rig's camera sees in a world; can be sent to it.
+
+    Attributes:
+        spec: what the world is made of.
+        scene: the people in it.
+        mount: where the camera sits on the head.
+        camera: its field of view and lens.
+        rng: for the noise.
+        params: how large, how fast and how true its pictures are.
+        number: which of the world's rigs carries the camera.
+    """
+
+    spec: WorldSpec
+    scene: Scene
+    mount: CameraMount
+    camera: CameraParams
+    rng: np.random.Generator
+    params: WorldCameraParams
+    number: int = 0
+
+    def pixels(
+        self,
+        newest: Callable[[], HostState | None],
+        head: HeadPose,
+        detector: FaceDetector,
+        simulated: bool = False,
+        find_motion: "FindMotion | None" = None,
+        locate: Locate | None = None,
+        begins_s: float | None = None,
+    ) -> "PixelCamera":
+        """Return the camera; it has rendered one picture already.
+
+        Args:
+            newest: returns the state of the world, None before the first.
+            head: where the head is in that state.
+            detector: finds the faces.
+            simulated: pictures are late on the run's own clock; else they take what they take.
+            find_motion: finds what moves, besides the faces.
+            locate: locates what is found in the camera's axes, None for none.
+            begins_s: when the script of the people begins; None: at the first look.
+
+        Raises:
+            NoRenderer: nothing on this machine can render.
+        """
+        from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+
+        asked = self.params
+        params = PixelCameraParams(
+            **{
+                **asked.of(PixelCameraParams),
+                "latency_ms": asked.latency_ms if simulated else 0.0,
+                "horizontal_field_deg": self.camera.horizontal_field_deg,
+            }
+        )
+        field_rad = radians(self.camera.horizontal_field_deg)
+        size_px = asked.width_px, asked.height_px
+        lens = intrinsics_of_lens(self.camera.lens, field_rad, *size_px)
+        view = world_view(self.spec, newest, asked, self.number)
+        camera = PixelCamera(
+            params, self.scene, self.mount, head, detector, self.rng, find_motion, locate, view,
+            lens, begins_s,
+        )  # fmt: skip
+        view.draw(PinholeView(0.0, lens, size_px, _LEVEL, (0.0, 0.0, 0.0)))
+        return camera
+
+
+def served_pixels(world: RenderedWorld, poses: WorldPoses, head: HeadPose) -> "PixelCamera":
+    """Return the camera that renders the world of another process, for a process of its own.
+
+    Raises:
+        NoRenderer: nothing on this machine can render.
+    """
+    render_in_calling_thread()
+    return world.pixels(lambda: poses.state, head, NoFaces())
+
+
+def world_view(
+    spec: WorldSpec,
+    newest: Callable[[], HostState | None],
+    params: WorldCameraParams,
+    number: int = 0,
+) -> "SceneView":
+    """Return what renders a world.
+
+    Args:
+        spec: of the world.
+        newest: returns its state, None before the first.
+        params: of the camera.
+        number: which of its rigs carries the camera.
+    """
+    model = spec.compiled()
+    from gazerig.features.world.figure_model import PlacedPeople
+    from gazerig.features.world.picture import WorldPicture
+    from gazerig.features.world.renderer import RendererParams
+
+    people = PlacedPeople(model.mj, spec.figures) if spec.figures is not None else None
+
+    def place(data: Any, t_s: float) -> None:
+        state = newest()
+        if state is not None:
+            data.qpos[:] = state.qpos
+        if people is not None:
+            people.place(data, t_s)
+
+    rig = model.rigs[number]
+    own = rig.names + HEAD_LINK
+    there = [model.mj.body(i).name for i in range(model.mj.nbody)]
+    hidden = [own] if own in there else []
+    return WorldPicture(
+        model.mj,
+        place,
+        RendererParams(**params.of(RendererParams)),
+        hidden,
+        rig.R_world_base,
+        rig.p_world_base_m,
+    )
+
+
+def world_camera(
+    rig: Rig,
+    options: RunOptions,
+    world: RenderedWorld,
+    poses: WorldPoses | SimulatedPoses,
+    locate: Locate,
+    clock: Clock,
+    turns: PoseBuffer | None,
+    own: ProgramParts,
+    say: Callable[[str], None],
+) -> Camera:
+    """Return the rig's camera in a world.
+
+    Args:
+        rig: with the parameters of the detectors.
+        options: whether pictures are rendered, and whether time is simulated.
+        world: what is to be rendered.
+        poses: where the head is.
+        locate: locates what is found in the camera's axes.
+        clock: of the run.
+        turns: how the camera was turned when, in real time.
+        own: camera and detector of a program.
+        say: gets what a person should know.
+    """
+    scene_params = SceneCameraParams(horizontal_field_deg=world.camera.horizontal_field_deg)
+
+    def ideal(begin_s: float) -> SceneCamera:
+        return SceneCamera(
+            scene_params, world.scene, world.mount, poses.head, world.rng, locate, begin_s
+        )
+
+    if isinstance(poses, WorldPoses):
+        process = None
+        if not options.no_pictures:
+            process = _process(rig, world, poses, locate, clock, turns)
+        return WorldCamera(process, ideal, poses)
+    if options.no_pictures:
+        return ideal(poses.begin_s)
+    from gazerig.robot.app.drawn_motion import MotionOfDrawn
+
+    try:
+        return world.pixels(
+            lambda: poses.state, poses.head, own.find_faces(rig), True,
+            MotionOfDrawn(rig.motion), locate, poses.begin_s,
+        )  # fmt: skip
+    except NoRenderer as error:
+        say(without_pictures(error))
+        return ideal(poses.begin_s)
+
+
+def _process(
+    rig: Rig,
+    world: RenderedWorld,
+    poses: WorldPoses,
+    locate: Locate,
+    clock: Clock,
+    turns: PoseBuffer | None,
+) -> CameraProcess:
+    """Return the process that renders the world of another process and looks."""
+    camera = world.camera
+    field_rad = radians(camera.horizontal_field_deg)
+    motion = partial(motion_finder, rig.motion, camera.lens, field_rad, turns)
+    make = partial(served_pixels, world, poses)
+    source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
+    parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
+    return CameraProcess(parts, clock.now_s, rig.camera_recovery)

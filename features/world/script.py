@@ -1,0 +1,145 @@
+"""The script of a world: which room, who is in it, and what each of them does when.
+
+Read from YAML by the configuration's loader (worlds/*.yaml are shipped). A script repeats
+after every round: who is in it ends the round where it was begun.
+
+Place frame: the world's, with the neck base of the (first) head as its origin, on the floor.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from gazerig.features.world.camera_params import WorldCameraParams
+from gazerig.params import Bounds
+
+Do = Literal[
+    "walk",
+    "step",
+    "turn",
+    "sit",
+    "stand",
+    "look_at",
+    "speak",
+    "nod",
+    "shake",
+    "be_hit",
+    "wave",
+    "gesture",
+    "point",
+    "reach",
+    "push",
+    "pass",
+    "guard",
+    "punch",
+    "feint",
+    "open_guard",
+]
+"""What a person can do."""
+
+RoomName = Literal["living-room", "gym", "hall"]
+"""The rooms there are (gazerig.features.world.room)."""
+
+HEAD = "head"
+"""What a script calls the robot's head."""
+
+
+@dataclass(frozen=True)
+class Act:
+    """One thing that a person does."""
+
+    # fmt: off
+    at_s: Annotated[float, Bounds(0, 600), "when it begins, from the beginning of the round"]
+    do: Annotated[Do, "what is done"]
+    to: Annotated[str, "where to: a place, a seat, a person, or head (the robot's)"] = ""
+    via: Annotated[tuple[str, ...], "places that a walk passes"] = ()
+    for_s: Annotated[float | None, Bounds(0.1, 600), "how long it takes; null: as long as it usually does"] = None
+    side: Annotated[Literal["left", "right"], "which hand, the person's own"] = "right"
+    ahead_m: Annotated[float, Bounds(-2, 2), "how far ahead a step goes"] = 0.0
+    left_m: Annotated[float, Bounds(-2, 2), "how far to the person's left a step goes"] = 0.0
+    speed_m_s: Annotated[float, Bounds(0.2, 2), "speed of a walk"] = 0.9
+    thing: Annotated[str, "the thing that is passed"] = ""
+    vary_s: Annotated[float, Bounds(0, 10), "how much earlier or later it begins at most, by the seed"] = 0.0
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class PersonScript:
+    """One person: looks, stature, and the acts of a round."""
+
+    # fmt: off
+    start: Annotated[str, "the place where the round begins and ends; on a seat the person sits"]
+    look: Annotated[int, Bounds(0, 7), "which face, hair and clothes"] = 0
+    stature_m: Annotated[float, Bounds(0.9, 2.1), "height of the person who stands upright"] = 1.72
+    gloves: Annotated[bool, "wears boxing gloves"] = False
+    looks_at: Annotated[str, "what is looked at before the first look_at: a person, a place or head"] = HEAD
+    acts: Annotated[tuple[Act, ...], "what is done, in the order of time"] = ()
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class ThingScript:
+    """A thing that people hand to each other."""
+
+    # fmt: off
+    held_by: Annotated[str, "the person who holds it when the round begins and ends"]
+    side: Annotated[Literal["left", "right"], "in which hand"] = "right"
+    kind: Annotated[Literal["cup", "ball"], "what it is"] = "cup"
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class PlaceScript:
+    """A place of the script's own on the floor."""
+
+    x_m: Annotated[float, Bounds(-10, 10), "distance ahead of the neck base"]
+    y_m: Annotated[float, Bounds(-10, 10), "distance to the left of it"]
+    facing_deg: Annotated[float, Bounds(-180, 180), "where one who stands there faces"] = 180.0
+    height_m: Annotated[float, Bounds(0, 3), "height of what is looked or pointed at there"] = 1.3
+
+
+@dataclass(frozen=True)
+class HeadScript:
+    """Another head in the same world, which a robot of its own leads."""
+
+    # fmt: off
+    rig: Annotated[str, "name or file of its rig; empty: that of the first head"] = ""
+    x_m: Annotated[float, Bounds(-10, 10), "distance of its neck base ahead of the first one's"] = 0.9
+    y_m: Annotated[float, Bounds(-10, 10), "distance of it to the left"] = 0.0
+    facing_deg: Annotated[float, Bounds(-180, 180), "where it faces; 180: the first head"] = 180.0
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class LightParams:
+    """How bright the room is."""
+
+    # fmt: off
+    ambient: Annotated[float, Bounds(0, 1), "light that comes from everywhere"] = 0.5
+    window: Annotated[float, Bounds(0, 2), "light that falls in from the window's side"] = 0.44
+    lamp: Annotated[float, Bounds(0, 2), "light of the lamp under the ceiling"] = 0.30
+    opposite: Annotated[float, Bounds(0, 2), "light from the first head's far side, against the window's"] = 0.0
+    shadows: Annotated[bool, "whether the window's light casts shadows, which cost time"] = False
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class WorldScript:
+    """A room and the people in it for one round."""
+
+    # fmt: off
+    people: Annotated[Mapping[str, PersonScript], "who is there, by name"]
+    room: Annotated[RoomName, "the room"] = "living-room"
+    round_s: Annotated[float, Bounds(2, 600), "length of a round"] = 60.0
+    neck_height_m: Annotated[float, Bounds(0.3, 2.0), "height of the robot's neck base above the floor"] = 0.95
+    description: Annotated[str, "what happens, in a few words"] = ""
+    places: Annotated[Mapping[str, PlaceScript], "places of its own, besides the room's"] = field(default_factory=dict)
+    things: Annotated[Mapping[str, ThingScript], "things that are passed from hand to hand"] = field(default_factory=dict)
+    heads: Annotated[Mapping[str, HeadScript], "other heads beside the first, by name"] = field(default_factory=dict)
+    light: Annotated[LightParams, "how bright it is"] = field(default_factory=LightParams)
+    camera: Annotated[WorldCameraParams, "pictures of the robot's camera"] = field(default_factory=WorldCameraParams)
+    # fmt: on
+
+
+Fault = tuple[str, str]
+"""Dotted key path and the broken rule."""

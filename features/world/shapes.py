@@ -1,0 +1,106 @@
+"""How a world looks, for a process that draws it: every geom of its model, and people's segments.
+
+MuJoCo is loaded where the shapes are made, not where they are sent from.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import radians
+from typing import NamedTuple
+
+from gazerig.features.world.figure import Figures
+from gazerig.features.world.other_heads import OtherHeads
+from gazerig.features.world.rig_in_world import RigInWorld
+from gazerig.features.world.world_spec import WorldSpec
+from gazerig.gaze.types import Vec3
+from gazerig.robot.description.world_shapes import WorldFinish, WorldPart
+from gazerig.robot.model.quaternion import Quaternion
+
+_SKIN = ("head", "neck", "lips", "left_hand", "right_hand", "left_lid", "right_lid")
+
+_FINENESS = 0.6
+"""People on the page stand farther off than before the rig's camera."""
+
+
+class SpecShapes(NamedTuple):
+    """The shapes of a world without its first rig, which is drawn as it was measured.
+
+    spec: its rigs are places only
+    rig_joints: bodies of a user's world that one of these turns are the rig's
+    others: the other heads in it, None where they are not shown
+    """
+
+    spec: WorldSpec
+    rig_joints: frozenset[str] = frozenset()
+    others: OtherHeads | None = None
+
+    def parts(self) -> Sequence[WorldPart]:
+        """Return the room, other heads and all segments of people; see ``WorldShapes.parts``."""
+        own, rigs = self.spec.rigs, () if self.others is None else self.others.rigs
+        spec = self.spec if self.others is None else self.spec._replace(rigs=(own[0], *rigs))
+        model = spec.compiled()
+        from gazerig.features.world.figure_model import figure_shapes
+        from gazerig.features.world.geom_shapes import still_parts
+
+        figures = self.spec.figures
+        moving = {} if figures is None else figure_shapes(figures, _FINENESS)
+        heads = () if self.others is None else tuple(self.others.parts(model, 1))
+        bodies = [] if self.others is None else self.others.bodies(model, 1)
+        elsewhere = {*moving, *(model.mj.body(i).name for i in bodies)}
+        return (
+            *still_parts(model.mj, elsewhere, self.rig_joints),
+            *heads,
+            *(WorldPart(name, shape, _finish(name), moves=True) for name, shape in moving.items()),
+        )
+
+    def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
+        """Return where all that moves is; see ``WorldShapes.poses``."""
+        figures = self.spec.figures
+        heads = {} if self.others is None else self.others.poses()
+        if figures is None:
+            return heads
+        now = figures.segments(world_s)
+        rows = zip(figures.names, now.quat.tolist(), now.p_m.tolist(), strict=True)
+        people = {name: ((w, x, y, z), (p, q, r)) for name, (w, x, y, z), (p, q, r) in rows}
+        return {**people, **heads}
+
+
+def shapes_of(spec: WorldSpec, others: OtherHeads | None = None) -> SpecShapes:
+    """Return the shapes of a world; they are small to send.
+
+    Args:
+        spec: of the world, with its rigs.
+        others: all of its rigs but the first, None where they are not shown.
+    """
+    joints = {rig.prefix + name for rig in spec.rigs for name in rig.stops_rad}
+    places = tuple(_place(rig) for rig in spec.rigs)
+    return SpecShapes(spec._replace(rigs=places), frozenset(joints), others)
+
+
+def script_shapes(figures: Figures) -> SpecShapes:
+    """Return the shapes of a script's world without any rig; they are small to send.
+
+    Args:
+        figures: the people of the script.
+    """
+    heads = figures.script.heads.items()
+    places = [RigInWorld(_no_body, {}, {}, ())]
+    places += [
+        RigInWorld(
+            _no_body, {}, {}, (), f"{name}_", (head.x_m, head.y_m, 0.0), radians(head.facing_deg)
+        )
+        for name, head in heads
+    ]
+    return SpecShapes(WorldSpec(figures, tuple(places)))
+
+
+def _place(rig: RigInWorld) -> RigInWorld:
+    """Return a rig of which nothing is left but where it stands."""
+    return RigInWorld(_no_body, {}, {}, (), rig.prefix, rig.p_m, rig.yaw_rad)
+
+
+def _no_body() -> tuple[str, Mapping[str, bytes]]:
+    return "<mujoco/>", {}
+
+
+def _finish(segment: str) -> WorldFinish:
+    return "skin" if segment.rpartition("/")[2] in _SKIN else "cloth"

@@ -1,0 +1,28 @@
+"""Whether worlds can be rendered here: tests that need it are skipped with the reason elsewhere."""
+
+from functools import cache
+
+import pytest
+
+
+@cache
+def why_not() -> str:
+    """Return why nothing can render here, "" where something can."""
+    from gazerig.drivers.errors import SetupError
+    from gazerig.features.world.gl_context import import_mujoco
+
+    try:
+        mujoco = import_mujoco()
+        from gazerig.features.world.renderer import Renderer
+
+        Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 16, 16).close()
+    except SetupError as error:
+        return str(error)
+    return ""
+
+
+@pytest.fixture(scope="session")
+def renders() -> None:
+    """Skip the test where nothing can render."""
+    if reason := why_not():
+        pytest.skip(reason)

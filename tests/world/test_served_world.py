@@ -1,0 +1,142 @@
+"""The world of the emulator's process, and the camera that looks into it from another one."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.features.world.camera_params import WorldCameraParams
+from gazerig.features.world.gl_context import NoRenderer
+from gazerig.features.world.run.camera import WorldCamera
+from gazerig.features.world.run.poses import RigInState, WorldPoses
+from gazerig.features.world.run.run_world import RunWorld, world_of
+from gazerig.features.world.run.sight import RenderedWorld, served_pixels
+from gazerig.features.world.served_world import PUBLISH_MS, ServedWorld
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.frames import CameraMount
+from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.pty.line import BusSettings
+
+RIG = load_rig("minimal")
+
+
+class Host:
+    """A clock that is set, and a world on it."""
+
+    def __init__(self, folder: Path) -> None:
+        world = world_of(RIG, RunOptions(mock=True, world="living-room"))
+        assert world is not None
+        self.world: RunWorld = world
+        self.t_s = 100.0
+        self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
+        for name, line in emulated_lines(RIG).items():
+            self.served.device(BusSettings(line, name))
+        joints = RigInState(kinematics_of(RIG), self.served.joints()[0])
+        self.poses = WorldPoses(folder / "state", joints)
+
+    def serve(self, seconds: float, heard: bool) -> None:
+        end_s = self.t_s + seconds
+        while self.t_s < end_s - 1e-9:
+            self.t_s += 0.001
+            self.served.serve(heard)
+
+
+@pytest.fixture
+def host(tmp_path: Path) -> Host:
+    return Host(tmp_path)
+
+
+def test_people_wait_until_a_client_has_spoken(host: Host) -> None:
+    host.serve(0.05, heard=False)
+    assert host.poses.newest() is None and host.poses.begin_s is None
+    host.serve(0.05, heard=True)
+    begin_s, newest = host.poses.begin_s, host.poses.newest()
+    assert begin_s is not None and newest is not None
+    assert begin_s == pytest.approx(100.051, abs=0.002)
+    assert 0.0 <= host.t_s - newest.t_s <= PUBLISH_MS / 1e3 + 1e-9
+    state = host.poses.state
+    assert state is not None and state.t_s == pytest.approx(newest.t_s - begin_s, abs=0.002)
+
+
+def test_the_state_is_that_of_physics(host: Host) -> None:
+    host.serve(0.02, heard=True)
+    assert host.poses.newest() is not None and host.poses.state is not None
+    truly = host.served.world.joints_rad()
+    for name, at in host.served.joints()[0].items():
+        assert host.poses.state.qpos[at] == pytest.approx(truly[name], abs=1e-3)
+    assert host.poses.head(0.0)[0] == pytest.approx(np.array(host.poses.head(0.0)[0]))
+
+
+class Broken(CameraProcess):
+    """A camera's process in which nothing can render."""
+
+    def __init__(self, error: SetupError) -> None:
+        self.error = error
+
+    def open(self) -> None:
+        raise self.error
+
+    def close(self) -> None:
+        pass
+
+    def events(self) -> tuple[str, ...]:
+        return ()
+
+
+def camera(host: Host, error: SetupError | None) -> WorldCamera:
+    def ideal(begin_s: float) -> SceneCamera:
+        return SceneCamera(
+            SceneCameraParams(missed_share=0.0), host.world.scene, CameraMount(RIG.camera),
+            host.poses.head, np.random.default_rng(1), begins_s=begin_s,
+        )  # fmt: skip
+
+    return WorldCamera(None if error is None else Broken(error), ideal, host.poses)
+
+
+@pytest.mark.parametrize("error", [None, NoRenderer("egl: it is missing")])
+def test_without_pictures_detections_are_those_of_the_same_people(
+    host: Host, error: SetupError | None
+) -> None:
+    seen = camera(host, error)
+    seen.open()
+    assert (("egl: it is missing" in " ".join(seen.events())) is True) == (error is not None)
+    assert seen.latest(host.t_s) is None  # nobody has begun
+    host.serve(0.02, heard=True)
+    found = seen.latest(host.t_s + 0.2)
+    assert seen.start_s == host.poses.begin_s
+    assert found is None or found.image is None
+    seen.close()
+
+
+def test_another_fault_of_the_camera_ends_the_start(host: Host) -> None:
+    with pytest.raises(CameraError):
+        camera(host, CameraError("it does not start")).open()
+
+
+@pytest.mark.parametrize("wish", [None, "2"])
+def test_the_camera_s_process_renders_without_threads_unless_somebody_wants_them(
+    host: Host, monkeypatch: pytest.MonkeyPatch, wish: str | None
+) -> None:
+    threads = []
+
+    def look(world: RenderedWorld, *others: object) -> None:
+        threads.append(os.environ.get("LP_NUM_THREADS"))
+
+    monkeypatch.setenv("LP_NUM_THREADS", wish or "")  # is put back afterwards
+    if wish is None:
+        monkeypatch.delenv("LP_NUM_THREADS")
+    monkeypatch.setattr(RenderedWorld, "pixels", look)
+    rendered = RenderedWorld(
+        host.world.spec, host.world.scene, CameraMount(RIG.camera), RIG.camera,
+        np.random.default_rng(1), WorldCameraParams(),
+    )  # fmt: skip
+    served_pixels(rendered, host.poses, host.poses.head)
+    assert threads == [wish or "0"]

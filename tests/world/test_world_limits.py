@@ -1,0 +1,111 @@
+"""Worlds of a user that are too large or hold no numbers: refused before MuJoCo reads them."""
+
+import os
+import struct
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.world.mjcf_limits import refuse_excessive
+from gazerig.features.world.model import world_model
+
+
+@pytest.fixture(autouse=True)
+def not_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing may be given to MuJoCo."""
+    monkeypatch.setattr(mujoco, "MjSpec", None)
+
+
+def refused(path: Path) -> str:
+    with pytest.raises(SetupError) as error:
+        world_model(None, [], path)
+    assert str(path) in str(error.value) and "\n" not in str(error.value)
+    return str(error.value)
+
+
+def world(folder: Path, inside: str) -> Path:
+    path = folder / "own.xml"
+    path.write_text(f"<mujoco>{inside}</mujoco>", encoding="utf-8")
+    return path
+
+
+REPEATED = "<replicate count='200'><replicate count='200'><geom/></replicate></replicate>"
+
+
+@pytest.mark.parametrize(
+    ("inside", "rule"),
+    [
+        (
+            "<asset><hfield name='hill' nrow='36000' ncol='36000'/></asset>",
+            "hfield 'hill': has 36,000 x 36,000 points: at most 4,000,000 in all",
+        ),
+        (
+            "<asset><texture name='wall' builtin='flat' width='1e5' height='1e5'/></asset>",
+            "texture 'wall': has 100,000 x 100,000 pixels: at most 32,000,000 in all",
+        ),
+        ("<size memory='5G'/>", "size: memory='5G': at most 1,073,741,824"),
+        ("<size nconmax='100000000'/>", "size: nconmax='100000000': at most 100,000"),
+        ("<size nuser_body='100000000'/>", "nuser_body='100000000': at most 1,000"),
+        ("<option gravity='0 0 nan'/>", "option: gravity='0 0 nan' is not a number"),
+        ("<option gravity='0 0 -inf'/>", "within +-100 m/s2, as in '0 0 -9.81'"),
+        ("<option gravity='0 0 -1e9'/>", "within +-100 m/s2, as in '0 0 -9.81'"),
+        ("<option gravity='-9.81'/>", "it is three numbers"),
+        ("<worldbody><geom name='a' pos='0 nan 0'/></worldbody>", "geom 'a': pos='0 nan 0' is not"),
+        (f"<worldbody>{REPEATED}</worldbody>", "more than 10,000 elements"),
+        ("<worldbody><composite count='90 90 90'/></worldbody>", "more than 10,000 elements"),
+        ("<broken>", "MuJoCo cannot read this world: mismatched tag"),
+    ],
+)
+def test_what_is_too_large_is_refused_by_what_the_file_says(
+    tmp_path: Path, inside: str, rule: str
+) -> None:
+    assert rule in refused(world(tmp_path, inside))
+
+
+@pytest.mark.parametrize("folder", ["", "heights"])
+def test_a_file_of_5_gb_is_refused_by_its_size(tmp_path: Path, folder: str) -> None:
+    (tmp_path / folder).mkdir(exist_ok=True)
+    with (tmp_path / folder / "hill.bin").open("wb") as file:
+        file.write(struct.pack("<ii", 36_000, 36_000))
+        file.truncate(5_184_000_008)  # takes no room on the disk
+    compiler = f"<compiler meshdir='{folder}'/>" if folder else ""
+    own = world(tmp_path, f"{compiler}<asset><hfield name='hill' file='hill.bin'/></asset>")
+    assert "hill.bin has 5,184 MB: at most 200 MB" in refused(own)
+
+
+def test_a_picture_is_refused_by_its_header(tmp_path: Path) -> None:
+    png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 60_000, 60_000)
+    (tmp_path / "wall.png").write_bytes(png)
+    own = world(tmp_path, "<asset><texture type='2d' name='wall' file='wall.png'/></asset>")
+    assert "wall.png has 60,000 x 60,000 pixels: at most 32,000,000" in refused(own)
+
+
+def test_files_that_are_included_count_too(tmp_path: Path) -> None:
+    (tmp_path / "more.xml").write_text("<mujoco><size memory='9T'/></mujoco>", encoding="utf-8")
+    with pytest.raises(SetupError, match=r"more\.xml: size: memory='9T'"):
+        world_model(None, [], world(tmp_path, "<include file='more.xml'/>"))
+    ring = world(tmp_path, "<include file='own.xml'/>")
+    refuse_excessive(ring)  # MuJoCo says what is wrong with it
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.xml"
+    os.mkfifo(pipe)
+    assert "is a named pipe" in refused(pipe)
+    with (tmp_path / "large.xml").open("wb") as file:
+        file.truncate(5_000_000_000)
+    assert "larger than the 20 MB" in refused(tmp_path / "large.xml")
+    assert "cannot be read" in refused(tmp_path / "absent.xml")
+
+
+def test_common_numbers_are_taken(tmp_path: Path) -> None:
+    refuse_excessive(
+        world(
+            tmp_path,
+            "<option gravity='0 0 -24.8'><flag gravity='disable'/></option>"
+            "<size memory='64M' nconmax='5000'/><custom><text name='nan' data='x'/></custom>"
+            "<asset><hfield name='hill' nrow='1000' ncol='1000' size='9 9 1 .1'/></asset>",
+        )
+    )

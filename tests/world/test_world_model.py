@@ -1,0 +1,138 @@
+"""Worlds are compiled with every shipped rig in them, at its angles, and from a user's MJCF."""
+
+from pathlib import Path
+
+import pytest
+from world_rigs import mujoco_or_skip
+
+mujoco = mujoco_or_skip()
+
+from gazerig.config.schema import load_rig  # noqa: E402
+from gazerig.drivers.errors import SetupError  # noqa: E402
+from gazerig.features.world.model import world_model  # noqa: E402
+from gazerig.features.world.physics import World  # noqa: E402
+from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
+
+RIGS = ("desk", "expressive", "feetech", "maker", "minimal", "nine_xl330", "six_hobby", "six_xl330")
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_every_shipped_rig_stands_in_a_world_at_its_first_angles(name: str) -> None:
+    """Joints of a world are the rig's, one shaft a servo."""
+    rig = rig_in_world(load_rig(name), looks=False)
+    world = World(world_model(None, [rig]), lambda: 0.0)
+    (placed,) = world.model.rigs
+    assert set(placed.qpos) == set(load_rig(name).names) == set(placed.tendon)
+    assert world.joints_rad() == rig.start_rad
+
+
+def test_two_rigs_stand_in_one_world() -> None:
+    """A second rig has a prefix, a place and a direction of its own."""
+    desk = load_rig("desk")
+    model = world_model(
+        None,
+        [
+            rig_in_world(desk, looks=False),
+            rig_in_world(desk, "other_", (1.0, 0.0, 0.0), 3.0, looks=False),
+        ],
+    )
+    first, second = model.rigs
+    assert not set(first.qpos.values()) & set(second.qpos.values())
+    data = mujoco.MjData(model.mj)
+    mujoco.mj_forward(model.mj, data)
+    necks = [data.body(one.names + "neck_pitch_link").xpos for one in model.rigs]
+    assert necks[1] - necks[0] == pytest.approx((1.0, 0.0, 0.0))
+
+
+def _world_file(folder: Path, inside: str) -> Path:
+    path = folder / "own.xml"
+    path.write_text(f"<mujoco><worldbody>{inside}</worldbody></mujoco>")
+    return path
+
+
+def test_a_users_world_carries_the_head_at_its_site(tmp_path: Path) -> None:
+    """The site says where the neck base stands."""
+    path = _world_file(tmp_path, '<site name="gazerig" pos="1 2 3"/>')
+    model = world_model(None, [rig_in_world(load_rig("desk"), looks=False)], path)
+    data = mujoco.MjData(model.mj)
+    mujoco.mj_forward(model.mj, data)
+    assert data.body("rig_neck_pitch_link").xpos == pytest.approx((1.0, 2.0, 3.07))
+
+
+def test_a_rig_knows_where_its_neck_base_stands(tmp_path: Path) -> None:
+    """A site may be turned; a further rig has a site with its own name."""
+    sites = '<site name="gazerig" pos="1 2 3" euler="0 0 90"/><site name="gazerig_other"/>'
+    desk = load_rig("desk")
+    rigs = [rig_in_world(desk, looks=False), rig_in_world(desk, "other_", looks=False)]
+    first, second = world_model(None, rigs, _world_file(tmp_path, sites)).rigs
+    assert first.p_world_base_m == pytest.approx((1.0, 2.0, 3.0))
+    assert [*first.R_world_base[0], *first.R_world_base[1]] == pytest.approx([0, -1, 0, 1, 0, 0])
+    assert second.p_world_base_m == pytest.approx((0.0, 0.0, 0.0))
+    assert second.R_world_base[0] == pytest.approx((1.0, 0.0, 0.0))
+
+
+def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path) -> None:
+    """The message has the file and the line to add."""
+    path = _world_file(tmp_path, '<geom size="1"/>')
+    with pytest.raises(SetupError, match=r'own\.xml: no place.*<site name="gazerig"'):
+        world_model(None, [rig_in_world(load_rig("desk"), looks=False)], path)
+
+
+def test_a_users_world_that_has_the_rigs_joints_is_used_as_it_is(tmp_path: Path) -> None:
+    """Its bodies are the head; the servos turn its joints."""
+    names = load_rig("minimal").names
+    joints = "".join(f'<body><joint name="{name}"/><geom size=".01"/></body>' for name in names)
+    path = _world_file(tmp_path, joints)
+    model = world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], path)
+    assert model.mj.nbody == 1 + len(names) and model.mj.nu == len(names)
+
+
+def test_a_described_rig_is_a_world_itself(tmp_path: Path) -> None:
+    """The file of gazerig describe has the joints, and motors at them that are not wanted here."""
+    desk = load_rig("desk")
+    placed = rig_in_world(desk, looks=False)
+    (tmp_path / "desk.xml").write_text(placed.body()[0])
+    model = world_model(None, [placed], tmp_path / "desk.xml")
+    assert model.mj.nu == len(desk.names) == model.mj.nv
+    assert model.rigs[0].p_world_base_m == (0.0, 0.0, 0.0)
+
+
+def test_a_users_world_with_a_part_of_the_joints_names_those_missing(tmp_path: Path) -> None:
+    """Half a rig is a mistake, not another head."""
+    first, *others = load_rig("minimal").names
+    path = _world_file(tmp_path, f'<body><joint name="{first}"/><geom size=".01"/></body>')
+    with pytest.raises(SetupError, match=f"own.xml: .*not {', '.join(others)}: add"):
+        world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], path)
+
+
+UNUSABLE = (
+    ("", "read"),
+    ("<mujoco><worldbody>", "read"),
+    ("no xml", "read"),
+    (
+        '<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>'
+        '<site name="gazerig"/></worldbody></mujoco>',
+        "build",
+    ),
+    (
+        '<mujoco><worldbody><site name="gazerig"/><body><joint/></body></worldbody></mujoco>',
+        "build",
+    ),
+    ('<mujoco><worldbody><site name="gazerig"/><geom/></worldbody></mujoco>', "build"),
+)
+
+
+@pytest.mark.parametrize(("text", "why"), UNUSABLE)
+def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path: Path, text: str, why: str) -> None:
+    """What MuJoCo says of it follows."""
+    path = tmp_path / "own.xml"
+    path.write_text(text)
+    with pytest.raises(SetupError, match=rf"own\.xml: MuJoCo cannot {why}") as found:
+        world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], path)
+    assert len(str(found.value).splitlines()) == 1
+
+
+def test_a_users_world_that_is_not_there_is_named(tmp_path: Path) -> None:
+    """One line, not MuJoCo's stack."""
+    with pytest.raises(SetupError, match=r"gone\.xml: "):
+        world_model(None, [rig_in_world(load_rig("minimal"), looks=False)], tmp_path / "gone.xml")

@@ -1,0 +1,139 @@
+"""What can be asked of a world on the command line, and what is refused in one line."""
+
+import importlib.util
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gazerig.config.faults import ConfigError
+from gazerig.config.load import load, shipped
+from gazerig.config.schema import load_rig
+from gazerig.config.shipped import shipped_names
+from gazerig.drivers.errors import SetupError
+from gazerig.features.world.camera_params import WorldCameraParams
+from gazerig.features.world.run.run_world import world_of, world_script
+from gazerig.features.world.shipped import HOME
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.session import compose
+from gazerig.robot.cli.run import what_runs
+
+ASKED = RunOptions(mock=True, world="living-room")
+
+
+def test_a_world_is_what_is_looked_at() -> None:
+    found = ASKED.checked()
+    assert (found.world, found.scene, found.looks_through) == ("living-room", None, None)
+    assert "a world, living-room" in what_runs(found)
+    assert replace(ASKED, fast=True).checked().seconds is None  # a whole round, as of a scene
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"mock": False}, "--world needs --mock"),
+        ({"scene": "visitor"}, "--scene and --world exclude each other"),
+        ({"camera": 0}, "--camera and --world exclude each other"),
+        ({"oak": True}, "--oak and --world exclude each other"),
+        ({"pixels": True}, "rendered in any case"),
+        ({"bus": "ideal", "fast": False}, "needs --fast: in real time"),
+        ({"world": None, "no_pictures": True}, "--no-pictures needs --world"),
+    ],
+)
+def test_what_does_not_fit_is_refused(changes: dict[str, object], why: str) -> None:
+    with pytest.raises(SetupError, match=why):
+        replace(ASKED, **changes).checked()  # type: ignore[arg-type]
+
+
+def test_a_missing_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr("gazerig.features.world.run.run_world.find_spec", lambda name: None)
+    with pytest.raises(
+        SetupError, match=r"mujoco is not installed: pip install 'gazerig\[world\]'"
+    ):
+        world_of(load_rig("desk"), ASKED)
+
+
+def test_a_world_that_is_not_there_is_said_with_those_that_are(tmp_path: Path) -> None:
+    rig = load_rig("desk")
+    with pytest.raises(ConfigError, match="living-room"):
+        world_of(rig, replace(ASKED, world="living-rom"))
+    with pytest.raises(SetupError, match="there is no such file"):
+        world_of(rig, replace(ASKED, world=str(tmp_path / "mine.xml")))
+
+
+def test_a_script_at_fault_is_said_with_file_line_and_key(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("room: living-room\npeople:\n  anna:\n    start: dor\n")
+    with pytest.raises(ConfigError) as found:
+        world_of(load_rig("desk"), replace(ASKED, world=str(file)))
+    assert "mine.yaml:4" in str(found.value) and "people.anna.start" in str(found.value)
+
+
+TWO_HEADS = "room: living-room\npeople: {}\nheads:\n  other:\n    rig: RIG\n"
+
+
+@pytest.mark.parametrize(
+    ("rig", "why"), [("desc", "did you mean 'desk'"), ("sub/my.yaml", "sub/my.yaml: there is no")]
+)
+def test_a_head_of_an_unknown_rig_is_said_with_file_line_and_key(
+    tmp_path: Path, rig: str, why: str
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(TWO_HEADS.replace("RIG", rig))
+    with pytest.raises(ConfigError) as found:
+        world_script(str(file))
+    assert "mine.yaml:5" in str(found.value) and "heads.other.rig" in str(found.value)
+    assert why in str(found.value)
+
+
+def test_the_rig_of_a_head_lies_beside_its_world(tmp_path: Path) -> None:
+    file, rig = tmp_path / "mine.yaml", tmp_path / "my.yaml"
+    file.write_text(TWO_HEADS.replace("RIG", "./my.yaml"))
+    rig.touch()
+    assert world_script(str(file)).heads["other"].rig == str(rig)
+    file.write_text(TWO_HEADS.replace("RIG", "minimal"))
+    assert world_script(str(file)).heads["other"].rig == "minimal"
+
+
+def test_a_script_is_read_once_until_it_is_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, reads = tmp_path / "mine.yaml", list[Path]()
+
+    def counted(path: Path, *more: Any, **named: Any) -> Any:
+        reads.append(path)
+        return load(path, *more, **named)
+
+    monkeypatch.setattr("gazerig.features.world.run.run_world.load", counted)
+    file.write_text("room: living-room\npeople: {}\n")
+    asked = replace(ASKED, world=str(file), no_pictures=True, fast=True, bus="ideal")
+    compose(asked).made.close()
+    assert reads == [file]
+    file.write_text("room: hall\npeople: {}\n")
+    assert world_script(str(file)).room == "hall"
+
+
+def test_a_mesh_that_is_lost_is_said_with_file_line_and_key(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    text = shipped("rigs", "minimal").read_text(encoding="utf-8")
+    file.write_text(text + "meshes:\n  head:\n    file: lost.stl\n")
+    with pytest.raises(ConfigError) as found:
+        compose(replace(ASKED, rig=str(file), world=None, scene="visitor", fast=True))
+    line = 3 + text.count("\n")
+    assert f"mine.yaml:{line}" in str(found.value) and "meshes.head.file" in str(found.value)
+
+
+def test_every_shipped_world_can_be_read() -> None:
+    rig = load_rig("desk")
+    for name in shipped_names("worlds", HOME):
+        world = world_of(rig, replace(ASKED, world=name, no_pictures=True))
+        assert world is not None and world.scene.name == name
+        assert world.scene.people(0.0) or len(world.spec.rigs) > 1
+
+
+def test_the_paper_has_every_parameter_of_the_camera() -> None:
+    paper = (Path(__file__).parents[2] / "docs/worlds.md").read_text(encoding="utf-8")
+    for field in fields(WorldCameraParams):
+        assert f"| `{field.name}` |" in paper

@@ -1,0 +1,240 @@
+"""A head that is pushed gives way within its torque limits and comes back; registers show it."""
+
+from math import degrees, radians
+from pathlib import Path
+
+import pytest
+from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run, write
+
+mujoco_or_skip()
+
+from gazerig.config.schema import load_rig  # noqa: E402
+from gazerig.features.world.commands import COMMANDS, obey  # noqa: E402
+from gazerig.features.world.model import world_model  # noqa: E402
+from gazerig.features.world.physics import World  # noqa: E402
+from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
+from gazerig.features.world.world_spec import WorldSpec  # noqa: E402
+from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
+from gazerig.robot.control.tick import Tick  # noqa: E402
+from gazerig.sim_mock.pty.line import BusSettings  # noqa: E402
+from gazerig.sim_mock.pty.server import (  # noqa: E402
+    WORLD_COMMANDS,
+    Server,
+    ServerSettings,
+    WorldFiles,
+)
+
+NECK = ("neck_yaw", "neck_pitch", "neck_roll")
+
+
+def _held(mjcf_file: Path | None = None) -> WorldBench:
+    """Return a desk rig whose neck holds its angles."""
+    bench = WorldBench("desk", mjcf_file=mjcf_file)
+    for name in NECK:
+        arm(bench.servos[name])
+    bench.pass_ms(200)
+    return bench
+
+
+def test_a_push_shows_in_the_registers_and_the_head_comes_back() -> None:
+    """Present Current against the push, Present Position away from the goal, then as before."""
+    bench = _held()
+    yaw = bench.servos["neck_yaw"]
+    goal, upright = (
+        read(yaw, "present_position"),
+        read(bench.servos["neck_roll"], "present_position"),
+    )
+    bench.world.push("head", (0.0, 10.0, 0.0), 0.4)
+    bench.pass_ms(300)
+    assert read(yaw, "present_position") - goal > 15  # to the left
+    # More than 0.1 of the stall current of 1.8 A, the other way, in units of 1 mA.
+    assert read(yaw, "present_current") < -180
+    assert read(bench.servos["neck_roll"], "present_position") < upright - 15
+    bench.pass_ms(1500)
+    assert abs(read(yaw, "present_position") - goal) <= 6
+    assert abs(read(yaw, "present_current")) < 80 and not yaw.errors
+
+
+def test_servos_yield_within_their_torque_limits() -> None:
+    """Of a push that is too strong for them they keep all their torque and no more."""
+    bench = _held()
+    roll = bench.servos["neck_roll"]
+    bench.world.push("head", (0.0, 40.0, 0.0), 0.3)
+    bench.pass_ms(280)
+    assert abs(bench.world.joints_rad()["neck_roll"]) > 0.3
+    assert 0.8 < abs(roll.shaft.effort) <= 1.01
+
+
+def test_a_limp_head_falls_away_from_a_push_and_stays_where_it_was_left() -> None:
+    """Without torque only the gears' friction is there."""
+    bench = WorldBench("desk")
+    before = bench.world.joints_rad()["neck_yaw"]
+    bench.world.push("head", (0.0, 3.0, 0.0), 0.3)
+    bench.pass_ms(1500)
+    left = bench.world.joints_rad()["neck_yaw"]
+    assert left > before + 0.1
+    bench.pass_ms(300)
+    assert bench.world.joints_rad()["neck_yaw"] == pytest.approx(left, abs=1e-3)
+
+
+HAND = """<mujoco><worldbody>
+  <site name="gazerig"/>
+  <body name="hand" mocap="true" pos="0.05 -0.4 0.12">
+    <geom type="capsule" size=".03 .06"/>
+  </body>
+</worldbody></mujoco>"""
+
+
+def test_a_hand_that_moves_into_the_head_pushes_it(tmp_path: Path) -> None:
+    """What is led through the world from outside cannot be stopped: the head gives way."""
+    (tmp_path / "hand.xml").write_text(HAND)
+    bench = _held(tmp_path / "hand.xml")
+    roll, goal = bench.servos["neck_roll"], read(bench.servos["neck_roll"], "present_position")
+    for ms in range(0, 400, 5):
+        bench.world.move("hand", (0.05, -0.4 + 0.36 * ms / 400, 0.12))
+        bench.pass_ms(5)
+    assert abs(read(roll, "present_position") - goal) > 30
+    assert abs(read(roll, "present_current")) > 100
+    bench.world.move("hand", (0.05, -0.4, 0.12))
+    bench.pass_ms(1200)
+    assert abs(read(roll, "present_position") - goal) <= 8
+
+
+def test_only_a_body_that_is_led_can_be_moved(tmp_path: Path) -> None:
+    """The message says what it needs."""
+    (tmp_path / "hand.xml").write_text(HAND)
+    bench = _held(tmp_path / "hand.xml")
+    with pytest.raises(ValueError, match="no body 'arm' with mocap=\"true\""):
+        bench.world.move("arm", (0.0, 0.0, 0.0))
+
+
+def test_upper_and_lower_lids_hold_each_other_off() -> None:
+    """Both are sent beyond where they meet: they touch, strain and stay apart."""
+    bench = WorldBench("maker")
+    wanted = {"left_upper_lid": -24.0, "left_lower_lid": -12.0}
+    for name, angle in wanted.items():
+        joint = bench.rig.joints[name]
+        bench.devices[""].body.channels[joint.id].aim(round(joint.steps(radians(angle))))
+    bench.pass_ms(500)
+    for name, angle in wanted.items():
+        assert degrees(bench.world.joints_rad()[name]) > angle + 2.0
+        assert bench.servos[name].straining
+    assert (
+        sum(degrees(bench.world.joints_rad()[name]) for name in wanted) > -29.5
+    )  # they meet at -28
+
+
+SHELF = """<mujoco><worldbody>
+  <site name="gazerig"/>
+  <geom type="box" size=".03 .2 .05" pos=".12 0 .1"/>
+</worldbody></mujoco>"""
+
+
+def test_what_stands_before_the_forehead_stops_it(tmp_path: Path) -> None:
+    """Sent down to its limit, the neck stops on the shelf, with its torque in the registers."""
+    (tmp_path / "shelf.xml").write_text(SHELF)
+    lowest, efforts = [], []
+    for path in (None, tmp_path / "shelf.xml"):
+        bench = _held(path)
+        pitch = bench.servos["neck_pitch"]
+        joint = bench.rig.joints["neck_pitch"]
+        write(pitch, "goal_position", round(joint.steps(radians(joint.min_deg))))
+        bench.pass_ms(600)
+        lowest.append(degrees(bench.world.joints_rad()["neck_pitch"]))
+        efforts.append(abs(read(pitch, "present_current")))
+    assert lowest[0] == pytest.approx(-35.0, abs=1.0) and lowest[1] > -32.0
+    assert efforts[1] > efforts[0] + 100
+
+
+def test_the_guard_finds_a_head_that_is_held_away_and_brings_it_back_softly(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A push of a second: the neck gives way, is found stalled, waits, and comes back."""
+    run = world_run("desk", monkeypatch)
+    seen: list[tuple[float, float, tuple[str, ...]]] = []
+
+    def watch(tick: Tick) -> None:
+        if len(seen) == 400:
+            run.world.push("head", (0.0, 15.0, 0.0), 0.8)
+        roll = run.rig.names.index("neck_roll")
+        seen.append(
+            (
+                degrees(tick.joints.position_rad[roll]),
+                tick.joints.load[roll],
+                tick.guard_result.reasons,
+            )
+        )
+
+    run.play(5.0, watch)
+    before, pushed, after = seen[390], seen[400:560], seen[-1]
+    assert abs(before[0]) < 3.0
+    assert min(row[0] for row in pushed) < -10.0
+    assert max(abs(row[1]) for row in pushed) > 0.7
+    assert any("neck_roll: not moving" in row[2] for row in seen[400:700])
+    assert abs(after[0]) < 3.0 and not after[2]
+
+
+# --- as a command
+
+
+def test_a_push_can_be_typed() -> None:
+    """With a direction as the rig stands; half a second where no time is given."""
+    bench = _held()
+    before = bench.world.joints_rad()["neck_yaw"]
+    assert obey(bench.world, "push head 10 left") == "head is pushed left with 10 N for 0.5 s"
+    bench.pass_ms(300)
+    assert bench.world.joints_rad()["neck_yaw"] > before + 0.02
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("push tail 5 left", "no body 'tail': there is base_link, "),
+        ("push head 500 left", "'500' is not newtons from 0 to 100"),
+        ("push head 5 sideways", "'sideways' is none of forward, back"),
+        ("push head", "N is missing"),
+        ("kick head", "'kick' is no command; there is push, help"),
+    ],
+)
+def test_a_push_that_cannot_be_is_refused_with_what_would_be_right(text: str, message: str) -> None:
+    """The usage follows."""
+    with pytest.raises(ValueError, match=message):
+        obey(_held().world, text)
+
+
+def test_two_heads_are_pushed_each_by_its_own_name_and_its_own_left() -> None:
+    """The second one stands opposite and turned round."""
+    desk = load_rig("desk")
+    rigs = [
+        rig_in_world(desk, looks=False),
+        rig_in_world(desk, "other_", (1.0, 0.0, 0.0), 3.14159265, looks=False),
+    ]
+    now_s = [0.0]
+    world = World(world_model(None, rigs), lambda: now_s[0])
+    before = [world.joints_rad(0)["neck_yaw"], world.joints_rad(1)["neck_yaw"]]
+    obey(world, "push other_head 3 left 0.2")
+    world.advance(300)
+    assert world.joints_rad(0)["neck_yaw"] == pytest.approx(before[0], abs=1e-6)
+    assert world.joints_rad(1)["neck_yaw"] > before[1] + 0.02
+
+
+def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servos(
+    tmp_path: Path,
+) -> None:
+    """``gazerig ctl fault`` orders both."""
+    spec = WorldSpec(None, (rig_in_world(load_rig("desk"), looks=False),))
+    spec.write(tmp_path / "spec")
+    (line,) = emulated_lines(load_rig("desk")).values()
+    files = WorldFiles(str(tmp_path / "spec"), str(tmp_path / "state"))
+    server = Server(ServerSettings((BusSettings(line),), True, files), lambda text: None)
+    try:
+        assert "pushed left with 5 N" in server._obey("push head 5 left 0.1")
+        assert "N is missing; usage: push BODY N" in server._obey("push head")
+        assert "servo 7 is stuck" in server._obey("stick 7")
+    finally:
+        server.close()
+
+
+def test_the_servers_commands_of_a_world_are_those_there_are() -> None:
+    """The server knows their names without MuJoCo."""
+    assert set(WORLD_COMMANDS) == set(COMMANDS.verbs)

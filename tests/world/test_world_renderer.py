@@ -1,0 +1,308 @@
+"""Pictures of a world: where points land, how far things are, and what a real lens adds."""
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from rendering import renders as renders
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.features.world.gl_context import NoRenderer, import_mujoco, open_context
+from gazerig.gaze.angles import compose, rotate, rotation, sub
+from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.robot.description.links import IDENTITY, ORIGIN
+from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.scene_view import PinholeView, Rendered
+from gazerig.sim_mock.cameras.optics import (
+    CameraMotion,
+    OpticsParams,
+    expose,
+    smeared,
+    through_lens,
+)
+
+pytestmark = pytest.mark.usefixtures("renders")
+
+SIZE = 320, 240
+OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+LENS = Intrinsics(210.0, 222.0, 171.0, 104.0)
+BENT = Intrinsics(210.0, 222.0, 171.0, 104.0, (-0.28, 0.09, 0.002, -0.003, -0.01))
+POINTS = np.random.default_rng(3).uniform((1.0, -0.6, -0.4), (2.0, 0.6, 0.4), (6, 3))
+RADIUS_M = 0.015
+POSES: list[tuple[Mat3, Vec3]] = [
+    (compose(rotation((0.0, 0.0, 0.0)), OPTICAL), (0.0, 0.0, 0.0)),
+    (compose(rotation((0.2, -0.1, 0.3)), OPTICAL), (-0.1, 0.05, 0.02)),
+    (compose(rotation((-0.15, 0.12, -0.5)), OPTICAL), (0.1, 0.1, -0.1)),
+]
+
+
+class Balls:
+    """White balls at known points in the dark; they move along y with a speed."""
+
+    def __init__(
+        self,
+        points: Floats = POINTS,
+        speed_m_s: float = 0.0,
+        R_world_base: Mat3 = IDENTITY,
+        p_world_base_m: Vec3 = ORIGIN,
+    ) -> None:
+        mujoco = import_mujoco()
+        from gazerig.features.world.picture import WorldPicture
+        from gazerig.features.world.renderer import RendererParams
+
+        bodies = "".join(
+            f'<body mocap="true" pos="{x} {y} {z}"><geom type="sphere" size="{RADIUS_M}"'
+            ' rgba="1 1 1 1"/></body>'
+            for x, y, z in points
+        )
+        model = mujoco.MjModel.from_xml_string(
+            '<mujoco><visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/>'
+            f"</visual><worldbody>{bodies}</worldbody></mujoco>"
+        )
+
+        def place(data: Any, t_s: float) -> None:
+            data.mocap_pos[:] = points + (0.0, speed_m_s * t_s, 0.0)
+
+        params = RendererParams(shadow_px=0, skybox=False)
+        self.picture = WorldPicture(model, place, params, (), R_world_base, p_world_base_m)
+
+
+@pytest.fixture(scope="module")
+def balls(renders: None) -> Iterator[Balls]:
+    made = Balls()
+    yield made
+    made.picture.close()
+
+
+def landed(seen: Rendered, expected_px: Floats) -> Floats:
+    """Return the centroid of the light within 8 pixels of each expected place."""
+    light = seen.image.max(axis=2).astype(float)
+    rows, columns = np.mgrid[0 : light.shape[0], 0 : light.shape[1]]
+    found = []
+    for x, y in expected_px:
+        near = light * (np.hypot(columns - x, rows - y) < 8.0)
+        found.append(((near * columns).sum(), (near * rows).sum()) / max(near.sum(), 1e-9))
+    return np.array(found)
+
+
+def visible(R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[Floats, Floats]:
+    """Return pixels and distances of the balls that are wholly in the frame and alone there."""
+    camera = (POINTS - p_m) @ np.array(R)
+    pixels = project(camera, lens)
+    apart = np.hypot(*np.moveaxis(pixels[:, None] - pixels[None], -1, 0)) + 99.0 * np.eye(
+        len(pixels)
+    )
+    inside = ((pixels > 8.0) & (pixels < np.array(SIZE) - 9.0)).all(axis=1) & (
+        apart.min(axis=1) > 16
+    )
+    return pixels[inside], camera[inside, 2]
+
+
+@pytest.mark.parametrize("lens", [LENS, BENT], ids=["ideal", "bent"])
+@pytest.mark.parametrize("pose", POSES)
+def test_a_point_lands_where_the_programs_own_lens_says(
+    balls: Balls, pose: tuple[Mat3, Vec3], lens: Intrinsics
+) -> None:
+    pixels, away_m = visible(*pose, lens)
+    assert len(pixels) >= 2
+    seen = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *pose), depth=True)
+    off = landed(seen, pixels) - pixels
+    assert np.abs(off).max() < 0.5
+    assert seen.depth_m is not None
+    for (x, y), metres in zip(np.rint(pixels).astype(int), away_m, strict=True):
+        near = seen.depth_m[y - 1 : y + 2, x - 1 : x + 2].min()
+        assert near == pytest.approx(metres - RADIUS_M, abs=0.004)
+    assert np.isinf(seen.depth_m[0, 0])
+
+
+def test_rows_alone_are_those_of_the_whole_picture(balls: Balls) -> None:
+    for lens in (LENS, BENT):
+        whole = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *POSES[1]))
+        part = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *POSES[1]), rows=(90, 150))
+        assert part.image.shape == (60, 320, 3)
+        assert np.abs(part.image.astype(int) - whole.image[90:150]).max() <= 40  # samples at edges
+        assert np.abs(part.image.astype(int) - whole.image[90:150]).mean() < 0.05
+
+
+def turning(rate_rad_s: float) -> CameraMotion:
+    """Return the motion of a camera that turns to its left."""
+    span = 0.005
+    before = compose(rotation((-rate_rad_s * span, 0.0, 0.0)), OPTICAL)
+    return CameraMotion(OPTICAL, (0.0, 0.0, 0.0), before, (0.0, 0.0, 0.0), span)
+
+
+ONE = np.array([(1.5, 0.0, 0.0)])
+
+
+def width_px(image: np.ndarray) -> int:
+    """Return over how many columns there is light."""
+    return int((image.max(axis=(0, 2)) > 12).sum())
+
+
+def test_what_moves_itself_is_blurred_only_where_the_exposure_is_made_of_several() -> None:
+    still = CameraMotion(OPTICAL, (0.0, 0.0, 0.0), OPTICAL, (0.0, 0.0, 0.0), 0.0)
+    passing = Balls(ONE, speed_m_s=4.0)  # 560 px/s: 9 px in 16 ms
+    sharp, blurred = (
+        expose(passing.picture, OpticsParams(16.0, count), 0.0, LENS, SIZE, still).image
+        for count in (1, 8)
+    )
+    passing.picture.close()
+    assert width_px(blurred) - width_px(sharp) == pytest.approx(8, abs=2)
+
+
+def test_the_mean_of_several_pictures_is_as_wide_as_the_smear_of_a_turn() -> None:
+    one = Balls(ONE)
+    motion = turning(3.0)
+    wide, smear, sharp = (
+        width_px(expose(one.picture, OpticsParams(20.0, count), 0.0, LENS, SIZE, move).image)
+        for count, move in ((12, motion), (1, motion), (1, motion._replace(span_s=0.0)))
+    )
+    one.picture.close()
+    assert wide == pytest.approx(smear, abs=2)
+    assert smear > sharp + 9
+
+
+def test_rows_that_are_read_later_are_seen_from_where_the_camera_is_then() -> None:
+    column = np.array([(1.5, 0.0, z) for z in (-0.5, 0.0, 0.5)])
+    pole = Balls(column)
+    params = OpticsParams(0.0, read_out_ms=20.0, bands=24)
+    motion = turning(1.0)
+    slant = expose(pole.picture, params, 0.0, LENS, SIZE, motion).image
+    straight = expose(pole.picture, OpticsParams(0.0), 0.0, LENS, SIZE, motion).image
+    pole.picture.close()
+    expected = project(column @ np.array(OPTICAL), LENS)
+    for image, rate in ((slant, 1.0), (straight, 0.0)):
+        for x, y in expected:
+            late_s = 0.020 * ((y + 0.5) / SIZE[1] - 0.5)
+            # The camera turns to the left, so what is there goes to the right.
+            where = np.array([(x + rate * late_s * LENS.fx_px, y)])
+            assert landed(Rendered(image, None), where)[0][0] == pytest.approx(where[0][0], abs=0.5)
+
+
+def test_what_is_beside_the_picture_is_left_out_and_nothing_else() -> None:
+    mujoco = import_mujoco()
+    from gazerig.features.world.renderer import Renderer, RendererParams
+
+    rng = np.random.default_rng(5)
+    xml = "".join(
+        f'<body name="b{i}" pos="{x} {y} {z}"><geom type="sphere" size="{r}" rgba="1 1 1 1"/></body>'
+        for i, (x, y, z, r) in enumerate(rng.uniform((-2, -2, -2, 0.01), (3, 2, 2, 0.3), (60, 4)))
+    )
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{xml}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    renderer = Renderer(model, *SIZE, RendererParams(shadow_px=0, samples=0, skybox=False))
+    for R, p_m in POSES:
+        seen = renderer.render(data, LENS, R, p_m)
+        model.geom_rbound[:] = 99.0  # as if everything reached into the picture
+        everything = renderer.render(data, LENS, R, p_m)
+        model.geom_rbound[:] = model.geom_size[:, 0]
+        assert seen.image.any()
+        assert (seen.image == everything.image).all()
+    assert (model.geom_group == 0).all()
+    renderer.close()
+
+
+def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
+    mujoco = import_mujoco()
+    from gazerig.features.world.renderer import Renderer, RendererParams
+
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><body name="head" pos="1 0 0"><body pos="0 0 0">'
+        '<geom type="sphere" size=".2" rgba="1 1 1 1"/></body></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    params = RendererParams(shadow_px=0, skybox=False)
+    for hidden, lit in (((), True), (("head",), False)):
+        renderer = Renderer(model, *SIZE, params, hidden)
+        assert bool(renderer.render(data, LENS, *POSES[0]).image.any()) == lit
+        renderer.close()
+    with pytest.raises(ValueError, match="no body 'skull'"):
+        Renderer(model, *SIZE, params, ["skull"])
+
+
+def test_several_threads_may_use_one_renderer_and_it_can_be_closed_twice(balls: Balls) -> None:
+    expected = balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image
+    found: list[np.ndarray] = []
+
+    def draw() -> None:
+        found.append(balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image)
+
+    threads = [threading.Thread(target=draw) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 3
+    assert all((image == expected).all() for image in found)
+    other = Balls(ONE)
+    other.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0]))
+    other.picture.close()
+    other.picture.close()
+    assert (balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image == expected).all()
+
+
+def refused(**environment: str) -> str:
+    """Return what a process says that tries to render with other settings."""
+    code = (
+        "from gazerig.features.world.gl_context import import_mujoco, NoRenderer\n"
+        "mujoco = import_mujoco()\n"
+        "from gazerig.features.world.renderer import Renderer\n"
+        "try: Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 16, 16)\n"
+        "except NoRenderer as error: print(error)\n"
+    )
+    clean = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=clean | environment, capture_output=True, text=True
+    )
+    assert not done.stderr
+    return done.stdout
+
+
+def test_where_nothing_renders_all_that_was_tried_is_told_in_one_line() -> None:
+    said = refused(MUJOCO_EGL_DEVICE_ID="99", LD_LIBRARY_PATH="", PYOPENGL_PLATFORM="egl")
+    assert said.count("\n") == 1
+    for part in ("egl: ", "osmesa: ", "glfw: there is no display", "libegl1", "libosmesa6"):
+        assert part in said
+
+
+def test_the_users_own_choice_is_the_only_one_tried() -> None:
+    said = refused(MUJOCO_GL="glfw")
+    assert "glfw: there is no display" in said
+    assert "egl" not in said
+
+
+def test_a_wish_that_is_no_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for wish in ("off", "vulkan"):
+        monkeypatch.setenv("MUJOCO_GL", wish)
+        with pytest.raises(NoRenderer, match=wish):
+            open_context(lambda: None)
+
+
+def test_a_smear_of_nothing_changes_nothing() -> None:
+    image = np.zeros((4, 4, 3), np.uint8)
+    assert smeared(image, (0.3, 0.3)) is image
+
+
+def test_places_of_a_camera_are_as_from_where_its_rig_stands(balls: Balls) -> None:
+    """A rig that stands elsewhere and turned round sees what a camera there sees."""
+    R, p_m = POSES[0]
+    turned: Mat3 = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    back: Mat3 = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    stands_m: Vec3 = (1.0, 2.0, -0.5)
+    elsewhere = Balls(R_world_base=turned, p_world_base_m=stands_m)
+    try:
+        seen = elsewhere.picture.draw(
+            PinholeView(0.0, LENS, SIZE, compose(back, R), rotate(back, sub(p_m, stands_m)))
+        )
+    finally:
+        elsewhere.picture.close()
+    here = balls.picture.draw(PinholeView(0.0, LENS, SIZE, R, p_m))
+    assert here.image.max() > 200
+    assert np.abs(seen.image.astype(int) - here.image.astype(int)).max() <= 8

@@ -1,0 +1,175 @@
+"""Several buses, coupled servos and several rigs in one world."""
+
+from dataclasses import replace
+from math import cos, degrees, pi, radians, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from emulated_rig import mixed_rig
+from test_coupling import KINDS
+from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
+from world_scripts import read as read_script
+
+mujoco_or_skip()
+
+from gazerig.config.schema import Rig, load_rig  # noqa: E402
+from gazerig.features.world.figure import Figures  # noqa: E402
+from gazerig.features.world.model import world_model  # noqa: E402
+from gazerig.features.world.physics import World  # noqa: E402
+from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
+from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
+
+
+def test_buses_of_three_kinds_share_one_world(tmp_path: Path) -> None:
+    """A Maestro's eyes, a Dynamixel and a Feetech servo in the neck: each moves its own joint."""
+    bench = WorldBench(mixed_rig(tmp_path))
+    eyes, yaw, pitch = "eyes_pan", bench.servos["neck_yaw"], bench.servos["neck_pitch"]
+    arm(yaw)
+    arm(pitch)
+    write(yaw, "goal_position", read(yaw, "present_position") + 200)
+    write(pitch, "goal_position", round(pitch.position_steps) + 100)
+    joint = bench.rig.joints[eyes]
+    bench.devices[""].body.channels[joint.id].aim(round(joint.steps(radians(12.0))))
+    before = bench.world.joints_rad()
+    bench.pass_ms(900)
+    angles = bench.world.joints_rad()
+    assert degrees(angles[eyes]) == pytest.approx(12.0, abs=1.2)
+    for name, servo in (("neck_yaw", yaw), ("neck_pitch", pitch)):
+        assert abs(angles[name] - before[name]) > radians(7.0)
+        told = bench.rig.joints[name].angle_rad(servo.position_steps)
+        assert told == pytest.approx(angles[name], abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_two_servos_move_two_joints_together(kind: str) -> None:
+    """Both give what their rods or gears make of the joints' angles, and hold them there."""
+    rig = replace(load_rig("desk"), couplings={"neck": KINDS[kind]})
+    bench = WorldBench(rig)
+    pair = [bench.servos[name] for name in ("neck_pitch", "neck_roll")]
+    coupling = KINDS[kind].made()
+    joints = [rig.joints[name] for name in ("neck_pitch", "neck_roll")]
+    for servo in pair:
+        arm(servo)
+    bench.pass_ms(150)
+    for servo, joint, angle in zip(pair, joints, coupling.servo_rad((0.2, -0.15)), strict=True):
+        write(servo, "goal_position", round(joint.steps(angle)))
+    for ms in (20, 20, 40, 900):
+        bench.pass_ms(ms)
+        angles = bench.world.joints_rad()
+        truly = coupling.servo_rad((angles["neck_pitch"], angles["neck_roll"]))
+        for servo, joint, angle in zip(pair, joints, truly, strict=True):
+            assert servo.position_steps == pytest.approx(joint.steps(angle), abs=0.05)
+    assert angles["neck_pitch"] == pytest.approx(0.2, abs=radians(1.0))
+    assert angles["neck_roll"] == pytest.approx(-0.15, abs=radians(1.0))
+
+
+def test_both_servos_of_a_pair_feel_a_push_against_one_joint() -> None:
+    """A roll of the head is a torque on both, of opposite sign."""
+    bench = WorldBench(replace(load_rig("desk"), couplings={"neck": KINDS["differential"]}))
+    a, b = bench.servos["neck_pitch"], bench.servos["neck_roll"]
+    for servo in (a, b, bench.servos["neck_yaw"]):
+        arm(servo)
+    bench.pass_ms(150)
+    bench.world.push("head", (0.0, 12.0, 0.0), 0.3)
+    bench.pass_ms(250)
+    assert a.shaft.effort > 0.1 and b.shaft.effort < -0.1
+
+
+class TwoHeads:
+    """Two desk rigs that stand opposite each other in one world, a metre apart."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.rig: Rig = load_rig("desk")
+        self.rigs = [
+            rig_in_world(self.rig, looks=False),
+            rig_in_world(self.rig, "other_", (1.0, 0.0, 0.0), pi, looks=False),
+        ]
+        self.world = World(world_model(None, self.rigs), lambda: self.now_s)
+        (line,) = emulated_lines(self.rig).values()
+        self.chains: list[Any] = [self.world.device(line, rig=nth) for nth in (0, 1)]
+        for chain in self.chains:
+            arm(chain[7])
+
+    def pass_ms(self, ms: int) -> None:
+        """Let time pass."""
+        self.now_s += ms / 1000.0
+        self.world.advance(round(self.now_s * 1000.0))
+
+
+def test_two_heads_in_one_world_move_each_by_its_own_servos() -> None:
+    """The same packet to both buses turns both; to one, only that one."""
+    both = TwoHeads()
+    write(both.chains[0][7], "goal_position", 2048)
+    write(both.chains[1][7], "goal_position", 2048 + 300)
+    both.pass_ms(700)
+    angles = [both.world.joints_rad(nth)["neck_yaw"] for nth in (0, 1)]
+    assert angles[0] == pytest.approx(0.0, abs=0.02)
+    assert angles[1] == pytest.approx(300 / 4096 * 2 * pi, abs=0.02)
+
+
+def test_a_head_moves_as_if_the_other_were_not_there() -> None:
+    """Without contact they have nothing to do with each other."""
+    both = TwoHeads()
+    now_s = [0.0]
+    alone = World(world_model(None, both.rigs[:1]), lambda: now_s[0])
+    (line,) = emulated_lines(both.rig).values()
+    chain: Any = alone.device(line)
+    arm(chain[7])
+    for one in (chain[7], both.chains[0][7]):
+        write(one, "goal_position", 2248)
+    both.pass_ms(300)
+    alone.advance(300)
+    assert both.world.joints_rad(0) == pytest.approx(alone.joints_rad(0), abs=1e-9)
+
+
+def test_a_rig_stands_where_it_was_put_and_turned() -> None:
+    """The camera of the second head is a metre away and looks back."""
+    both = TwoHeads()
+    data, mj = both.world._data, both.world.model.mj
+    frames = [mj.body(one.names + "base_link").id for one in both.world.model.rigs]
+    turned = np.array(data.xmat[frames[1]]).reshape(3, 3)
+    assert data.xpos[frames[1]] - data.xpos[frames[0]] == pytest.approx((1.0, 0.0, 0.0))
+    assert turned[:2, :2].ravel() == pytest.approx((cos(pi), -sin(pi), sin(pi), cos(pi)))
+
+
+PUSH = """description: a child pushes the head
+room: hall
+round_s: 10.0
+neck_height_m: 1.05
+people:
+  tim:
+    look: 3
+    stature_m: 1.22
+    start: close
+    acts:
+      - {at_s: 3.0, do: push, to: head}
+"""
+
+
+def test_a_child_that_pushes_the_head_turns_it_and_its_servos_feel_it(tmp_path: Path) -> None:
+    """By contact alone: registers show the torque, and the head comes back to its goal."""
+    (tmp_path / "push.yaml").write_text(PUSH)
+    rig, now_s = load_rig("desk"), [0.0]
+    figures = Figures(read_script(tmp_path / "push.yaml"))
+    (push,) = figures.timelines["tim"]
+    world = World(world_model(figures, [rig_in_world(rig, looks=False)]), lambda: now_s[0])
+    (line,) = emulated_lines(rig).values()
+    chain: Any = world.device(line)
+    pitch = chain[8]
+    for servo in chain.servos[6:]:
+        arm(servo)
+    world.begin(-round(push.start_s * 1000.0) + 200)
+    world.advance(200)
+    before = read(pitch, "present_position")
+    rows = []
+    for ms in range(220, 3200, 20):
+        world.advance(ms)
+        rows.append((read(pitch, "present_position") - before, read(pitch, "present_current")))
+    moved, current = np.array(rows).T
+    assert np.abs(moved).max() > 23  # 2 deg
+    at = int(np.abs(moved).argmax())
+    assert abs(current[at]) > 150 and current[at] * moved[at] < 0
+    assert abs(moved[-1]) <= 6 and not pitch.errors

@@ -1,0 +1,121 @@
+"""Whole runs in a world: servo bytes, torques, motion, what is seen, and back to servo bytes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
+
+from rendering import why_not
+
+import gazerig
+from gazerig.config.schema import load_rig
+from gazerig.features.lab.simulated_run import simulate
+from gazerig.features.world import gl_context
+from gazerig.features.world.gl_context import NoRenderer
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.session import compose, run
+from gazerig.robot.recording.read import RunRecording
+from gazerig.sim_mock.cameras.detections import SceneCamera
+
+FAST = RunOptions(
+    mock=True, fast=True, seed=3, world="living-room", no_pictures=True, seconds=1.0
+).checked()
+
+
+def digest(options: RunOptions) -> object:
+    bus = simulate(load_rig("desk"), options).figures["bus"]
+    assert isinstance(bus, dict)
+    return bus["tx_sha256"]
+
+
+def test_the_same_seed_gives_the_same_bytes() -> None:
+    """Without pictures: those of another graphics library differ in a pixel here and there."""
+    seen = replace(FAST, seconds=2.0)  # before that the head straightens up, whoever is there
+    once = digest(seen)
+    assert once == digest(seen)
+    assert once != digest(replace(seen, seed=4))
+
+
+def test_a_head_in_a_world_finds_the_person_there() -> None:
+    made = simulate(load_rig("desk"), replace(FAST, seconds=8.0))
+    assert int(str(made.figures["faces_seen"])) > 100
+    error = made.figures["gaze_error_deg"]
+    assert isinstance(error, dict) and error["median"] < 1.0
+    assert made.figures["joint_faults"] == {}
+
+
+def test_the_servos_move_joints_that_weigh_something() -> None:
+    """The world's joints follow the servos' registers, and gravity draws at them."""
+    made = assemble(load_rig("desk"), FAST)
+    try:
+        made.robot.start(made.clock)
+        for _ in range(60):
+            made.clock.sleep_until(made.clock.now_s() + 0.005)
+            tick = made.robot.tick(made.clock.now_s(), 0.005)
+        camera = made.robot.camera
+        assert isinstance(camera, SceneCamera)
+        R, _ = camera._head_pose(0.0)
+        measured = dict(zip(tick.guard_result.joints, tick.joints.position_rad, strict=True))
+        truly = made.live.parts.kinematics.head_pose(
+            (measured["neck_yaw"], measured["neck_pitch"], measured["neck_roll"]), (0.0, 0.0)
+        )[0]
+        assert R[0] == pytest.approx(truly[0], abs=0.01)
+        made.robot.stop()
+    finally:
+        made.close()
+
+
+def test_without_a_renderer_it_goes_on_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(make: object) -> object:
+        raise NoRenderer("no pictures of a world: egl: it is missing")
+
+    monkeypatch.setattr("gazerig.features.world.renderer.open_context", fail)
+    made = assemble(load_rig("desk"), replace(FAST, no_pictures=False))
+    try:
+        assert isinstance(made.robot.camera, SceneCamera)
+        made.robot.start(made.clock)
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+        assert any("egl: it is missing; detections are computed" in one for one in tick.events)
+        made.robot.stop()
+    finally:
+        made.close()
+
+
+def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    composed = compose(replace(FAST, record=file))
+    figures = run(composed, lambda: None, lambda line: None)
+    recording = RunRecording(file)
+    assert recording.info.scene == "living-room" and "no pictures" in recording.info.eyes
+    again = rerun(recording)
+    assert again.same and again.tx_same, again.differs
+    assert again.ticks == figures["ticks"]
+
+
+def test_nothing_but_the_world_imports_its_graphics() -> None:
+    assert "mujoco" not in vars(gl_context)
+
+
+def test_ideal_servos_move_the_world_too() -> None:
+    """For what is judged above the bus; the head is where the world has it."""
+    made = simulate(load_rig("desk"), replace(FAST, bus="ideal", seconds=4.0))
+    error = made.figures["gaze_error_deg"]
+    assert isinstance(error, dict) and error["median"] < 1.0
+
+
+def test_pictures_of_the_same_seed_give_the_same_bytes_on_one_machine() -> None:
+    if reason := why_not():
+        pytest.skip(reason)
+    seen = replace(FAST, no_pictures=False, seconds=0.2)
+    assert digest(seen) == digest(seen)
+
+
+def test_a_program_can_be_in_a_world() -> None:
+    with gazerig.open("desk", fast=True, world="living-room", seed=3) as head:
+        head.step(0.2)
+        assert head.time_s >= 0.2

@@ -1,0 +1,116 @@
+"""A script of a world that cannot be played is refused with file, line, key and cure."""
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from world_scripts import WORLDS, read, shipped_world
+
+from gazerig.config.bounds import shapes_of
+from gazerig.config.faults import ConfigError
+from gazerig.features.world.room import ROOMS
+from gazerig.features.world.script import Act, Do, PersonScript, PlaceScript, WorldScript
+from gazerig.features.world.timeline import LASTS_S
+
+PAGE = (Path(__file__).parents[2] / "docs" / "world-scripts.md").read_text()
+
+HEAD = "room: living-room\nround_s: 20.0\npeople:\n  anna:\n    start: {start}\n    acts:\n"
+
+
+def refused(tmp_path: Path, acts: str, start: str = "door", more: str = "") -> str:
+    file = tmp_path / "own.yaml"
+    file.write_text(HEAD.format(start=start) + acts + more)
+    with pytest.raises(ConfigError) as caught:
+        read(file)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_what_is_shipped_can_be_played(name: str) -> None:
+    world = shipped_world(name)
+    assert world.people or world.heads
+
+
+@pytest.mark.parametrize(
+    ("acts", "start", "line", "said"),
+    [
+        ("      - {at_s: 0, do: dance}\n", "door", 7, "walk"),
+        (
+            "      - {at_s: 0, do: walk, to: moon}\n",
+            "door",
+            7,
+            "no place 'moon'; it has behind, chair_left",
+        ),
+        ("      - {at_s: 0, do: walk}\n", "door", 7, "needs `to`"),
+        ("      - {at_s: 1, do: sit}\n", "door", 7, "there is no seat at door; walk to one"),
+        ("      - {at_s: 1, do: stand}\n", "door", 7, "stands already"),
+        ("      - {at_s: 1, do: walk, to: door}\n", "chair_left", 7, "let the person stand up"),
+        ("      - {at_s: 1, do: walk, to: front}\n", "door", 6, "began it at door; let it end"),
+        ("      - {at_s: 19, do: wave}\n", "front", 7, "ends at 21.6 s, the round at 20 s"),
+        ("      - {at_s: 1, do: look_at, to: bob}\n", "front", 7, "no person, no place"),
+        (
+            "      - {at_s: 1, do: wave}\n      - {at_s: 2, do: point, to: head}\n",
+            "front",
+            8,
+            "wave (acts.0) keeps the right arm busy until 3.6 s; begin then",
+        ),
+        ("      - {at_s: -1, do: nod}\n", "front", 7, "-1"),
+    ],
+)
+def test_an_act_that_cannot_be_done_is_refused_at_its_line(
+    tmp_path: Path, acts: str, start: str, line: int, said: str
+) -> None:
+    text = refused(tmp_path, acts, start)
+    assert f"own.yaml:{line}:" in text and said in text, text
+
+
+def test_acts_of_one_arm_keep_apart_by_what_varies(tmp_path: Path) -> None:
+    """The second begins 0.1 s after the first's end, but up to 0.3 s earlier by the seed."""
+    acts = "      - {at_s: 1, do: wave}\n      - {at_s: 3.7, do: punch, to: head, vary_s: 0.3}\n"
+    assert "keeps the right arm busy until 3.6 s; begin then" in refused(tmp_path, acts, "front")
+
+
+def test_two_people_cannot_be_at_one_place_at_once(tmp_path: Path) -> None:
+    text = refused(tmp_path, "      - {at_s: 1, do: nod}\n", "front", "  ben:\n    start: front\n")
+    assert "anna is at front then; choose another place or time" in text and ":9:" in text
+
+
+def test_a_cup_that_somebody_else_holds_cannot_be_passed(tmp_path: Path) -> None:
+    more = (
+        "  ben:\n    start: chair_right\n    acts:\n"
+        "      - {at_s: 4, do: pass, to: anna, thing: cup}\nthings:\n  cup: {held_by: anna}\n"
+    )
+    text = refused(tmp_path, "      - {at_s: 1, do: nod}\n", "chair_left", more)
+    assert "anna holds cup then; let anna pass it" in text and ":11:" in text
+
+
+def test_both_arms_are_free_for_different_things_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "own.yaml"
+    file.write_text(
+        HEAD.format(start="front")
+        + "      - {at_s: 1, do: wave, side: left}\n      - {at_s: 1, do: point, to: head}\n"
+        "      - {at_s: 1, do: speak}\n      - {at_s: 1, do: nod}\n"
+    )
+    assert len(read(file).people["anna"].acts) == 4
+
+
+def test_the_page_names_every_act_place_and_key() -> None:
+    rows = [row.split("|")[1:-1] for row in PAGE.splitlines() if row.startswith("| ")]
+    acts = {act.strip(): row[1].strip() for row in rows for act in row[0].split(",")}
+    assert set(get_args(Do)) <= set(acts)
+    for act, lasts_s in LASTS_S.items():
+        if lasts_s:
+            assert acts[act] == f"{lasts_s:g} s", act
+    for room, places in ROOMS.items():
+        (row,) = [row for row in rows if row[0].strip() == room]
+        assert set(re.findall(r"\w+", " ".join(row[1:]))) == set(places), room
+    for params in (Act, PersonScript, PlaceScript, WorldScript):
+        for key in shapes_of(params):
+            assert re.search(rf"\b{key}\b", PAGE), f"{params.__name__}.{key}"
+
+
+def test_the_example_on_the_page_can_be_played(tmp_path: Path) -> None:
+    file = tmp_path / "page.yaml"
+    file.write_text(PAGE.split("```")[1])
+    assert read(file).people["anna"].acts[-1].to == "door"

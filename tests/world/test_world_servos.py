@@ -1,0 +1,276 @@
+"""Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
+
+mujoco_or_skip()
+
+from gazerig.drivers.errors import SetupError  # noqa: E402
+from gazerig.features.world.physics import WorldUnstable  # noqa: E402
+from gazerig.robot.app import emulation  # noqa: E402
+from gazerig.sim_mock.devices import PluginLine  # noqa: E402
+from gazerig.sim_mock.smart_servo.physics import Physics  # noqa: E402
+
+STEP = 200
+"""Steps of 4096 that a joint is sent."""
+
+
+def _armed(name: str, joint: str, gains: tuple[int, ...] = ()) -> WorldBench:
+    """Return a rig whose joint holds its position, in the world and by itself."""
+    bench = WorldBench(name)
+    for servo in bench.both(joint):
+        arm(servo, gains)
+    bench.pass_ms(100)
+    return bench
+
+
+def _moves(bench: WorldBench, joint: str, ms: int) -> tuple[list[Any], list[Any]]:
+    """Return (position, speed, effort) every 5 ms of both, from where each began."""
+    starts = [servo.position_steps for servo in bench.both(joint)]
+    rows: tuple[list[Any], list[Any]] = [], []
+    for servo, start in zip(bench.both(joint), starts, strict=True):
+        write(servo, "goal_position", round(start) + STEP)
+    for _ in range(ms // 5):
+        bench.pass_ms(5)
+        for servo, start, own in zip(bench.both(joint), starts, rows, strict=True):
+            own.append((servo.position_steps - start, servo.shaft.v, servo.shaft.effort))
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "gains"),
+    [
+        ("desk", "left_eye_pan", (1200, 0, 12000)),
+        ("desk", "neck_yaw", ()),
+        ("feetech", "left_eye_pan", ()),
+        ("feetech", "neck_yaw", ()),
+    ],
+)
+def test_a_step_is_as_that_of_servos_with_mechanics_of_their_own(
+    name: str, joint: str, gains: tuple[int, ...]
+) -> None:
+    """Position within 3 % of the step at every moment, peaks of speed and torque within 8 %."""
+    world, own = _moves(_armed(name, joint, gains), joint, 400)
+    assert max(abs(a[0] - b[0]) for a, b in zip(world, own, strict=True)) < 0.03 * STEP
+    for nth in (1, 2):
+        assert max(abs(a[nth]) for a in world) == pytest.approx(
+            max(abs(b[nth]) for b in own), rel=0.08
+        )
+    assert abs(world[-1][0] - STEP) < 6.0
+
+
+def test_a_step_reaches_its_goal_in_registers() -> None:
+    """Present Position, Velocity and Current are read as from any servo."""
+    bench = _armed("desk", "left_eye_pan", (1200, 0, 12000))
+    servo = bench.servos["left_eye_pan"]
+    start = read(servo, "present_position")
+    write(servo, "goal_position", start + STEP)
+    bench.pass_ms(20)
+    assert read(servo, "present_velocity") > 20 and read(servo, "present_position") > start
+    bench.pass_ms(500)
+    assert (
+        abs(read(servo, "present_position") - start - STEP) <= 5
+        and abs(read(servo, "present_velocity")) <= 3
+    )
+
+
+def test_without_torque_a_hand_turns_the_joint_and_it_stays_there() -> None:
+    """Dry friction of the gear holds what is balanced."""
+    bench = WorldBench("desk")
+    servo = bench.servos["neck_yaw"]
+    before = servo.position_steps
+    servo.turn(150.0)
+    bench.pass_ms(300)
+    assert servo.position_steps == pytest.approx(before + 150.0, abs=1.0)
+    assert servo.shaft.effort == 0.0
+
+
+def test_a_stop_holds_a_servo_that_runs_against_it() -> None:
+    """It does not bounce, its registers have the current, the overload protection acts."""
+    bench = _armed("desk", "left_eye_pan")
+    servo = bench.servos["left_eye_pan"]
+    write(servo, "goal_position", 3000)  # 84 deg, the stop is at 39
+    bench.pass_ms(400)
+    at = servo.position_steps
+    assert at == pytest.approx(2048 + 39.0 / 360.0 * 4096, abs=2.0)
+    assert abs(servo.shaft.v) < 0.02 and servo.shaft.effort > 0.7
+    bench.pass_ms(2200)
+    assert servo.errors & 0x20 and not servo.torque
+
+
+def test_the_neck_goes_limp_and_falls_when_its_load_is_heavier_than_friction() -> None:
+    """With the torque off nothing but friction holds; under torque it comes back."""
+    bench = _armed("desk", "neck_pitch")
+    servo = bench.servos["neck_pitch"]
+    before = servo.position_steps
+    servo.set_load(-0.15)
+    bench.pass_ms(300)
+    held = servo.position_steps
+    assert abs(held - before) < 40 and servo.shaft.effort > 0.05
+    write(servo, "torque_enable", 0)
+    bench.pass_ms(300)
+    assert servo.position_steps < held - 100 and servo.shaft.effort == 0.0
+
+
+def test_a_jammed_joint_does_not_move_and_a_freed_one_does() -> None:
+    """As the fault commands stick and free have it."""
+    bench = _armed("desk", "left_eye_pan", (1200, 0, 12000))
+    servo = bench.servos["left_eye_pan"]
+    before = servo.position_steps
+    servo.jam()
+    write(servo, "goal_position", round(before) + STEP)
+    bench.pass_ms(300)
+    assert servo.position_steps == pytest.approx(before, abs=1.0) and servo.shaft.effort > 0.1
+    servo.jam(False)
+    bench.pass_ms(400)
+    assert servo.position_steps == pytest.approx(before + STEP, abs=6.0)
+
+
+def test_the_bus_watchdog_halts_a_servo_at_its_time_although_nobody_asks() -> None:
+    """The world brings all devices up to date."""
+    bench = _armed("desk", "neck_yaw")
+    servo, device = bench.servos["neck_yaw"], bench.devices[""]
+    write(servo, "profile_velocity", 20)
+    write(servo, "bus_watchdog", 10)
+    write(servo, "goal_position", round(servo.position_steps) + 400)
+    bench.now_s += 1.0
+    bench.world.advance(round(bench.now_s * 1000.0))
+    assert servo.memory.get("bus_watchdog") == 255
+    assert servo.position_steps < 2048 + 40
+    assert device.positions_steps()
+
+
+@pytest.mark.parametrize("asked_ms", [(500,), (5,) * 100, (1, 2, 3, 4) * 50])
+def test_motion_does_not_depend_on_how_often_the_time_is_asked(asked_ms: tuple[int, ...]) -> None:
+    """The same state, to the bit."""
+    bench = _armed("desk", "left_eye_pan", (1200, 0, 12000))
+    write(bench.servos["left_eye_pan"], "goal_position", 2300)
+    for ms in asked_ms:
+        bench.pass_ms(ms)
+    assert bench.world.state().qpos.tobytes() == _after_500_ms()
+
+
+def _after_500_ms() -> bytes:
+    bench = _armed("desk", "left_eye_pan", (1200, 0, 12000))
+    write(bench.servos["left_eye_pan"], "goal_position", 2300)
+    bench.pass_ms(500)
+    state: bytes = bench.world.state().qpos.tobytes()
+    return state
+
+
+def test_a_world_whose_numbers_run_away_says_so(tmp_path: Path) -> None:
+    """MuJoCo would begin anew in silence, and servos would see a joint jump."""
+    spring = (
+        '<body pos="1 0 0"><joint name="s" stiffness="1e12" ref="1"/><geom size=".001"/></body>'
+    )
+    (tmp_path / "own.xml").write_text(
+        f'<mujoco><worldbody><site name="gazerig"/>{spring}</worldbody></mujoco>'
+    )
+    bench = WorldBench("desk", mjcf_file=tmp_path / "own.xml")
+    bench.world._data.qvel[-1] = float("nan")
+    with pytest.raises(WorldUnstable, match="became unstable 0.0"):
+        bench.pass_ms(20)
+
+
+def test_a_bus_of_a_package_has_no_servos_in_a_world() -> None:
+    """Its device has mechanics of its own, which would leave the joints limp."""
+    bench = WorldBench("desk")
+    with pytest.raises(SetupError, match="kind theirs has no servos that a world could move"):
+        bench.world.device(PluginLine("theirs", "", ()))
+
+
+def test_a_head_at_rest_does_not_tremble() -> None:
+    """After a push all nine joints come to rest, stiff gains and all: speeds are none."""
+    bench = WorldBench("desk")
+    for name, servo in bench.servos.items():
+        arm(servo, bench.rig.joints[name].gains or ())
+    bench.pass_ms(300)
+    bench.world.push("head", (4.0, 6.0, 3.0), 0.1)
+    bench.pass_ms(1500)
+    before = {name: servo.position_steps for name, servo in bench.servos.items()}
+    for _ in range(20):
+        bench.pass_ms(5)
+        for name, servo in bench.servos.items():
+            assert servo.shaft.v == 0.0, name
+            assert servo.position_steps == pytest.approx(before[name], abs=0.05)
+
+
+def test_supply_and_motor_feel_a_stall() -> None:
+    """Present Input Voltage falls by the supply's resistance, Present Temperature rises."""
+    bench = _armed("desk", "neck_yaw")
+    servo = bench.servos["neck_yaw"]
+    volts, warm = read(servo, "present_input_voltage"), servo.temperature_c
+    servo.jam()
+    write(servo, "goal_position", 3500)
+    bench.pass_ms(1500)
+    assert servo.shaft.effort > 0.85
+    assert read(servo, "present_input_voltage") <= volts - 2
+    assert servo.temperature_c > warm + 0.5
+
+
+def test_a_shaft_without_torque_turns_as_fast_as_its_viscous_friction_lets_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Dry friction takes .03 of the stall torque, the other half of it at no-load speed."""
+    monkeypatch.setattr(emulation, "Physics", partial(Physics, viscous_share=0.5))
+    bench = WorldBench("desk")
+    for servo in bench.both("left_eye_pan"):
+        servo.set_load(-0.05 * servo.model.stall_torque_nm)
+    bench.pass_ms(500)
+    for servo in bench.both("left_eye_pan"):
+        no_load = servo.model.no_load_rpm * 4096 / 60_000  # steps/ms
+        assert servo.shaft.v == pytest.approx(-(0.05 - 0.03) / 0.5 * no_load, rel=0.03)
+
+
+def test_a_restart_lets_go_of_the_joint_until_torque_comes_on_again() -> None:
+    """As after a reboot instruction: deaf for a while, then limp."""
+    bench = _armed("desk", "neck_yaw")
+    servo = bench.servos["neck_yaw"]
+    servo.restart()
+    assert not servo.torque and not servo.advance(round(bench.now_s * 1000.0))
+    bench.world.push("head", (0.0, 3.0, 0.0), 0.2)
+    before = servo.position_steps
+    bench.pass_ms(600)
+    moved = servo.position_steps
+    assert moved > before + 20 and servo.advance(round(bench.now_s * 1000.0))
+    arm(servo)
+    bench.pass_ms(200)
+    assert servo.position_steps == pytest.approx(moved, abs=3.0)
+
+
+def test_acceleration_is_fed_forward_as_by_servos_with_mechanics_of_their_own() -> None:
+    """With a profile and a soft controller the second gain sets the shaft in motion."""
+    first = {}
+    for gain in (0, 16000):
+        bench = _armed("desk", "neck_yaw", (100, 0, 0))
+        for servo in bench.both("neck_yaw"):
+            write(servo, "feedforward_2nd_gain", gain)
+            write(servo, "profile_acceleration", 300)
+            write(servo, "profile_velocity", 100)
+        world, own = _moves(bench, "neck_yaw", 100)
+        assert max(abs(a[0] - b[0]) for a, b in zip(world, own, strict=True)) < 0.03 * STEP
+        first[gain] = world[1][2]
+    assert first[16000] > first[0] + 0.1
+
+
+def test_a_stalled_motor_does_not_wind_up() -> None:
+    """Freed after a second it goes past its goal by no more than one that was never held."""
+    past = []
+    for held_ms in (0, 1000):
+        bench = _armed("desk", "neck_yaw", (1500, 300, 3000))
+        servo = bench.servos["neck_yaw"]
+        start = servo.position_steps
+        servo.jam(held_ms > 0)
+        write(servo, "goal_position", round(start) + 3 * STEP)
+        bench.pass_ms(held_ms)
+        servo.jam(False)
+        most = 0.0
+        for _ in range(120):
+            bench.pass_ms(5)
+            most = max(most, servo.position_steps - start)
+        past.append(most - 3 * STEP)
+    assert past[1] < past[0] + 5.0

@@ -1,0 +1,160 @@
+"""What of a world the page draws: all of its geoms where they are, its people, and no rig."""
+
+import pickle
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from present import present
+
+pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
+
+import mujoco
+
+from gazerig.config.load import shipped
+from gazerig.config.schema import load_rig
+from gazerig.features.world.figure_model import PlacedPeople
+from gazerig.features.world.rig_in_world import RigInWorld
+from gazerig.features.world.run.rig import rig_in_world
+from gazerig.features.world.run.run_world import world_scene
+from gazerig.features.world.shapes import SpecShapes, shapes_of
+from gazerig.features.world.shipped import HOME
+from gazerig.features.world.world_spec import WorldSpec
+from gazerig.robot.dashboard.view.world_view import part_glb, room_glbs
+from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.texture import TexturedMesh
+from gazerig.robot.description.world_shapes import WorldPart
+
+WORLDS = sorted(path.stem for path in shipped("worlds", "living-room", HOME).parent.glob("*.yaml"))
+HEAD_TRIANGLES = 31_000  # of the expressive rig's
+MOST_TRIANGLES, MOST_BYTES = 150_000, 3_000_000
+
+MJCF = """<mujoco>
+  <asset><material name="blue" rgba="0 0 1 1"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 .1" pos="0 0 -1" rgba=".5 .4 .3 1"/>
+    <body pos="1 0 0"><geom type="sphere" size=".1" material="blue"/></body>
+    <body pos="1 .5 0"><geom type="capsule" size=".05 .2" euler="90 0 0"/></body>
+    <body pos="1 -.5 0"><geom type="cylinder" size=".05 .2"/><geom size=".3" group="3"/></body>
+    <body pos="0 1 0"><geom type="box" size=".1 .2 .3"/><geom size=".4" rgba="1 1 1 0"/></body>
+    <body pos="0 0 .1"><joint name="neck_yaw" axis="0 0 1"/><geom size=".5"/>
+      <body><geom size=".6"/></body></body>
+  </worldbody>
+</mujoco>"""
+
+
+@cache
+def desk() -> RigInWorld:
+    return rig_in_world(load_rig("desk"))
+
+
+@cache
+def shapes(world: str) -> SpecShapes:
+    return shapes_of(WorldSpec(world_scene(world, 0).figures, (desk(),)))
+
+
+@cache
+def parts_of(world: str) -> Sequence[WorldPart]:
+    return shapes(world).parts()
+
+
+def triangles(part: WorldPart) -> int:
+    return len(part.shape.mesh.faces if isinstance(part.shape, Painted) else part.shape.faces)
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_a_shipped_world_is_small_enough_for_a_browser(world: str) -> None:
+    found = shapes(world)
+    assert len(pickle.dumps(found)) < 20_000
+    parts = parts_of(world)
+    assert sum(map(triangles, parts)) + HEAD_TRIANGLES < MOST_TRIANGLES
+    room = room_glbs(parts)
+    people = [part_glb(part) for part in parts if part.moves]
+    assert sum(map(len, (*room, *people))) < 0.85 * MOST_BYTES and len(room) < 20
+    # The rig stands on something, and walls let one look in from outside.
+    assert any(np.ptp(_vertices(part)[:, 2]) > 0.05 for part in parts if not part.moves)
+
+
+def _vertices(part: WorldPart) -> np.ndarray:
+    return part.shape.vertices if isinstance(part.shape, TexturedMesh) else part.shape.mesh.vertices
+
+
+def test_everybody_is_where_mujoco_has_them() -> None:
+    found = pickle.loads(pickle.dumps(shapes("conversation")))
+    figures, model = found.spec.figures, found.spec.compiled().mj
+    data = mujoco.MjData(model)
+    assert [part.name for part in found.parts() if part.moves] == list(figures.names)
+    for world_s in (0.0, 12.34, 100.0):
+        PlacedPeople(model, figures).place(data, world_s)
+        mujoco.mj_kinematics(model, data)
+        poses = found.poses(world_s)
+        assert tuple(poses) == figures.names
+        for name, (turn, p_world_m) in poses.items():
+            body = model.body(name).id
+            assert np.allclose(turn, data.xquat[body], atol=1e-9), name
+            assert np.allclose(p_world_m, data.xpos[body], atol=1e-9), name
+
+
+def test_limbs_collide_from_joint_to_joint() -> None:
+    spec = shapes("conversation").spec
+    figures, model = present(spec.figures), spec.compiled().mj
+    data = mujoco.MjData(model)
+    PlacedPeople(model, figures).place(data, 0.0)
+    mujoco.mj_kinematics(model, data)
+    for who in figures.script.people:
+        for upper, lower in (("upper_arm", "forearm"), ("forearm", "hand"), ("thigh", "shank"),
+                             ("shank", "foot")):  # fmt: skip
+            body, below = (model.body(f"{who}/left_{part}").id for part in (upper, lower))
+            (geom,) = np.flatnonzero(
+                (model.geom_bodyid == body) & (model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE)
+            )
+            half = model.geom_size[geom, 1] * data.geom_xmat[geom].reshape(3, 3)[:, 2]
+            ends = [data.geom_xpos[geom] - half, data.geom_xpos[geom] + half]
+            ends.sort(key=lambda end: float(np.linalg.norm(end - data.xpos[body])))
+            assert ends[0] == pytest.approx(data.xpos[body], abs=2e-3), (who, upper)
+            assert ends[1] == pytest.approx(data.xpos[below], abs=2e-3), (who, upper)
+
+
+def test_a_users_world_is_shown_without_the_rig_and_what_mujoco_hides(tmp_path: Path) -> None:
+    (tmp_path / "mine.xml").write_text(MJCF)
+    parts = shapes_of(WorldSpec(None, (desk(),), tmp_path / "mine.xml")).parts()
+    sizes = np.array([np.ptp(_vertices(part), axis=0) for part in parts])
+    wanted = ((4, 4, 0), (0.2, 0.2, 0.2), (0.1, 0.5, 0.1), (0.1, 0.1, 0.4), (0.2, 0.4, 0.6))
+    assert sizes == pytest.approx(np.array(wanted), abs=0.002)
+    middles = [np.mean([_vertices(p).min(axis=0), _vertices(p).max(axis=0)], axis=0) for p in parts]
+    assert np.array(middles[1:]) == pytest.approx(
+        np.array(((1, 0, 0), (1, 0.5, 0), (1, -0.5, 0), (0, 1, 0))), abs=0.01
+    )
+    ball = parts[1].shape
+    assert isinstance(ball, Painted) and ball.colours[0].tolist() == [0.0, 0.0, 255.0]
+    for part in parts:  # faces are turned outwards, for their backs are not drawn
+        assert isinstance(part.shape, Painted)
+        (vertices, faces), _, normals = part.shape
+        assert normals is not None
+        a, b, c = (vertices[faces[:, i]] for i in range(3))
+        flat = np.cross(b - a, c - a)
+        seen = np.linalg.norm(flat, axis=1) > 1e-9
+        assert ((flat * normals[faces[:, 0]]).sum(axis=1)[seen] > 0.0).mean() > 0.95
+
+
+def test_a_picture_lies_on_a_wall_as_mujoco_lays_it() -> None:
+    """The first row of a picture is on top, its first column to the left of who looks at it."""
+    walls = [
+        part.shape
+        for part in parts_of("living-room")
+        if isinstance(part.shape, TexturedMesh) and np.ptp(part.shape.uv, axis=0).max() <= 1.001
+    ]
+    checked = 0
+    for wall in walls:
+        corners = wall.faces.reshape(-1)
+        upright = np.abs(wall.normals[corners, 2]).max() < 0.1 and np.ptp(wall.uv[corners, 1]) > 0.9
+        if not upright:
+            continue
+        top = wall.vertices[corners][wall.uv[corners, 1] % 1.0 < 0.01, 2]
+        checked += 1
+        v = wall.uv[corners, 1]
+        highest, lowest = wall.vertices[corners, 2].argmax(), wall.vertices[corners, 2].argmin()
+        assert v[highest] < v[lowest] and len(top)
+    assert checked >= 2

@@ -1,0 +1,137 @@
+"""Rigs in a world with physics, for tests; a test that needs mujoco skips where it is not."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.features.world.run.rig import rig_in_world
+from gazerig.robot.app import run_bus
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import run
+from gazerig.robot.control.tick import Tick
+from gazerig.sim_mock.devices import build
+
+MUJOCO_ABSENT = "mujoco is not installed: pip install 'gazerig[world]'"
+
+
+def mujoco_or_skip() -> Any:
+    """Return mujoco, or skip the test that asks for it."""
+    return pytest.importorskip("mujoco", reason=MUJOCO_ABSENT)
+
+
+class WorldBench:
+    """A shipped rig twice on one clock: its servos in a world, and with mechanics of their own.
+
+    Attributes:
+        world: the world.
+        servos: those in it, and own: those with mechanics of their own, by joint.
+    """
+
+    def __init__(self, rig: str | Rig, mjcf_file: Path | None = None) -> None:
+        from gazerig.features.world.model import world_model
+        from gazerig.features.world.physics import World
+
+        self.now_s = 0.0
+        self.rig = load_rig(rig) if isinstance(rig, str) else rig
+        self.world = World(
+            world_model(None, [rig_in_world(self.rig, looks=False)], mjcf_file), lambda: self.now_s
+        )
+        lines = emulated_lines(self.rig)
+        self.devices: dict[str, Any] = {
+            bus: self.world.device(line, bus) for bus, line in lines.items()
+        }
+        self.own_devices: dict[str, Any] = {
+            bus: build(line, lambda: self.now_s) for bus, line in lines.items()
+        }
+        self.servos = self._by_joint(self.devices)
+        self.own = self._by_joint(self.own_devices)
+
+    def _by_joint(self, devices: dict[str, Any]) -> dict[str, Any]:
+        servos = {bus: getattr(one, "body", one).servos for bus, one in devices.items()}
+        return {n: servos[self.rig.joints[n].bus][place_of(self.rig, n)] for n in self.rig.names}
+
+    def pass_ms(self, ms: int) -> None:
+        """Let time pass for both."""
+        self.now_s += ms / 1000.0
+        for device in (*self.devices.values(), *self.own_devices.values()):
+            device.positions_steps()
+
+    def both(self, joint: str) -> tuple[Any, Any]:
+        """Return the servo of a joint in the world, and that with mechanics of its own."""
+        return self.servos[joint], self.own[joint]
+
+
+def write(servo: Any, name: str, value: int) -> None:
+    """Write a register as an instruction does."""
+    register = servo.memory.named(name)
+    assert (
+        servo.write(register.address, value.to_bytes(register.size, "little", signed=value < 0))
+        == 0
+    )
+
+
+def read(servo: Any, name: str) -> int:
+    """Return a register as an instruction reads it."""
+    register = servo.memory.named(name)
+    return int.from_bytes(servo.read(register.address, register.size), "little", signed=True)
+
+
+def arm(servo: Any, gains: tuple[int, ...] = ()) -> None:
+    """Let a smart servo hold its position, with position gains P, I and D where they are given."""
+    names = ("position_p_gain", "position_i_gain", "position_d_gain")
+    for register, gain in zip(names, gains, strict=False):
+        write(servo, register, gain)
+    write(servo, "goal_position", round(servo.position_steps))
+    if servo.memory.has("goal_speed"):
+        write(servo, "goal_speed", 3400)
+    write(servo, "torque_enable", 1)
+
+
+class WorldRun:
+    """A run of a shipped rig in a world without people, looking at a scene's.
+
+    Attributes:
+        rig: the rig.
+        made: the run's parts.
+        world: the world, with the servos of all its buses.
+    """
+
+    def __init__(self, name: str, monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
+        from gazerig.features.world.model import world_model
+        from gazerig.features.world.physics import World
+
+        self.rig = load_rig(name)
+        buses = iter(bus_names(self.rig))
+        worlds: list[World] = []
+
+        def in_world(line: Any, now_s: Callable[[], float]) -> Any:
+            if not worlds:
+                worlds.append(
+                    World(world_model(None, [rig_in_world(self.rig, looks=False)]), now_s)
+                )
+            return worlds[0].device(line, next(buses))
+
+        monkeypatch.setattr(run_bus, "build", in_world)
+        self.made = assemble(self.rig, RunOptions(True, True, 0, scene))
+        self.world = worlds[0]
+
+    def play(self, seconds: float, watch: Callable[[Tick], None]) -> None:
+        """Run for a time."""
+        made = self.made
+        made.robot.start(made.clock)
+        try:
+            run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)
+        finally:
+            made.robot.stop()
+            made.close()
+
+
+def world_run(name: str, monkeypatch: pytest.MonkeyPatch, scene: str = "visitor") -> WorldRun:
+    """Return a run in simulated time whose servos are in a world."""
+    return WorldRun(name, monkeypatch, scene)
