@@ -12,11 +12,10 @@ from math import nan
 from typing import Any, Protocol
 
 import numpy as np
+import pytest
 
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
-from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.simulated_run import simulate
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
 from gazerig.robot.app import run_scene
 from gazerig.robot.app.options import RunOptions
@@ -25,6 +24,10 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.gaze_angles import GazeAngles, GazeAnglesBuilder, target_text
 from gazerig.sim_mock.scenes.scene import Scene
+
+pytest.importorskip("gazerig.features.lab")  # its measures
+from gazerig.features.lab.report.gaze_trace import GazeTrace  # noqa: E402
+from gazerig.features.lab.simulated_run import simulate  # noqa: E402
 
 BEGIN_S = 3.0
 """So long the head straightens up slowly: rows of a measured run begin after it."""

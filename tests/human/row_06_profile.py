@@ -7,11 +7,14 @@ shipped scenes as the report finds them.
 from collections.abc import Sequence
 
 import numpy as np
+import pytest
 from human.eye_steps import steps
 from human.measured_run import Runner
 
-from gazerig.features.lab.report.saccades import table
 from gazerig.robot.analysis import human_norms as people
+
+pytest.importorskip("gazerig.features.lab")  # its measures
+from gazerig.features.lab.report.saccades import table  # noqa: E402
 
 SCENES = ("visitor", "face-to-face")
 SIZES_DEG = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 26.0, 30.0)

@@ -6,9 +6,12 @@ than chance may have done.
 
 from collections.abc import Callable, Sequence
 
+import pytest
 from human.measured_run import MeasuredRun
 
-from gazerig.features.lab.report.report import found
+pytest.importorskip("gazerig.features.lab")  # its measures
+
+from gazerig.features.lab.report.report import found  # noqa: E402
 
 SCENES = ("visitor", "face-to-face")
 WANTED = {f"{scene}, outside, most of all seeds": (0.0, 2.0) for scene in SCENES}
