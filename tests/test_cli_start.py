@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 import typer
 from command_line import gazerig, parse, typed
+from features_there import needs_all_features, skip_without
 from typer.core import TyperGroup
 
 from gazerig import __version__
@@ -142,6 +143,7 @@ def test_help_imports_nothing_heavy(words: str, helps: dict[str, str]) -> None:
     assert imported.split() in (["HEAVY"], *([["HEAVY", "pydantic"]] if words else []))
 
 
+@needs_all_features
 def test_every_command_has_examples_and_no_example_is_without_command() -> None:
     ctl, study = commands()["ctl"], commands()["study"]
     assert isinstance(ctl, TyperGroup) and isinstance(study, TyperGroup)
@@ -159,6 +161,7 @@ def test_every_command_has_examples_and_no_example_is_without_command() -> None:
     "words", [words for examples in EXAMPLES.values() for words, _ in examples]
 )
 def test_every_example_names_options_that_there_are(words: str) -> None:
+    skip_without(words.split()[0])
     parse(shlex.split(words))
 
 

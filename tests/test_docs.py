@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+from features_there import needs_all_features
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, each_of_papers, prose, spans
 from ruamel.yaml import YAML
 
@@ -188,6 +189,7 @@ READERS_OWN = ("study.yaml", "myrig.yaml", "my.yaml", "myhead.yaml", "agree.yaml
 """Files that a reader writes."""
 
 
+@needs_all_features
 @each_of_papers("paper")
 def test_files_named_exist(paper: Path) -> None:
     names = {path.name for folder in (*FOLDERS, "tests") for path in (ROOT / folder).rglob("*.*")}
@@ -229,6 +231,7 @@ def _names(node: ast.stmt, over: str = "") -> Iterator[str]:
                 yield over + target.id
 
 
+@needs_all_features
 @pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
 def test_tests_and_functions_named_exist(paper: Path) -> None:
     known = defined()
@@ -280,6 +283,7 @@ SAID = {
 """Spans that name nothing which could be looked up."""
 
 
+@needs_all_features
 @each_of_papers("paper")
 def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper == EMULATOR:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from features_there import needs_all_features
 from light_python import LightPython
 
 from gazerig.drivers.extras import extra_hint
@@ -43,6 +44,7 @@ def without_extras(
     return re.findall(r"^exit (\d+)$", out, re.MULTILINE), err.splitlines()
 
 
+@needs_all_features
 def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_done(
     python: LightPython, tmp_path: Path
 ) -> None:

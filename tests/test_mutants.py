@@ -11,12 +11,15 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.mark.parametrize("mutant", ALL, ids=lambda mutant: mutant.effect)
 def test_a_mutant_breaks_one_place_that_named_tests_judge(mutant: Mutant) -> None:
-    source = (ROOT / mutant.file).read_text(encoding="utf-8")
+    file = Path(mutant.file)
+    if file.parts[0] == "features":
+        pytest.importorskip(".".join(("gazerig", *file.parts[:2])))
+    source = (ROOT / file).read_text(encoding="utf-8")
     assert source.count(mutant.old) == 1 and mutant.new != mutant.old
     assert mutant.tests
     for name in mutant.tests:
-        file, _, function = name.partition("::")
-        (path,) = ROOT.glob(f"tests/**/test_{file}.py")
+        stem, _, function = name.partition("::")
+        (path,) = ROOT.glob(f"tests/**/test_{stem}.py")
         there = path.read_text(encoding="utf-8")
         assert not function or re.search(rf"^ *def {function}\(", there, re.M), name
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 import typer
+from features_there import skip_without
 from typer.core import TyperGroup
 
 from gazerig.robot.cli.examples import PANELS
@@ -18,6 +19,7 @@ def group_of_all() -> TyperGroup:
 
 def values(*words: str) -> dict[str, Any]:
     """Parse a command as the command line does, without running it."""
+    skip_without(words[0])
     command = group_of_all().commands[words[0]]
     return dict(command.make_context(words[0], list(words[1:])).params)
 

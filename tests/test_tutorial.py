@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from command_line import figures, invoked, parse
+from features_there import needs_all_features, skip_without
 from tutorial import blocks, commands, steps, write_files
 
 import gazerig
@@ -34,6 +35,7 @@ def test_every_command_of_a_step_works(step: int, folder: Path) -> None:
     for line in commands(step):
         words = shlex.split(line)
         if words[0] == "gazerig" and words[1] != "ctl":
+            skip_without(words[1])
             tried(line, *words[1:])
 
 
@@ -111,6 +113,7 @@ def test_a_mouth_too_slow_for_its_jaw_is_refused_with_the_time_that_would_do(fol
     assert done.code != 0 and "levels.mouth.smoothing_ms" in done.err and "or more" in done.err
 
 
+@needs_all_features
 def test_what_the_tutorial_types_is_a_command() -> None:
     for step in STEPS:
         for line in commands(step):

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from attack.ways_out import START, attack, bench
 from branch import Branch, gazerig
+from features_there import skip_without
 
 import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import load_rig
@@ -366,6 +367,7 @@ def begun(words: list[str], breaks: str, **options: Any) -> Branch:
     ],
 )
 def test_no_servo_stays_on(rig: str, command: str, way: str) -> None:
+    skip_without(command)
     with bench(rig) as at:
         row = attack(at, command, way, begun)
     assert not row.void and row.code is not None and row.on == 0, row
