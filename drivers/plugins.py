@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
 ATTENTION, GESTURES, RIGS = "gazerig.attention", "gazerig.gestures", "gazerig.rigs"
 COMMAND, SCHEMA = "gazerig.command", "gazerig.schema"
+SURROUNDINGS = "gazerig.surroundings"
 GROUPS: Mapping[str, str] = {
     BUS: "bus",
     CAMERA: "camera",
@@ -33,6 +34,7 @@ GROUPS: Mapping[str, str] = {
     RIGS: "rigs",
     COMMAND: "command",
     SCHEMA: "schema",
+    SURROUNDINGS: "surroundings",
 }
 """Group of entry points -> what people call a part of it."""
 
@@ -77,11 +79,13 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "study": "gazerig.features.study.design:StudyDesign",
         "questionnaire": "gazerig.features.study.questionnaire:Questionnaire",
     },
+    SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:World"},
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
 Gestures and rigs are folders of YAML files: a module of that folder, or its path. A command is
-a ``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a YAML file fills.
+a ``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a YAML file fills;
+surroundings are a subclass of ``gazerig.robot.app.surroundings.Surroundings``.
 """
 
 OUR_PACKAGE = "gazerig"

@@ -7,7 +7,6 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -18,10 +17,10 @@ from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.model.clock import Clock
 
 
-def _ideal(rig: Rig, options: RunOptions, clock: Clock, world: Any = None) -> RunBus:
-    if options.fast and options.bus is None and world is None:
+def _ideal(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
+    if options.fast and options.bus is None:
         options = replace(options, bus="ideal")
-    return run_bus(rig, options, clock, world)
+    return run_bus(rig, options, clock)
 
 
 @contextmanager

@@ -70,6 +70,10 @@ class Figures:
                 return np.asarray(np.load(self.shared, mmap_mode="r"))
         return _round(self)
 
+    def sharing(self, file: Path) -> "Figures":
+        """Return the same people, with their motion in a file once ``share`` has written it."""
+        return type(self)(self.script, self.seed, file)
+
     def share(self) -> None:
         """Write the motion into the file for the other processes, where there is one."""
         if self.shared is not None:

@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from gazerig.features.world.commands import obey
+from gazerig.features.world.commands import COMMANDS, obey
 from gazerig.features.world.physics import World
 from gazerig.features.world.state_file import StateWriter
 from gazerig.features.world.world_spec import WorldSpec
@@ -28,12 +28,16 @@ class ServedWorld:
         state: the file in which its newest state is found.
         clock_s: the host's monotonic clock.
 
+    Attributes:
+        commands: the first words of what ``obey`` carries out.
+
     Raises:
         SetupError: a user's own world cannot be used.
     """
 
     def __init__(self, spec: WorldSpec, state: Path, clock_s: Callable[[], float]) -> None:
         self._clock_s = clock_s
+        self.commands = frozenset(COMMANDS.verbs)
         self.world = World(spec.compiled(), clock_s)
         if spec.figures is not None:
             spec.figures.share()

@@ -10,7 +10,6 @@ import numpy as np
 from gazerig.features.world.figure import SIDES, Figures
 from gazerig.features.world.motions import FIST_M, OUT_S
 from gazerig.features.world.rotations import rotation_matrix
-from gazerig.features.world.script import WorldScript
 from gazerig.features.world.timeline import HEAD_M, TimedAct
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.sim_mock.scenes.boxing import HALF_FIELD_RAD
@@ -31,18 +30,18 @@ class WorldScene:
 
     Args:
         name: of the world.
-        script: of its people, checked.
-        seed: of what varies.
+        figures: its people.
     """
 
-    def __init__(self, name: str, script: WorldScript, seed: int = 0) -> None:
+    def __init__(self, name: str, figures: Figures) -> None:
+        script = figures.script
         self.name, self.round_s = name, script.round_s
         boxes = any(person.gloves for person in script.people.values())
         self.behaviours: tuple[str, ...] = ("wait", "guard", "attack") if boxes else ()
-        self.figures = Figures(script, seed)
+        self.figures = figures
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _with_figures, (self.name, self.figures)
+        return type(self), (self.name, self.figures)
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         """Return all people, in the script's order: the tip of the nose, its way, a raised hand."""
@@ -175,13 +174,6 @@ class WorldScene:
         turn = Rotation.from_matrix(after @ before.T).as_rotvec() / (2.0 * _SPIN_WITHIN_S)
         sight = np.subtract(middle, HEAD_M)
         return float(turn @ sight / max(float(np.linalg.norm(sight)), 1e-6))
-
-
-def _with_figures(name: str, figures: Figures) -> WorldScene:
-    """Return a world of people who are computed already; whoever else has them shares them."""
-    scene = WorldScene(name, figures.script, figures.seed)
-    scene.figures = figures
-    return scene
 
 
 def _vec(row: Floats) -> Vec3:

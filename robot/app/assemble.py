@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from math import radians
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -43,13 +43,13 @@ from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.app.run_camera import run_camera, sight_of
 from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.app.run_scene import scene_of
+from gazerig.robot.app.surroundings import Room, surroundings
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import GuardedChooser, TargetChooser
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
-from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import (
@@ -67,9 +67,6 @@ from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.scenes.scene import Scene
 
-if TYPE_CHECKING:
-    from gazerig.features.world.run.run_world import RunWorld
-
 T = TypeVar("T")
 
 
@@ -84,9 +81,8 @@ class Assembly(NamedTuple):
     close: ends what was started for it; notes: what a person should know
     live: holds the rig in force and puts changes into the running parts
     fault: carries out a fault command of the emulated servos, None where they are real or ideal
-    world: how the world with physics looks, None without one
-    world_start_s: gives when the script of its people began, None before that and without one
-    others: the other heads of the same world, which are stopped and resumed with it
+    room: the surroundings of --world, None without
+    others: the other heads of the same room, which are stopped and resumed with it
     """
 
     robot: Robot
@@ -99,8 +95,7 @@ class Assembly(NamedTuple):
     notes: tuple[str, ...]
     live: LiveParams
     fault: Callable[[str], str] | None = None
-    world: WorldShapes | None = None
-    world_start_s: Callable[[], float | None] = lambda: None
+    room: Room | None = None
     others: tuple[NamedRobot, ...] = ()
 
     def shown(self) -> ShownRig:
@@ -152,22 +147,11 @@ class Substitutes(NamedTuple):
 RIGS_OWN = Substitutes()
 
 
-class SharedPlace(NamedTuple):
-    """A place in a world with several robots: the world as this robot sees it, and their time.
-
-    stands: where it stands there, as a recording holds it
-    """
-
-    world: "RunWorld"
-    clock: Clock
-    stands: tuple[float, ...] = ()
-
-
 def assemble(
     rig: Rig,
     options: RunOptions,
     substitutes: Substitutes = RIGS_OWN,
-    shared: "SharedPlace | None" = None,
+    room: Room | None = None,
 ) -> Assembly:
     """Build the robot of a rig, once and whole; nothing is opened but the emulated bus.
 
@@ -176,29 +160,39 @@ def assemble(
         options: what to run.
         substitutes: what a recording, a replay or a calibration puts around or in the place
             of the rig's own parts.
-        shared: the rig's place in a world with other robots, None for a world of its own or none.
+        room: surroundings that are open, as the caller has other robots in them; None: they are
+            opened if ``options`` name some.
 
     Raises:
         gazerig.config.load.ConfigError: the profile or walk that the rig names is at fault.
         SetupError: a film or model file cannot be used.
     """
     rig = with_options(rig, options)
-    world, scene, clock = _surroundings(rig, options, shared)
     seeds = np.random.SeedSequence(options.seed).spawn(len(_Generators._fields))
     random = _Generators(*map(np.random.default_rng, seeds))
     kinematics = kinematics_of(rig)
     camera, notes = placed_camera(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
-    drawn = options.pixels or (world is not None and not options.no_pictures)
-    in_process = scene is None or (drawn and not options.fast)
-    sight = sight_of(kinematics, camera, options, in_process)
-    wires = run_bus(rig, options, clock, world)
+    clock: Clock = SimulatedClock() if options.fast else RealClock()
+    if room is None and options.world is not None:
+        room = surroundings(options.world).open(rig, options, clock)
+    if room is None:
+        scene = scene_of(rig, options)
+        wires = run_bus(rig, options, clock)
+    else:
+        scene, clock, wires = room.scene, room.clock, room.wires
     messages: list[str] = []
     try:
-        seen = run_camera(
-            rig, options, scene, world, sight, wires, random.camera, camera, clock,
-            substitutes.program, messages.append,
-        )  # fmt: skip
+        drawn = options.pixels or (room is not None and not options.no_pictures)
+        in_process = scene is None or (drawn and not options.fast)
+        sight = sight_of(kinematics, camera, options, in_process)
+        program = substitutes.program
+        if room is not None:
+            seen = room.camera(rig, options, sight, camera, random.camera, program, messages.append)
+        else:
+            seen = run_camera(
+                rig, options, scene, sight, wires, random.camera, camera, clock, program,
+            )  # fmt: skip
         if options.mock and not options.fast:
             seen = lendable(seen, rig, clock)
         parts = _components(
@@ -224,28 +218,8 @@ def assemble(
     return Assembly(
         robot, clock, sight.mount, sight.poses, scene, wires.digest, close,
         (*notes, *_walk_notes(walk, rig, options)), live,
-        wires.fault, None if world is None else world.shapes(), wires.world_start_s,
+        wires.fault, room,
     )  # fmt: skip
-
-
-def _surroundings(
-    rig: Rig, options: RunOptions, shared: SharedPlace | None
-) -> tuple["RunWorld | None", Scene | None, Clock]:
-    """Return the world with physics, what is before the camera, and the time; None without one."""
-    if shared is not None:
-        return shared.world, shared.world.scene, shared.clock
-    world = _world(rig, options)
-    scene = scene_of(rig, options) if world is None else world.scene
-    return world, scene, SimulatedClock() if options.fast else RealClock()
-
-
-def _world(rig: Rig, options: RunOptions) -> "RunWorld | None":
-    """Return the world that was asked for, None without one."""
-    if options.world is None:
-        return None
-    from gazerig.features.world.run.run_world import world_of  # with the people in it
-
-    return world_of(rig, options)
 
 
 def _walk_notes(walk: Walk, rig: Rig, options: RunOptions) -> tuple[str, ...]:

@@ -27,12 +27,12 @@ from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.features.world.run.camera import WorldCamera
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.drawn_camera import DrawnCamera, drawn_camera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
+from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams, standing_still
 from gazerig.robot.model.kinematics import Kinematics
@@ -86,7 +86,7 @@ def scene_start_s(camera: Camera) -> float | None:
     """Return when the scene of a camera without images began, None before that or without one."""
     if isinstance(camera, BorrowedCamera):
         return None if camera.lent else scene_start_s(camera.own)
-    return camera.start_s if isinstance(camera, SceneCamera | WorldCamera) else None
+    return camera.start_s if isinstance(camera, SceneCamera | RoomCamera) else None
 
 
 def placed_camera(
@@ -214,7 +214,7 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
                 return retune_camera(camera.own, before, after, placed)
             case DrawnCamera():
                 return retune_camera(camera.process, before, after, placed)
-            case WorldCamera():
+            case RoomCamera():
                 return retune_camera(camera.seeing, before, after, placed) if camera.seeing else ""
             case CameraProcess():
                 motion = partial(retuned, after.motion, placed.lens, field_rad)

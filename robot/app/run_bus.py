@@ -3,10 +3,9 @@
 import hashlib
 from collections.abc import Callable, Mapping
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.errors import SetupError
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.drivers.types import ServoBus
@@ -21,13 +20,8 @@ from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import Emulated, build
+from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
-
-if TYPE_CHECKING:
-    from gazerig.features.world.physics import World
-    from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
-    from gazerig.features.world.run.run_world import RunWorld
 
 TrueSteps = Callable[[], Mapping[str, float]]
 """Returns the true positions of the servos now in steps, by joint."""
@@ -48,7 +42,6 @@ class RunBus(NamedTuple):
     digest: returns the SHA-256 of all bytes sent, None where they are not counted
     close: ends what was started for it
     fault: carries out a fault command of the emulated servos, None where they are real or ideal
-    head: where the head is in a world with physics, None without one
     """
 
     bus: ServoBus
@@ -56,14 +49,9 @@ class RunBus(NamedTuple):
     digest: Callable[[], str | None] = _no_digest
     close: Callable[[], None] = _nothing
     fault: Callable[[str], str] | None = None
-    head: "WorldPoses | SimulatedPoses | None" = None
-
-    def world_start_s(self) -> float | None:
-        """Return when the script of a world's people began, None before that and without one."""
-        return None if self.head is None else self.head.begin_s
 
 
-def run_bus(rig: Rig, options: RunOptions, clock: Clock, world: "RunWorld | None" = None) -> RunBus:
+def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
     """Return the real port, ideal servos, an emulated bus here, or one on a pseudo-terminal.
 
     Without pseudo-terminals the bus is emulated here in real time, too.
@@ -72,78 +60,24 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock, world: "RunWorld | None
         rig: whose servos they are.
         options: what replaces them.
         clock: of the run.
-        world: in which emulated servos are; None: each has mechanics of its own.
-
-    Raises:
-        SetupError: the world cannot be used.
     """
     if not options.mock:
         paths, here = ports_of(rig, options.port), serial_ports()
         for name, path in paths.items():
             refuse_owner(path, rig.bus_named(name).kind, here)
         return RunBus(guarded_rig_bus(rig, paths))
-    if options.bus == "ideal" and world is not None:
-        return _ideal_in_world(rig, clock, world)
     if options.bus == "ideal":
         ideal, names = ideal_bus(rig, clock.now_s), rig.names
         return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
     lines = emulated_lines(rig)
     if not options.fast and has_terminals():
-        return _on_terminals(rig, lines, world)
-    if world is not None:
-        if not options.fast:
-            raise SetupError("--world needs the pseudo-terminals of Linux, or --fast")
-        return _in_world(rig, clock, lines, world)
-    devices = {name: build(line, clock.now_s) for name, line in lines.items()}
-    return _in_process(rig, devices)
-
-
-def _on_terminals(rig: Rig, lines: Mapping[str, Emulated], world: "RunWorld | None") -> RunBus:
-    """Return servos on terminals of another process, which is started unless others share it."""
-    if world is not None and world.served is not None:
-        buses, paths = world.served
-        close = _nothing
-    else:
         buses = PtyBuses()
-        paths, close = buses.start(lines, None if world is None else world.spec), buses.stop
-    bus = guarded_rig_bus(rig, paths)
-    head = None if world is None else _seen_from_here(rig, buses, world.number)
-    return RunBus(bus, close=close, fault=buses.command, head=head)
+        paths = buses.start(lines)
+        return RunBus(guarded_rig_bus(rig, paths), close=buses.stop, fault=buses.command)
+    return in_process(rig, {name: build(line, clock.now_s) for name, line in lines.items()})
 
 
-def _seen_from_here(rig: Rig, buses: PtyBuses, number: int) -> "WorldPoses":
-    """Return where the head of one of the rigs is in the world of a server's process."""
-    from gazerig.features.world.run.poses import RigInState, WorldPoses
-
-    return WorldPoses(buses.state, RigInState(kinematics_of(rig), buses.joints[number]))
-
-
-def _in_world(rig: Rig, clock: Clock, lines: Mapping[str, Emulated], run: "RunWorld") -> RunBus:
-    """Return emulated servos in a world in this process, on the clock of the run."""
-    world = run.computed(clock)
-    devices = {name: world.device(line, name, rig=run.number) for name, line in lines.items()}
-    return _in_process(rig, devices)._replace(head=_seen_in(world, rig, clock, run.number))
-
-
-def _seen_in(world: "World", rig: Rig, clock: Clock, number: int) -> "SimulatedPoses":
-    """Return where the head of one of a world's rigs is."""
-    from gazerig.features.world.run.poses import RigInState, SimulatedPoses
-
-    joints = RigInState(kinematics_of(rig), world.model.rigs[number].qpos)
-    return SimulatedPoses(world, clock, joints)
-
-
-def _ideal_in_world(rig: Rig, clock: Clock, run: "RunWorld") -> RunBus:
-    """Return ideal servos in a world in this process, on the clock of the run."""
-    from gazerig.features.world.run.rig import world_ideal_bus
-
-    world, names = run.computed(clock), rig.names
-    ideal = world_ideal_bus(rig, world, run.number)
-    head = _seen_in(world, rig, clock, run.number)
-    return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)), head=head)
-
-
-def _in_process(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
+def in_process(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
     """Return emulated devices in this process, by the name of their bus, with a digest."""
     from gazerig.sim_mock.in_process_port import InProcessPort
 

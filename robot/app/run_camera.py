@@ -1,7 +1,7 @@
 """The camera of a run: where it sits, and what it looks at."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams, NewestPose, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.sim_mock.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    from gazerig.features.world.run.run_world import RunWorld
 
 
 class Sight(NamedTuple):
@@ -60,28 +57,17 @@ def run_camera(
     rig: Rig,
     options: RunOptions,
     scene: Scene | None,
-    world: "RunWorld | None",
     sight: Sight,
     wires: RunBus,
     rng: np.random.Generator,
     placed: CameraParams,
     clock: Clock,
     own: ProgramParts,
-    say: Callable[[str], None],
 ) -> Camera:
     """Return what the robot looks through."""
     if scene is None:
         return real_camera(rig, options, clock, placed, sight.turns, own)
     locate = locator_of(placed)
-    if world is not None and wires.head is not None:
-        from gazerig.features.world.run.sight import RenderedWorld, world_camera
-
-        rendered = RenderedWorld(
-            world.spec, scene, sight.mount, placed, rng, world.camera, world.number
-        )
-        return world_camera(
-            rig, options, rendered, wires.head, locate, clock, sight.turns, own, say
-        )
     where = true_head(wires.true_steps, rig, sight.poses)
     return scene_camera(
         rig, options, scene, sight.mount, where, rng, locate, own, clock, sight.turns

@@ -88,7 +88,7 @@ class RunObservers:
         self._emulated = options.mock and steer is None
         computed = options.no_pictures or (made.scene is not None and not options.pixels)
         self._detector = "" if computed else str(detector_status(made.live.rig.detector))
-        self._tuning, self._recorder = tuning, recorder
+        self._tuning, self._recorder, self._world_recorded = tuning, recorder, False
         self._commanded = HeadsTogether(made.robot, made.others)
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
@@ -149,23 +149,36 @@ class RunObservers:
     def _live_rig(self) -> LiveRig:
         made = self._made
         picture = ScenePicture(made.scene) if made.scene is not None else None
+        shapes = made.room.shapes() if made.room is not None else None
         return LiveRig(
-            made.loop.rate_hz, made.shown(), self._emulated, picture, made.world, self._detector
+            made.loop.rate_hz, made.shown(), self._emulated, picture, shapes, self._detector
         )
 
     def _run_state(self) -> RunState:
         """Return what the page shows and ticks do not tell."""
         robot = self._made.robot
         errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
-        start_s = scene_start_s(robot.camera) or self._made.world_start_s()
+        start_s = scene_start_s(robot.camera)
+        if not start_s and self._made.room is not None:
+            start_s = self._made.room.start_s()
         return RunState(
             errors, *self._in_force(), robot.perception.residual(), start_s,
             [other.seen() for other in self._made.others],
         )  # fmt: skip
 
+    def _record_world(self, tick: Tick) -> None:
+        """Record the surroundings, once their beginning is known."""
+        if self._world_recorded or self._recorder is None or self._made.room is None:
+            return
+        if (world := self._made.room.recorded()) is not None:
+            self._recorder.record_world(world)
+            self._world_recorded = True
+
     def join(self, observers: Observers) -> None:
         """Let all of them observe the ticks; each is left out by itself where it fails."""
         if self._recorder is not None:
+            if self._made.room is not None:
+                observers.add("recording the surroundings", self._record_world)
             observers.add("the recording", self._recorder.record)
         elif self._publisher is not None:
             observers.add("the page", self._stream.update)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.surroundings import surroundings
 from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -48,9 +49,7 @@ def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
     """
     scene: Scene | None = scenes().get(options.scene or "")
     if options.world is not None:
-        from gazerig.features.world.run.run_world import world_scene  # with the people in it
-
-        scene = world_scene(options.world, options.seed)
+        scene = surroundings(options.world).scene(options)
     rules = rig.gaze.top_down
     if scene is None or not scene.behaviours or not {*scene.behaviours} <= rules.rules.keys():
         return rig

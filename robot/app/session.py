@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,7 +17,6 @@ from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import (
     RIGS_OWN,
     Assembly,
-    SharedPlace,
     Substitutes,
     assemble,
 )
@@ -27,6 +25,7 @@ from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_figures import SceneScore, run_figures
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_rig
+from gazerig.robot.app.surroundings import Room
 from gazerig.robot.control.event_text import drawn_together, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
@@ -39,7 +38,6 @@ from gazerig.robot.recording.run_info import RunInfo, versions
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
-    from gazerig.robot.recording.world_info import WorldInfo
 
 
 SECONDS = "seconds"
@@ -59,14 +57,14 @@ class ComposedRun(NamedTuple):
 
 
 def compose(
-    options: RunOptions, substitutes: Substitutes = RIGS_OWN, shared: SharedPlace | None = None
+    options: RunOptions, substitutes: Substitutes = RIGS_OWN, room: Room | None = None
 ) -> ComposedRun:
     """Assemble one run; nothing moves.
 
     Args:
         options: what to run.
         substitutes: parts of a program's own; a recording goes around the body.
-        shared: its place in a world with other robots; None: it is alone.
+        room: open surroundings with other robots in them; None: it is alone.
 
     Raises:
         gazerig.config.load.ConfigError: the rig, character, profile or walk is at fault.
@@ -78,31 +76,12 @@ def compose(
     else:
         from gazerig.robot.recording.recorder import Recorder  # with what writes and packs files
 
-        info = run_info(rig, options, () if shared is None else shared.stands)
+        info = run_info(rig, options, () if room is None else room.stands)
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
         substitutes = substitutes._replace(body=recorder.recorded)
-    made = assemble(rig, options, substitutes, shared)
-    if recorder is not None and options.world is not None:
-        people = shared.world.spec.figures if shared is not None else None
-        seed = people.seed if people is not None else options.seed
-        recorder.in_world(_begun_world(options, seed, made.world_start_s))
+    made = assemble(rig, options, substitutes, room)
     names = (options.rig, options.character, options.profile)
     return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)
-
-
-def _begun_world(
-    options: RunOptions, seed: int, begins_s: Callable[[], float | None]
-) -> Callable[[], "WorldInfo | None"]:
-    """Return what tells the world of a run, once its people have begun."""
-    from gazerig.features.world.run.recorded_world import world_info  # with the people in it
-
-    info = world_info(options, seed)
-
-    def begun() -> "WorldInfo | None":
-        start_s = begins_s()
-        return None if info is None or start_s is None else replace(info, start_s=start_s)
-
-    return begun
 
 
 def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:

@@ -237,5 +237,12 @@ def complete_scene(incomplete: str) -> list[str]:
     return [name for name in sorted(scenes()) if name.startswith(incomplete)]
 
 
+def complete_world(incomplete: str) -> list[str]:
+    """Complete a world with physics, or other surroundings."""
+    from gazerig.robot.app.surroundings import surroundings_names
+
+    return [name for name in surroundings_names() if name.startswith(incomplete)]
+
+
 def _dashed(callback: object) -> str:
     return str(getattr(callback, "__name__", "")).replace("_", "-")

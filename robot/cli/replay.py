@@ -222,10 +222,11 @@ def _world(recording: "RunRecording") -> "WorldShapes | None":
     """Return how the recorded run's world looked; None without one, or, said why, if it is lost."""
     if recording.world is None:
         return None
-    from gazerig.features.world.run.recorded_world import recorded_shapes
+    from gazerig.robot.app.surroundings import surroundings
 
     try:
-        return recorded_shapes(recording.world, recording.info.stands)
+        world = surroundings(recording.world.name)
+        return world.replayed(recording.world, recording.info.stands)
     except SetupError as error:
         say(str(error))
         return None

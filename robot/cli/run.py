@@ -27,7 +27,7 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.control.joint_faults import JointFault, named
 
 if TYPE_CHECKING:
-    from gazerig.features.world.run.head_group import HeadGroup
+    from gazerig.robot.app.surroundings import GroupRun
 
 app = typer.Typer()
 
@@ -95,13 +95,13 @@ def run(
         raise typer.Exit(FAULT)
 
 
-def _group(asked: RunOptions) -> "HeadGroup | None":
+def _group(asked: RunOptions) -> "GroupRun | None":
     """Return the heads of a world that has several, None without."""
     if asked.world is None:
         return None
-    from gazerig.features.world.run.head_group import compose_group, has_other_heads
+    from gazerig.robot.app.surroundings import surroundings
 
-    return compose_group(asked) if has_other_heads(asked) else None
+    return surroundings(asked.world).group(asked)
 
 
 class Opening:

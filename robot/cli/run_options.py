@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gazerig.robot.cli.examples import complete_scene, complete_shipped
+from gazerig.robot.cli.examples import complete_scene, complete_shipped, complete_world
 
 Mock = Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")]
 Port = Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")]
@@ -22,7 +22,7 @@ World = Annotated[
         metavar="NAME|FILE",
         help="Be in a world with physics, seen through a rendered camera (needs --mock): "
         "living-room, boxing, conversation, crowd, or a file of one's own (YAML, MJCF).",
-        autocompletion=complete_shipped("worlds"),
+        autocompletion=complete_world,
     ),
 ]
 NoPictures = Annotated[

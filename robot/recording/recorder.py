@@ -73,15 +73,7 @@ class Recorder:
         self._checked_s = -inf
         self._beside: Path | None = None
         self._opened = self._said = False
-        self._world: Callable[[], WorldInfo | None] | None = None
         self.lost = 0
-
-    def in_world(self, world: Callable[[], WorldInfo | None]) -> None:
-        """Record the world that the run is in, too.
-
-        world: returns it, None as long as its beginning is not known
-        """
-        self._world = world
 
     def open(self) -> None:
         """Create the file and start the process that writes it; returns at once.
@@ -126,12 +118,13 @@ class Recorder:
 
         return noted
 
+    def record_world(self, world: WorldInfo) -> None:
+        """Record the surroundings of the run; once, after ``open``."""
+        self._link.post(writer.WORLD, encode(as_text(world)))
+
     def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
         before = self._before(tick)
-        if self._world is not None and (world := self._world()) is not None:
-            self._world = None
-            self._link.post(writer.WORLD, encode(as_text(world)))
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0
         self._last_s = tick.t_s
         self.stream.append(tick, dt_s, before)

@@ -6,7 +6,7 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
@@ -14,7 +14,6 @@ from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 if TYPE_CHECKING:
-    from gazerig.features.world.world_spec import WorldSpec
     from gazerig.sim_mock.pty.served_folder import ServedFolder
 
 STOP_S = 2.0
@@ -29,6 +28,22 @@ def has_terminals() -> bool:
     return sys.platform == "linux"
 
 
+class SentSurroundings(Protocol):
+    """Surroundings that the server's process makes."""
+
+    @property
+    def make(self) -> str:
+        """Return "module:function", which makes a ``server.ServedSurroundings``.
+
+        It gets the folder, and what returns the host's time in seconds.
+        """
+        ...
+
+    def write(self, folder: Path) -> None:
+        """Write into a folder what that function needs."""
+        ...
+
+
 class _Served:
     """A server process of ``gazerig.sim_mock.pty.server``."""
 
@@ -37,12 +52,12 @@ class _Served:
         self._folder: ServedFolder | None = None
         self._asking = threading.Lock()
         self.joints: list[dict[str, int]] = []
-        """Where the joints of each rig stand in the state of the world, where there is one."""
+        """Place of each rig's joints in the state of the surroundings; [] without these."""
 
     def _start(
-        self, buses: Sequence[Mapping[str, object]], world: "WorldSpec | None" = None
+        self, buses: Sequence[Mapping[str, object]], surroundings: SentSurroundings | None = None
     ) -> list[str]:
-        """Start it for these settings of buses, in a world or without; return the path of each."""
+        """Start it for these settings of buses; return the path of each."""
         from gazerig.sim_mock.pty.served_folder import ServedFolder  # where there are terminals
 
         self._folder = ServedFolder()
@@ -50,11 +65,9 @@ class _Served:
         links = [str(folder / f"tty{k or ''}") for k in range(len(buses))]
         linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
         more: dict[str, object] = {}
-        if world is not None:
-            if world.figures is not None:
-                world.figures.shared = folder / "people.npy"
-            world.write(spec := folder / "world")
-            more["world"] = {"spec": str(spec), "state": str(self.state)}
+        if surroundings is not None:
+            surroundings.write(folder)
+            more["surroundings"] = {"make": surroundings.make, "folder": str(folder)}
         settings = json.dumps({"buses": linked, "until_eof": True, **more})
         self._server = child_process.start(
             # The servos must outlive their client's way out: they end when their input does.
@@ -63,7 +76,7 @@ class _Served:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
-        lines = [self._read_line() for _ in range(len(buses) + (world is not None))]
+        lines = [self._read_line() for _ in range(len(buses) + (surroundings is not None))]
         said = [json.loads(line) for line in lines if line]
         refused = next((one["error"] for one in said if "error" in one), None)
         if refused is not None or not all(lines):
@@ -71,16 +84,16 @@ class _Served:
             if refused is not None:
                 raise SetupError(refused)
             raise RuntimeError("the emulated bus did not start: its message is above")
-        if world is not None:
+        if surroundings is not None:
             self.joints = said.pop(0)["joints"]
         return [str(one["path"]) for one in said]
 
     @property
-    def state(self) -> Path:
-        """Return the file with the newest state of the world, where there is a world."""
+    def folder(self) -> Path:
+        """Return the folder of the terminals and of the surroundings."""
         if self._folder is None:
             raise RuntimeError("the emulated bus is not running: start it first")
-        return self._folder.path / "state"
+        return self._folder.path
 
     @property
     def pid(self) -> int:
@@ -185,34 +198,34 @@ class PtyBus(_Served):
 
 
 class PtyBuses(_Served):
-    """All emulated buses of a rig, or of several in one world, in one process of their own."""
+    """All emulated buses of a rig, or of several in one place, in one process of their own."""
 
     def start(
-        self, devices: Mapping[str, Emulated], world: "WorldSpec | None" = None
+        self, devices: Mapping[str, Emulated], surroundings: SentSurroundings | None = None
     ) -> dict[str, str]:
         """Start a server for what is on every bus; return the path of each, by the same names.
 
         Args:
             devices: by the name of their bus.
-            world: in which all their servos are; None: each has mechanics of its own.
+            surroundings: in which all their servos are; None: each has mechanics of its own.
 
         Raises:
-            SetupError: the world cannot be used; says why.
+            SetupError: the surroundings cannot be used; says why.
             RuntimeError: the server did not start; its message is on standard error.
         """
-        return self.start_rigs([("", devices)], world)[0]
+        return self.start_rigs([("", devices)], surroundings)[0]
 
     def start_rigs(
         self,
         rigs: Sequence[tuple[str, Mapping[str, Emulated]]],
-        world: "WorldSpec | None" = None,
+        surroundings: SentSurroundings | None = None,
     ) -> list[dict[str, str]]:
-        """Start a server for the buses of several rigs of one world; return the paths of each.
+        """Start a server for the buses of several rigs in one place; return the paths of each.
 
         Args:
-            rigs: in the world's order: a name, "" for the first, which stands before the names of
-                its buses in commands, and what is on its buses.
-            world: as for ``start``.
+            rigs: in the surroundings' order: a name, "" for the first, which is before the names
+                of its buses in commands, and what is on its buses.
+            surroundings: as for ``start``.
 
         Raises:
             SetupError: as ``start``, or two buses would have one name.
@@ -229,6 +242,6 @@ class PtyBuses(_Served):
             for name, (number, bus) in zip(names, places, strict=True)
         ]
         found: list[dict[str, str]] = [{} for _ in rigs]
-        for (number, bus), path in zip(places, self._start(buses, world), strict=True):
+        for (number, bus), path in zip(places, self._start(buses, surroundings), strict=True):
             found[number][bus] = path
         return found

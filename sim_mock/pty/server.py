@@ -5,9 +5,8 @@
 serves clients that come and go. It takes commands as lines on standard input and answers
 each with one JSON line: {"ok": ...} or {"error": ...}. Where there are several buses, a
 command begins with the name of its own: ``neck: lose 3``; without one it is for the bus
-that has none. Imports nothing heavy, so that it is up within a tenth of a second; with a "world"
-in its settings it computes a world with physics, which has all servos of all buses in it, and
-writes where everything is into a file for those who look at it.
+that has none. Imports nothing heavy, so that it is up within a tenth of a second; with
+"surroundings" in its settings it makes these, and all servos of all buses are in them.
 
 A server in a thread of the client's own process would fight it for the interpreter lock.
 """
@@ -19,32 +18,73 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from gazerig.drivers.errors import SetupError
+from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import unpacked
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
 
-if TYPE_CHECKING:
-    from gazerig.features.world.served_world import ServedWorld
-
-
 _LOOK_MS = 200
-WORLD_COMMANDS = ("push",)
-"""Commands that are the world's, whatever bus; ``gazerig.features.world.commands`` has them."""
+
+
+class ServedSurroundings(Protocol):
+    """Surroundings that all servos of a server are in."""
+
+    @property
+    def commands(self) -> Collection[str]:
+        """Return the first words of its own commands."""
+        ...
+
+    def joints(self) -> list[dict[str, int]]:
+        """Return for each rig where its joints are in a state."""
+        ...
+
+    def device(self, bus: BusSettings) -> Device:
+        """Return the emulated device of a bus, whose servos are in it."""
+        ...
+
+    def obey(self, text: str) -> str:
+        """Carry out a command; return {"ok": ...} or {"error": ...} as JSON."""
+        ...
+
+    def wait_s(self) -> float:
+        """Return how long to sleep if nothing arrives."""
+        ...
+
+    def serve(self, heard: bool) -> None:
+        """Bring it up to now; heard: a client has sent bytes."""
+        ...
 
 
 @dataclass(frozen=True)
-class WorldFiles:
-    """Of what a world is made, as ``WorldSpec.write`` writes it, and where its state is written."""
+class SurroundingsSettings:
+    """How surroundings are made.
 
-    spec: str
-    state: str
+    Attributes:
+        make: "module:function".
+        folder: into which they are written; the function gets it and the clock.
+    """
+
+    make: str
+    folder: str
+
+    def made(self) -> ServedSurroundings:
+        """Return them.
+
+        Raises:
+            SetupError: they cannot be used.
+        """
+        module, _, function = self.make.partition(":")
+        make = getattr(import_module(module), function)
+        made: ServedSurroundings = make(Path(self.folder), time.monotonic)
+        return made
 
 
 @dataclass(frozen=True)
@@ -54,12 +94,12 @@ class ServerSettings:
     Attributes:
         buses: each on a terminal of its own.
         until_eof: stop at the end of standard input.
-        world: the world that all servos are in; None: each has mechanics of its own.
+        surroundings: what all servos are in; None: each has mechanics of its own.
     """
 
     buses: tuple[BusSettings, ...]
     until_eof: bool = False
-    world: WorldFiles | None = None
+    surroundings: SurroundingsSettings | None = None
 
 
 class ServerStopped(Exception):
@@ -81,14 +121,14 @@ class Server:
         if not names or len(set(names)) < len(names):
             raise ValueError(f"every bus needs a name of its own; there is {names}")
         try:
-            self.world: ServedWorld | None = None
-            if settings.world is not None:
+            self.surroundings: ServedSurroundings | None = None
+            if settings.surroundings is not None:
                 with _ended_with_client(settings.until_eof):
-                    self.world = _world(settings.world)
+                    self.surroundings = settings.surroundings.made()
             for bus in settings.buses:
                 device = None
-                if self.world is not None:
-                    device = self.world.device(bus)
+                if self.surroundings is not None:
+                    device = self.surroundings.device(bus)
                 self.lines.append(TerminalLine(bus, time.monotonic, say, warn, device))
         except BaseException:
             self.close()
@@ -107,8 +147,8 @@ class Server:
                 if commands is not None:
                     watched.append(commands)
                 wait_s = min([line.wait_s() for line in self.lines])
-                if self.world is not None:
-                    wait_s = min(wait_s, self.world.wait_s())
+                if self.surroundings is not None:
+                    wait_s = min(wait_s, self.surroundings.wait_s())
                 ready, _, _ = select.select(watched, (), (), wait_s)
                 now_s = time.monotonic()
                 if commands in ready and not self._take_commands(commands):
@@ -117,8 +157,8 @@ class Server:
                     commands = None
                 for line in self.lines:
                     line.serve(ready, now_s)
-                if self.world is not None:
-                    self.world.serve(any([line.heard for line in self.lines]))
+                if self.surroundings is not None:
+                    self.surroundings.serve(any([line.heard for line in self.lines]))
         finally:
             self.close()
 
@@ -139,9 +179,9 @@ class Server:
         return bool(came)
 
     def _obey(self, text: str) -> str:
-        """Carry out a command on the bus it names, on the one without a name, or on the world."""
-        if self.world is not None and text.split()[0] in WORLD_COMMANDS:
-            return self.world.obey(text)
+        """Carry out a command: on its bus, on the one without a name, or in the surroundings."""
+        if self.surroundings is not None and text.split()[0] in self.surroundings.commands:
+            return self.surroundings.obey(text)
         named = {line.settings.name or "": line for line in self.lines}
         for name, line in named.items():
             if text.startswith(f"{name}:"):
@@ -159,7 +199,7 @@ class Server:
 
 @contextmanager
 def _ended_with_client(until_eof: bool) -> Iterator[None]:
-    """End this process with its client also while a world is made, which takes seconds."""
+    """End this process with its client also while surroundings are made, which takes seconds."""
     made = threading.Event()
     number: int | None = None
     if until_eof and sys.stdin is not None:
@@ -180,17 +220,6 @@ def _ended_with_client(until_eof: bool) -> Iterator[None]:
         yield
     finally:
         made.set()
-
-
-def _world(files: WorldFiles) -> "ServedWorld":
-    """Return the world that all servos are in."""
-    from gazerig.features.world.gl_context import import_mujoco
-
-    import_mujoco()
-    from gazerig.features.world.served_world import ServedWorld
-    from gazerig.features.world.world_spec import WorldSpec
-
-    return ServedWorld(WorldSpec.read(Path(files.spec)), Path(files.state), time.monotonic)
 
 
 def _warn(text: str) -> None:
@@ -220,8 +249,8 @@ def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool)
             say(json.dumps({"error": str(error)}))
             return
         servers.append(server)
-        if server.world is not None:
-            say(json.dumps({"joints": server.world.joints()}))
+        if server.surroundings is not None:
+            say(json.dumps({"joints": server.surroundings.joints()}))
         for line in server.lines:
             say(line.where())
         server.serve(sys.stdin.fileno() if sys.stdin is not None else None)
@@ -242,8 +271,9 @@ def settings_of(settings: Mapping[str, Any]) -> ServerSettings:
         ValueError, TypeError: there is no such device, or it has no such setting.
     """
     buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in settings["buses"]]
-    world = WorldFiles(**settings["world"]) if "world" in settings else None
-    return ServerSettings(tuple(buses), settings.get("until_eof", False), world)
+    around = settings.get("surroundings")
+    surroundings = None if around is None else SurroundingsSettings(**around)
+    return ServerSettings(tuple(buses), settings.get("until_eof", False), surroundings)
 
 
 def main() -> None:

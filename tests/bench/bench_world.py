@@ -41,6 +41,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view  # noq
 from gazerig.drivers.types import FaceDetector  # noqa: E402
 from gazerig.drivers.vision.face.detector import face_detector  # noqa: E402
 from gazerig.drivers.vision.face.params import FaceDetectorParams  # noqa: E402
+from gazerig.features.world.figure import Figures  # noqa: E402
 from gazerig.features.world.script import Act, PersonScript, PlaceScript, WorldScript  # noqa: E402
 from gazerig.features.world.shipped import HOME  # noqa: E402
 from gazerig.features.world.world_scene import WorldScene  # noqa: E402
@@ -264,7 +265,7 @@ def scripts(args: argparse.Namespace) -> None:
         rng = np.random.default_rng(0)
         script = load(shipped("worlds", name, HOME), WorldScript)
         picture = _played(script)
-        scene = WorldScene(name, script, 0)
+        scene = WorldScene(name, Figures(script, 0))
         detectors = _detectors(args.yunet)
         for t_s in np.linspace(1.0, script.round_s - 1.0, moments):
             R = compose(rotation((float(rng.uniform(-0.4, 0.4)), 0.1, 0.0)), OPTICAL)

@@ -52,7 +52,8 @@ class Looks:
 
     def watch(self, tick: Tick) -> None:
         """Note one tick."""
-        begun, scene = self._made.world_start_s(), self._made.scene
+        room, scene = self._made.room, self._made.scene
+        begun = room.start_s() if room is not None else None
         if tick.detections is not None:
             self.pictures = tick.detections.number
         if begun is None or scene is None:

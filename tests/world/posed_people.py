@@ -280,12 +280,13 @@ def watch_motion(
         The share of pictures with a waving hand in which a blob is at it, how many blobs a picture
         are elsewhere, and the number of pictures with a waving hand.
     """
+    from gazerig.features.world.figure import Figures
     from gazerig.features.world.figure_model import PlacedPeople
     from gazerig.features.world.model import world_model
     from gazerig.features.world.picture import WorldPicture
     from gazerig.features.world.world_scene import WorldScene
 
-    scene = WorldScene("posed", script, 1)
+    scene = WorldScene("posed", Figures(script, 1))
     model = world_model(scene.figures, ()).mj
     view = WorldPicture(model, PlacedPeople(model, scene.figures).place, params)
 

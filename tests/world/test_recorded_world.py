@@ -47,7 +47,8 @@ def recorded(
     file = tmp_path_factory.mktemp("recorded") / "run.mcap"
     composed = compose(replace(ASKED, record=file))
     run(composed, lambda: None, lambda line: None)
-    world = composed.made.world
+    assert composed.made.room is not None
+    world = composed.made.room.shapes()
     assert isinstance(world, SpecShapes)
     return RunRecording(file), world
 

@@ -109,7 +109,8 @@ def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
 @branched
 def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
     made = group.members[0].composed.made
-    shapes = pickle.loads(pickle.dumps(made.world))  # as to the page's process
+    assert made.room is not None
+    shapes = pickle.loads(pickle.dumps(made.room.shapes()))  # as to the page's process
     parts = {part.name: part for part in shapes.parts()}
     head = next(name for name in parts if name.startswith("other_") and "eye" in name)
     assert parts[head].moves and not [name for name in parts if name.startswith("rig_")]

@@ -187,7 +187,7 @@ def test_the_same_seed_gives_the_same_motion_in_another_process_and_another_seed
 
 
 def test_a_scene_says_where_faces_truly_are() -> None:
-    scene = WorldScene("living-room", shipped_world("living-room"))
+    scene = WorldScene("living-room", Figures(shipped_world("living-room")))
     t_s = 20.0
     (anna,) = scene.people(t_s)
     all_of_them = scene.figures
@@ -255,7 +255,7 @@ def test_a_child_pushes_the_head() -> None:
 
 
 def test_a_boxer_s_fist_goes_to_the_head_and_spins_only_then() -> None:
-    scene = WorldScene("boxing", shipped_world("boxing"), 3)
+    scene = WorldScene("boxing", Figures(shipped_world("boxing"), 3))
     assert scene.behaviours
     first = next(event for event in scene.events() if event.name == "punch")
     fists = [
@@ -294,7 +294,7 @@ def test_processes_share_a_motion_and_without_its_file_compute_the_same(tmp_path
 
 
 def test_a_world_sent_to_another_process_computes_its_people_once() -> None:
-    scene = WorldScene("living-room", shipped_world("living-room"))
+    scene = WorldScene("living-room", Figures(shipped_world("living-room")))
     again, figures = pickle.loads(pickle.dumps((scene, scene.figures)))
     assert again.figures is figures
     assert (again.name, again.round_s) == (scene.name, scene.round_s)
@@ -337,6 +337,6 @@ def test_only_a_hand_before_the_camera_is_to_be_looked_at() -> None:
                 "it": PlaceScript(0.5, 0.1, height_m=height_m),
             },
         )
-        events = WorldScene(name, script).events()
+        events = WorldScene(name, Figures(script)).events()
         found[name] = [event.name for event in events]
     assert found == {"level": ["reach"], "floor": []}

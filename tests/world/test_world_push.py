@@ -9,7 +9,7 @@ from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run, write
 mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.commands import COMMANDS, obey  # noqa: E402
+from gazerig.features.world.commands import obey  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
 from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
@@ -18,10 +18,9 @@ from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
 from gazerig.robot.control.tick import Tick  # noqa: E402
 from gazerig.sim_mock.pty.line import BusSettings  # noqa: E402
 from gazerig.sim_mock.pty.server import (  # noqa: E402
-    WORLD_COMMANDS,
     Server,
     ServerSettings,
-    WorldFiles,
+    SurroundingsSettings,
 )
 
 NECK = ("neck_yaw", "neck_pitch", "neck_roll")
@@ -223,9 +222,9 @@ def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servo
 ) -> None:
     """``gazerig ctl fault`` orders both."""
     spec = WorldSpec(None, (rig_in_world(load_rig("desk"), looks=False),))
-    spec.write(tmp_path / "spec")
+    spec.write(tmp_path)
     (line,) = emulated_lines(load_rig("desk")).values()
-    files = WorldFiles(str(tmp_path / "spec"), str(tmp_path / "state"))
+    files = SurroundingsSettings(spec.make, str(tmp_path))
     server = Server(ServerSettings((BusSettings(line),), True, files), lambda text: None)
     try:
         assert "pushed left with 5 N" in server._obey("push head 5 left 0.1")
@@ -233,8 +232,3 @@ def test_a_server_passes_a_push_on_to_its_world_and_everything_else_to_its_servo
         assert "servo 7 is stuck" in server._obey("stick 7")
     finally:
         server.close()
-
-
-def test_the_servers_commands_of_a_world_are_those_there_are() -> None:
-    """The server knows their names without MuJoCo."""
-    assert set(WORLD_COMMANDS) == set(COMMANDS.verbs)

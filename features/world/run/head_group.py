@@ -6,11 +6,12 @@ What ends one of them ends all: each parks and lets go.
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.features.world.heads_scene import HeadsScene, RigFrame
-from gazerig.features.world.run.run_world import RunWorld, world_of, world_scene
+from gazerig.features.world.run.run_world import world_of, world_scene
 from gazerig.features.world.run.shared_world import (
     FaceNow,
     RealTimeWorld,
@@ -19,13 +20,13 @@ from gazerig.features.world.run.shared_world import (
 )
 from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
-from gazerig.robot.app.assemble import SharedPlace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.tick import Tick
+from gazerig.sim_mock.scenes.scene import Scene
 
 FIRST = "first"
 
@@ -65,7 +66,6 @@ def compose_group(options: RunOptions) -> "HeadGroup":
     """
     first = run_rig(options)
     found = world_of(first, options)
-    assert found is not None  # a world was asked for
     assert found.spec.figures is not None  # heads stand in a script
     heads = found.spec.figures.script.heads
     others = [_other(options, name, n, heads[name].rig) for n, name in enumerate(heads, 1)]
@@ -75,9 +75,11 @@ def compose_group(options: RunOptions) -> "HeadGroup":
     members: list[_Member] = []
     try:
         faces = [world.face(number, rig) for number, (_, rig) in enumerate(rigs)]
-        for number, ((name, _), one) in enumerate(zip(rigs, each, strict=True)):
-            place = _place(world, found, number, faces)
-            members.append(_Member(name, compose(one, shared=place), world.frames[number]))
+        for number, ((name, rig), one) in enumerate(zip(rigs, each, strict=True)):
+            frame = world.frames[number]
+            faced = [face for n, face in enumerate(faces) if n != number]
+            room = world.room(number, rig, one, partial(_before, frame, faced, number == 0))
+            members.append(_Member(name, compose(one, room=room), frame))
     except BaseException:
         for member in members:
             member.composed.made.close()
@@ -97,15 +99,9 @@ def _together(members: Sequence[_Member]) -> list[_Member]:
     return [first._replace(composed=first.composed._replace(made=made)), *alone]
 
 
-def _place(
-    world: SharedWorld, found: RunWorld, number: int, faces: Sequence[FaceNow]
-) -> SharedPlace:
-    """Return the place of a head in the world that it shares."""
-    frame = world.frames[number]
-    others = [face for n, face in enumerate(faces) if n != number]
-    scene = HeadsScene(found.scene, frame, others, number == 0)
-    stands = HeadPlace(frame.R, frame.p_m).numbers
-    return SharedPlace(world.seen(number, scene), world.clock(number), stands)
+def _before(frame: RigFrame, faces: Sequence[FaceNow], first: bool, people: Scene) -> HeadsScene:
+    """Return what a head has before itself: the people and the other heads, as from where it is."""
+    return HeadsScene(people, frame, faces, first)
 
 
 def _other(options: RunOptions, name: str, number: int, rig: str) -> RunOptions:

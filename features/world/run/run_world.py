@@ -1,6 +1,6 @@
 """The world with physics that a run is in: who is there, and the rig among them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
@@ -13,12 +13,11 @@ from gazerig.config.schema import Rig, load_rig, rig_path
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.extras import extra_hint
 from gazerig.features.world.camera_params import WorldCameraParams
-from gazerig.features.world.other_heads import HeadInState, OtherHeads
+from gazerig.features.world.figure import Figures
 from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.run.rig import rig_in_world
 from gazerig.features.world.script import Fault, WorldScript
 from gazerig.features.world.script_faults import CHECKS
-from gazerig.features.world.shapes import shapes_of
 from gazerig.features.world.shipped import HOME
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
@@ -27,8 +26,6 @@ from gazerig.robot.app.emulation import BOARDS, CHAINS
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
 from gazerig.robot.app.run_scene import refuse_unruled
-from gazerig.robot.description.world_shapes import WorldShapes
-from gazerig.robot.model.clock import Clock
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -43,12 +40,14 @@ class ServedRig(NamedTuple):
     """The terminals of one of the rigs of a world that another process computes.
 
     Attributes:
-        buses: of that process, which its owner stops.
+        buses: of that process.
         paths: of this rig's terminals, by the names of its buses.
+        close: ends the process; does nothing if other rigs are in it.
     """
 
     buses: "PtyBuses"
     paths: Mapping[str, str]
+    close: Callable[[], None]
 
 
 class RunWorld(NamedTuple):
@@ -59,8 +58,6 @@ class RunWorld(NamedTuple):
         scene: the people in it, as a run and its score know them.
         camera: how large, how fast and how true the pictures of cameras are.
         number: which of its rigs is the run's.
-        shared: the world itself where several runs of this process are in it, else None.
-        served: the rig's terminals where several runs are in a world of another process, else None.
         others: the world's other rigs with all that can be seen of them.
     """
 
@@ -68,48 +65,61 @@ class RunWorld(NamedTuple):
     scene: Scene
     camera: WorldCameraParams
     number: int = 0
-    shared: "World | None" = None
-    served: ServedRig | None = None
     others: tuple[RigInWorld, ...] = ()
 
-    def computed(self, clock: Clock) -> "World":
-        """Return the world in this process."""
-        if self.shared is not None:
-            return self.shared
+    def computed(self, now_s: Callable[[], float]) -> "World":
+        """Return the world in this process.
+
+        Args:
+            now_s: returns the time of the run.
+        """
         model = self.spec.compiled()  # imports MuJoCo, whatever may render here
         from gazerig.features.world.physics import World
 
-        return World(model, clock.now_s)
+        return World(model, now_s)
 
-    def shapes(self) -> WorldShapes:
-        """Return how the world looks, with the other heads where another process has it."""
-        if self.served is None or self.number:
-            return shapes_of(self.spec)
-        buses = self.served.buses
-        heads = map(HeadInState, self.others, buses.joints[1:])
-        return shapes_of(self.spec, OtherHeads(buses.state, tuple(heads)))
+    def served(self, folder: Path) -> "RunWorld":
+        """Return the same world; it has the people's motion in common with its server.
+
+        Args:
+            folder: of the server.
+        """
+        spec = self.spec.sharing(folder)
+        if spec.figures is None:
+            return self
+        return self._replace(spec=spec, scene=WorldScene(self.scene.name, spec.figures))
 
 
-def world_of(rig: Rig, options: RunOptions) -> RunWorld | None:
-    """Return the world that was asked for, None without one.
+def asked_world(options: RunOptions) -> str:
+    """Return the name or path of the world that was asked for.
+
+    Raises:
+        ValueError: none was.
+    """
+    if options.world is None:
+        raise ValueError("the run is in no world")
+    return options.world
+
+
+def world_of(rig: Rig, options: RunOptions) -> RunWorld:
+    """Return the world that was asked for.
 
     Raises:
         gazerig.config.load.ConfigError: its file is at fault, or there is none of that name.
         SetupError: MuJoCo is not installed, or the rig has no rule for what the world asks for.
     """
-    if options.world is None:
-        return None
+    asked = asked_world(options)
     if find_spec("mujoco") is None:
         error = ModuleNotFoundError(name="mujoco")
-        raise SetupError(f"--world {options.world}: {extra_hint('mujoco', 'world', error)}")
+        raise SetupError(f"--world {asked}: {extra_hint('mujoco', 'world', error)}")
     for name in bus_names(rig):
         if (kind := rig.bus_named(name).kind) not in (*CHAINS, *BOARDS):
             raise SetupError(
-                f"--world {options.world}: a bus of kind {kind} has no servos that a world could "
+                f"--world {asked}: a bus of kind {kind} has no servos that a world could "
                 "move: put its joints on one of our kinds, or use --scene"
             )
-    scene, mjcf_file = world_scene(options.world, options.seed), mjcf_of(options.world)
-    refuse_unruled(rig, scene, f"--world {options.world}")
+    scene, mjcf_file = world_scene(asked, options.seed), mjcf_of(asked)
+    refuse_unruled(rig, scene, f"--world {asked}")
     script = scene.figures.script
     # Where nothing is rendered, nobody sees the rigs: the page draws them by itself.
     looks = not options.no_pictures
@@ -160,8 +170,8 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
     """
     name = Path(name_or_path).stem
     if mjcf_of(name_or_path) is not None:
-        return WorldScene(name, WorldScript(people={}), seed)
-    return WorldScene(name, world_script(name_or_path), seed)
+        return WorldScene(name, Figures(WorldScript(people={}), seed))
+    return WorldScene(name, Figures(world_script(name_or_path), seed))
 
 
 def world_script(name_or_path: str) -> WorldScript:

@@ -6,7 +6,7 @@ real time the emulator's process has the world and the servos of all heads, as i
 each head's control loop speaks to its own terminals, on the host's clock.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,15 +15,21 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.world.heads_scene import HeadFace, RigFrame
 from gazerig.features.world.run.lockstep import Lockstep
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
+from gazerig.features.world.run.rig_room import RigRoom, served_room, simulated_room
 from gazerig.features.world.run.run_world import RunWorld, ServedRig
+from gazerig.features.world.world_spec import state_file
 from gazerig.gaze.angles import add, rotate, rotation
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.analysis.mutual_gaze import HeadPlace
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.head_shape import HeadMeasures
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 from gazerig.sim_mock.scenes.scene import Scene
+
+Before = Callable[[Scene], Scene]
 
 
 class TrueHeadPose(Protocol):
@@ -64,8 +70,15 @@ class SharedWorld(Protocol):
         """Return what tells where a head's face is now."""
         ...
 
-    def seen(self, number: int, scene: Scene) -> RunWorld:
-        """Return the world as one of the heads is in it, with what it has before itself."""
+    def room(self, number: int, rig: Rig, options: RunOptions, before: Before) -> RigRoom:
+        """Return the world as one of the heads is in it.
+
+        Args:
+            number: of the head.
+            rig: of the head.
+            options: of its run.
+            before: returns what it has before itself of the world's people.
+        """
         ...
 
     def clock(self, number: int) -> Clock:
@@ -93,11 +106,9 @@ class SimulatedWorld:
     """
 
     def __init__(self, found: RunWorld) -> None:
-        from gazerig.features.world.physics import World
-
         self._found = found
         self._lockstep = Lockstep(len(found.spec.rigs))
-        self._world: World = World(found.spec.compiled(), self._lockstep.now_s)
+        self._world = found.computed(self._lockstep.now_s)
         self.frames: Sequence[RigFrame] = [
             RigFrame(rig.R_world_base, rig.p_world_base_m) for rig in self._world.model.rigs
         ]
@@ -108,9 +119,11 @@ class SimulatedWorld:
         poses = SimulatedPoses(self._world, self.clock(number), joints)
         return FaceNow(poses, self.frames[number], _nose_m(rig))
 
-    def seen(self, number: int, scene: Scene) -> RunWorld:
+    def room(self, number: int, rig: Rig, options: RunOptions, before: Before) -> RigRoom:
         """Return the world as one of the heads is in it."""
-        return self._found._replace(scene=scene, number=number, shared=self._world)
+        world = self._found._replace(scene=before(self._found.scene), number=number)
+        stands, clock = _stands(self.frames[number]), self.clock(number)
+        return simulated_room(rig, options, clock, world, self._world, stands)
 
     def clock(self, number: int) -> Clock:
         """Return a head's clock."""
@@ -142,7 +155,6 @@ class RealTimeWorld:
     def __init__(self, found: RunWorld, rigs: Sequence[tuple[str, Rig]]) -> None:
         if not has_terminals():
             raise SetupError("several heads need the pseudo-terminals of Linux, or --fast")
-        self._found = found
         self.frames: Sequence[RigFrame] = [
             RigFrame(rotation((rig.yaw_rad, 0.0, 0.0)), rig.p_m) for rig in found.spec.rigs
         ]
@@ -151,16 +163,21 @@ class RealTimeWorld:
             (name if number else "", emulated_lines(rig)) for number, (name, rig) in enumerate(rigs)
         ]
         self._paths = self._buses.start_rigs(lines, found.spec)
+        self._found = found.served(self._buses.folder)
 
     def face(self, number: int, rig: Rig) -> FaceNow:
         """Return what tells where a head's face is now."""
         joints = RigInState(kinematics_of(rig), self._buses.joints[number])
-        return FaceNow(WorldPoses(self._buses.state, joints), self.frames[number], _nose_m(rig))
+        return FaceNow(
+            WorldPoses(state_file(self._buses.folder), joints), self.frames[number], _nose_m(rig)
+        )
 
-    def seen(self, number: int, scene: Scene) -> RunWorld:
+    def room(self, number: int, rig: Rig, options: RunOptions, before: Before) -> RigRoom:
         """Return the world as one of the heads is in it."""
-        served = ServedRig(self._buses, self._paths[number])
-        return self._found._replace(scene=scene, number=number, served=served)
+        served = ServedRig(self._buses, self._paths[number], _leave_it)
+        world = self._found._replace(scene=before(self._found.scene), number=number)
+        stands, clock = _stands(self.frames[number]), self.clock(number)
+        return served_room(rig, options, clock, world, served, stands)
 
     def clock(self, number: int) -> Clock:
         """Return the host's clock."""
@@ -175,6 +192,14 @@ class RealTimeWorld:
     def close(self) -> None:
         """End the emulator's process; safe to call twice."""
         self._buses.stop()
+
+
+def _stands(frame: RigFrame) -> tuple[float, ...]:
+    return HeadPlace(frame.R, frame.p_m).numbers
+
+
+def _leave_it() -> None:
+    """Let the world run: the other heads are in it, and ``close`` ends it."""
 
 
 def _nose_m(rig: Rig) -> Vec3:

@@ -1,0 +1,177 @@
+"""A rig in a world with physics: its bus, its camera, and how the world looks to it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import Camera
+from gazerig.features.world.other_heads import HeadInState, OtherHeads
+from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
+from gazerig.features.world.run.recorded_world import world_info
+from gazerig.features.world.run.rig import world_ideal_bus
+from gazerig.features.world.run.run_world import RunWorld, ServedRig
+from gazerig.features.world.run.sight import RenderedWorld, world_camera
+from gazerig.features.world.shapes import shapes_of
+from gazerig.features.world.world_spec import state_file
+from gazerig.robot.app.bus_wiring import guarded_rig_bus
+from gazerig.robot.app.camera_factory import locator_of
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.program_parts import ProgramParts
+from gazerig.robot.app.run_bus import RunBus, in_process
+from gazerig.robot.app.run_camera import Sight
+from gazerig.robot.description.world_shapes import WorldShapes
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
+from gazerig.sim_mock.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from gazerig.features.world.physics import World
+
+
+@dataclass(frozen=True)
+class RigRoom:
+    """A ``Room`` of gazerig.robot.app.surroundings: a world as one of its rigs is in it.
+
+    Attributes:
+        world: the world.
+        clock: of the run.
+        wires: the bus of the rig.
+        head: where its head is.
+        heads: the world's other heads, None where they are not shown.
+        info: what a recording keeps of it but for its beginning, None without a recording.
+        stands: as of ``Room.stands``.
+    """
+
+    world: RunWorld
+    clock: Clock
+    wires: RunBus
+    head: WorldPoses | SimulatedPoses
+    heads: OtherHeads | None = None
+    info: WorldInfo | None = None
+    stands: tuple[float, ...] = ()
+
+    @property
+    def scene(self) -> Scene:
+        """Return the people in it, as the rig has them before itself."""
+        return self.world.scene
+
+    def camera(
+        self,
+        rig: Rig,
+        options: RunOptions,
+        sight: Sight,
+        placed: CameraParams,
+        rng: np.random.Generator,
+        own: ProgramParts,
+        say: Callable[[str], None],
+    ) -> Camera:
+        """Return what the rig looks through; arguments as of ``Room.camera``."""
+        world = self.world
+        rendered = RenderedWorld(
+            world.spec, world.scene, sight.mount, placed, rng, world.camera, world.number
+        )
+        return world_camera(
+            rig, options, rendered, self.head, locator_of(placed), self.clock, sight.turns, own, say
+        )
+
+    def start_s(self) -> float | None:
+        """Return when the script of the people began, None before that."""
+        return self.head.begin_s
+
+    def shapes(self) -> WorldShapes:
+        """Return how the world looks, with the other heads where another process has it."""
+        return shapes_of(self.world.spec, self.heads)
+
+    def recorded(self) -> WorldInfo | None:
+        """Return what a recording keeps of it, None before the people have begun."""
+        start_s = self.start_s()
+        return None if self.info is None or start_s is None else replace(self.info, start_s=start_s)
+
+
+def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> RigRoom:
+    """Return a world with one rig, which it has to itself; arguments as of ``Surroundings.open``.
+
+    Raises:
+        SetupError: it cannot be used; says why.
+    """
+    if options.fast:
+        return simulated_room(rig, options, clock, world, world.computed(clock.now_s))
+    if not has_terminals():
+        raise SetupError("--world needs the pseudo-terminals of Linux, or --fast")
+    buses = PtyBuses()
+    served = ServedRig(buses, buses.start(emulated_lines(rig), world.spec), buses.stop)
+    return served_room(rig, options, clock, world.served(buses.folder), served)
+
+
+def simulated_room(
+    rig: Rig,
+    options: RunOptions,
+    clock: Clock,
+    world: RunWorld,
+    computed: "World",
+    stands: tuple[float, ...] = (),
+) -> RigRoom:
+    """Return a rig in a world of this process, on the clock of the run.
+
+    Args:
+        rig: the rig.
+        options: whether its servos are ideal, and whether the run is recorded.
+        clock: of the run.
+        world: the world as the rig is in it.
+        computed: the same in this process.
+        stands: as of ``Room.stands``.
+    """
+    if options.bus == "ideal":
+        ideal, names = world_ideal_bus(rig, computed, world.number), rig.names
+        wires = RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
+    else:
+        lines = emulated_lines(rig).items()
+        devices = {name: computed.device(line, name, rig=world.number) for name, line in lines}
+        wires = in_process(rig, devices)
+    joints = RigInState(kinematics_of(rig), computed.model.rigs[world.number].qpos)
+    head = SimulatedPoses(computed, clock, joints)
+    return RigRoom(world, clock, wires, head, None, _info(options, world), stands)
+
+
+def served_room(
+    rig: Rig,
+    options: RunOptions,
+    clock: Clock,
+    world: RunWorld,
+    served: ServedRig,
+    stands: tuple[float, ...] = (),
+) -> RigRoom:
+    """Return a rig in a world of another process.
+
+    Args:
+        rig: the rig.
+        options: whether the run is recorded.
+        clock: the host's.
+        world: the world as the rig is in it.
+        served: the terminals of the rig.
+        stands: as of ``Room.stands``.
+    """
+    buses, number = served.buses, world.number
+    wires = RunBus(guarded_rig_bus(rig, served.paths), close=served.close, fault=buses.command)
+    state = state_file(buses.folder)
+    head = WorldPoses(state, RigInState(kinematics_of(rig), buses.joints[number]))
+    # The page, which is the first head's, draws the others.
+    heads = map(HeadInState, world.others, buses.joints[1:])
+    others = OtherHeads(state, tuple(heads)) if world.others and number == 0 else None
+    return RigRoom(world, clock, wires, head, others, _info(options, world), stands)
+
+
+def _info(options: RunOptions, world: RunWorld) -> WorldInfo | None:
+    """Return what a recording keeps of a world, None if the run is not recorded."""
+    if options.record is None:
+        return None
+    people = world.spec.figures
+    return world_info(options, options.seed if people is None else people.seed)

@@ -1,0 +1,47 @@
+"""Our worlds as surroundings of a run: ``gazerig run --world``."""
+
+from gazerig.config.schema import Rig
+from gazerig.config.shipped import shipped_names
+from gazerig.features.world.shipped import HOME
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.surroundings import GroupRun, Room, Surroundings
+from gazerig.robot.description.world_shapes import WorldShapes
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.sim_mock.scenes.scene import Scene
+
+
+class World(Surroundings):
+    """A world with physics of a script's name or path, or of a user's own MJCF file.
+
+    Modules are imported where they are used: MuJoCo's and the people's are heavy.
+    """
+
+    def scene(self, options: RunOptions) -> Scene:
+        """Return the people of the world that was asked for."""
+        from gazerig.features.world.run.run_world import asked_world, world_scene
+
+        return world_scene(asked_world(options), options.seed)
+
+    def open(self, rig: Rig, options: RunOptions, clock: Clock) -> Room:
+        """Return the world that was asked for, with one rig in it."""
+        from gazerig.features.world.run.rig_room import open_room
+        from gazerig.features.world.run.run_world import world_of
+
+        return open_room(rig, options, clock, world_of(rig, options))
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the shipped worlds."""
+        return shipped_names("worlds", HOME)
+
+    def group(self, options: RunOptions) -> GroupRun | None:
+        """Return the run of several heads, None in a world with one."""
+        from gazerig.features.world.run.head_group import compose_group, has_other_heads
+
+        return compose_group(options) if has_other_heads(options) else None
+
+    def replayed(self, info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
+        """Return how the world of a recorded run looked."""
+        from gazerig.features.world.run.recorded_world import recorded_shapes
+
+        return recorded_shapes(info, stands)
