@@ -96,6 +96,13 @@ def test_a_limp_joint_may_fall_out_of_its_range_under_a_load():
     assert machine.strike(bus, i, j, case).end == "came back"
 
 
+@pytest.mark.parametrize("bit", [3, 9])
+def test_a_hit_bit_is_not_taken_for_the_pulse_of_a_channel_that_gives_none(bit):
+    rig, machine = copied(of_kind("maestro"))
+    case = Case(("error script-stack", f"corrupt {{i}} {bit}"))
+    assert machine.strike(pair_of(rig, "maestro")[0], 0, 1, case).end == "came back"
+
+
 # --- several kinds in one head
 
 ALONE = (

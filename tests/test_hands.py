@@ -277,6 +277,13 @@ def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_ha
     assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
 
 
+def test_nor_is_it_the_persons_arm_because_it_moves_before_their_shoulder() -> None:
+    hands, seen = Hands(), reaching(0.17, p=(2.0, 0.68, -0.24))
+    for k in range(3):
+        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+    assert found.kind == HAND and level(found.p_world_m) == pytest.approx(0.5, abs=0.03)
+
+
 @pytest.mark.parametrize(
     "seen",
     [reaching(0.1), reaching(0.17, from_side=False),

@@ -30,6 +30,8 @@ FAST = 1.3
 ROOM_RAD = 0.03
 """And the end of their range by their inertia so much."""
 NEAR_RAD = 0.06
+GIVES_RAD = 0.06
+"""A joint under torque gives way to a load so far."""
 
 Commands = tuple[str, ...]
 
@@ -112,9 +114,11 @@ class Machine:
     under torque in the last tick
     own_speed: servos may catch up at their own speed
     volts: of their supply, to which faults of the supply return
+    room_rad: servos may be out of their range by so much
     """
 
     volts = 5.0
+    room_rad = ROOM_RAD
 
     def __init__(self, rig: Rig, rate_hz: float = 100.0, seed: int = 0) -> None:
         self.rig, self.period_s = rig, 1.0 / rate_hz
@@ -273,7 +277,8 @@ class Machine:
                 took_s = max(dt_s, 0.01)  # a board moves its channels so often
             if goal is not None and not setup.min_steps <= goal <= setup.max_steps:
                 raise Broken(f"{name}'s servo has goal {goal}")
-            inside = limit.low_rad - ROOM_RAD <= true[i] <= limit.high_rad + ROOM_RAD
+            room = self.room_rad + (GIVES_RAD if self._loaded else 0.0)
+            inside = limit.low_rad - room <= true[i] <= limit.high_rad + room
             if goal is None and self._loaded:
                 self._fallen.add(i)  # nothing holds a limp joint against a load
             elif inside:

@@ -5,7 +5,7 @@ from math import degrees
 from time import perf_counter
 
 from gazerig.drivers.camera.located_frame import LocatedFrame
-from gazerig.drivers.camera.off_frame import OffFrameReport
+from gazerig.drivers.camera.off_frame import OffFrameReport, is_off_frame
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, MovingBlob
@@ -54,7 +54,11 @@ class FrameAnalyzer:
     def look(self, shot: Shot) -> Detections:
         """Find and locate faces, unless the camera itself has, people, palms, and what moves."""
         began_s = perf_counter()
+        height, width = shot.image.shape[:2]
         faces = self._faces(shot)
+        for line in self._off_frame.told_of(faces, width, height):
+            self._faults.setdefault(line, False)
+        faces = tuple([face for face in faces if not is_off_frame(face, width, height)])
         faces_s = perf_counter()
         find_people = getattr(self._detector, "people", None)
         people = () if find_people is None else find_people(shot.image, shot.captured_s)
@@ -69,9 +73,6 @@ class FrameAnalyzer:
             "people and hands": bodies_s - faces_s,
             "motion": perf_counter() - bodies_s,
         }
-        height, width = shot.image.shape[:2]
-        for line in self._off_frame.told_of(faces, width, height):
-            self._faults.setdefault(line, False)
         found = Detections(
             shot.captured_s,
             shot.number,

@@ -1,8 +1,8 @@
 """Faces whose landmarks are not in the frame: no such face is looked at.
 
-A net may guess a point or two of a face that the edge cuts; a face whose middle lies outside, or a
-point of which lies farther outside than the face is large, is a mistake of the detector, mostly
-pixels of another size of frame.
+A net may guess points of a face that the edge cuts; one whose middle lies outside is not in view. A
+face that lies farther outside than it is large, or a point of it, is a mistake of the detector,
+mostly pixels of another size of frame; that is told.
 """
 
 from math import isnan
@@ -19,13 +19,19 @@ def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
     x, y = sum(xs) / len(xs), sum(ys) / len(ys)
     if isnan(x) or isnan(y):
         return False  # no numbers: the same
-    right, bottom = width_px - 0.5, height_px - 0.5
-    if not (-0.5 <= x <= right and -0.5 <= y <= bottom):
-        return True
-    left_x, right_x, top_y, bottom_y = min(xs), max(xs), min(ys), max(ys)
-    size = max(right_x - left_x, bottom_y - top_y)
-    least = -0.5 - size
-    return min(left_x, top_y) < least or right_x > right + size or bottom_y > bottom + size
+    outside = _outside_px(x, y, width_px, height_px)
+    return outside > 0.0 or _is_misplaced(xs, ys, width_px, height_px)
+
+
+def _outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
+    """Return how far a point is outside the frame; negative inside."""
+    return max(-0.5 - x, x - width_px + 0.5, -0.5 - y, y - height_px + 0.5)
+
+
+def _is_misplaced(xs: list[float], ys: list[float], width_px: int, height_px: int) -> bool:
+    """Return whether a point lies farther outside the frame than the face is large."""
+    size = max(max(xs) - min(xs), max(ys) - min(ys))
+    return any(_outside_px(x, y, width_px, height_px) > size for x, y in zip(xs, ys, strict=True))
 
 
 class OffFrameReport:
@@ -41,7 +47,9 @@ class OffFrameReport:
         if self._told:
             return ()
         for face in faces:
-            if is_off_frame(face, width_px, height_px):
+            points: list[tuple[float, float]] = face.landmarks_px.tolist()
+            xs, ys = [x for x, _ in points], [y for _, y in points]
+            if points and _is_misplaced(xs, ys, width_px, height_px):
                 self._told = True
                 x, y = face.landmarks_px.mean(axis=0).tolist()
                 return (

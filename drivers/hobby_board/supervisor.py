@@ -12,13 +12,16 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
-from gazerig.drivers.hobby_board.models import channel_label
+from gazerig.drivers.hobby_board.models import HOBBY, channel_label
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A board that lets go of its channels more often within such a time stays without pulses."""
 
 REST_S, LONGEST_REST_S = 0.1, 1.0
 """Channels that noise sends home more often than that wait so long, and longer each time."""
+
+LEAST_STEPS = HOBBY["hobby"].lowest
+"""A shorter pulse is none: a bit of an answer was hit."""
 
 SAME_S = 1.0
 """Shortest time between two reports of the same error."""
@@ -47,6 +50,7 @@ class BoardSupervisor:
         self._errors_s: dict[str, float] = {}
         self._disturbed: list[float] = []
         self._damages = 0
+        self._last_found = -1, 0
         self._damaged_s = self._hold_at_s = self._told_s = -inf
 
     def torque_enabled(self) -> None:
@@ -271,8 +275,14 @@ class BoardSupervisor:
         if found is None:
             return
         pulse = found[0]
+        before, self._last_found = self._last_found, (channel.id, pulse)
         if self._never_sent(channel, pulse, now_s):
             pulse = 0
+        elif pulse and not self._led:
+            # A goal to a channel without pulses is not ramped: that it gives any is asked twice.
+            twice = before[0] == channel.id and abs(before[1] - pulse) <= channel.room_steps()
+            if pulse < LEAST_STEPS or not twice:
+                return
         channel.found(pulse)
         outcome = take(self._board, channel, pulse)
         if outcome is HoldResult.HELD:

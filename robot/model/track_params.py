@@ -35,5 +35,6 @@ class TrackParams:
     forget_ms: Annotated[float, Bounds(0, 60000),
         "a track without a detection is deleted after this long; what returns later gets a new id"] = 1500.0
     remember_face_s: Annotated[float, Bounds(0, 3600),
-        "a face out of sight for longer is known again for this time if it is where it was, within gate_m"] = 20.0
+        "a face out of sight for longer is remembered for this time: it is known again where it was, within gate_m, and looked at if no "
+        "face is visible"] = 20.0
     # fmt: on

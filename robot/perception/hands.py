@@ -66,8 +66,10 @@ _HAND_RADIUS_M = 0.07
 # much larger.
 _ALONE_M, _TOO_LARGE, _LARGE_FRAMES = 0.065, 1.6, 2
 # Width of a hand; how many times as wide an arm that comes in at the side has to be, in how many
-# frames that is measured, and how far from the person's shoulder the arm has to lead.
+# frames that is measured, and how far from the person's shoulder the arm has to lead. If its
+# fastest part is so near to its middle, it hardly tells where it leads to, and less far will do.
 _WIDE_M, _TOO_WIDE, _WIDE_FRAMES, _ANOTHERS_M = 0.085, 1.4, 3, 0.165
+_SHORT_M, _ANOTHERS_SHORT_M = 0.1, 0.11
 # What is found of that counts by this share of the way in each frame, as in frames without.
 _NEARER_GAIN = 0.5
 _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
@@ -387,7 +389,9 @@ def _owned(
                 and _off_shoulder(tip, face[0]) > _off_shoulder(middle, face[0]) - _AS_FAR_M
             )
             wide = ratio * thing.thickness_m > _TOO_WIDE * _WIDE_M
-            comes_in = thing.from_side and shoulder_m > _ANOTHERS_M and wide
+            short = norm(sub(tip, middle)) < _SHORT_M
+            anothers = shoulder_m > (_ANOTHERS_SHORT_M if short else _ANOTHERS_M)
+            comes_in = thing.from_side and anothers and wide
             best, least = _Arm(face, tip, v, ratio, shoulder_m, attached, comes_in), off_m
     return best
 

@@ -18,6 +18,7 @@ import sys
 import time
 from collections import Counter, deque
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 
@@ -30,9 +31,9 @@ from gazerig.drivers.errors import DriverError  # noqa: E402
 from gazerig.robot.model.types import JointState  # noqa: E402
 from gazerig.sim_mock.smart_servo.chain import ServoChain  # noqa: E402
 from gazerig.testing import struck_machine  # noqa: E402
-from gazerig.testing.struck_machine import NEAR_RAD, Broken, Case, Machine  # noqa: E402
+from gazerig.testing.struck_machine import NEAR_RAD, ROOM_RAD, Broken, Case, Machine  # noqa: E402
 
-ROOM_RAD = 0.004
+SEEN_RAD = 0.004
 ROOM_C, ROOM_V = 2.0, 0.15
 PAST_S = 1.0
 MOST_PRINTED = 3
@@ -120,8 +121,8 @@ class Watch:
                 self._counts["off"] += not _between(now, seen, NEAR_RAD)
                 continue
             self._counts["fresh"] += 1
-            if not _between(now, seen, ROOM_RAD):
-                stale = any(abs(now - one) <= ROOM_RAD for past in self._past for one in past[1][i])
+            if not _between(now, seen, SEEN_RAD):
+                stale = any(abs(now - one) <= SEEN_RAD for past in self._past for one in past[1][i])
                 self._counts["stale" if stale else "wrong"] += 1
                 self._report(
                     f"{t_s:.3f} s {name} at {now:.4f} rad, truly {seen}; heard "
@@ -169,7 +170,9 @@ def mix(kind: str, dice: random.Random, only: str = "") -> Case:
     some = [case for case in some if "script {i}" in case.name] or some
     begins = tuple(text for case in some for text in case.begins)
     ends = tuple(text for case in some for text in case.ends)
-    return Case(begins, ends, any(case.own_speed or case in STATIC for case in some))
+    # Where a script has left a servo whose pulses then ended is not known to anybody.
+    lost = len(some) > 1 and any("script on" in case.begins for case in some)
+    return Case(begins, ends, lost or any(case.own_speed or case in STATIC for case in some))
 
 
 def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> None:
@@ -193,6 +196,8 @@ def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> 
                 i, j = dice.sample(range(len(machine.names)), 2)
                 watch.where = f"{kind} {seed} {nth}: {case.name} ({machine.names[i]})"
                 machine.noisy = "static" in case.name
+                # One damaged command in 128 passes a Maestro's check of 7 bits.
+                machine.room_rad = inf if machine.noisy and kind == "maestro" else ROOM_RAD
                 outcome = machine.strike(bus, i, j, case, dice.uniform(0.05, 2.0))
                 faults += len(case.begins)
                 ends[outcome.end if outcome.survived else "unnamed"] += 1

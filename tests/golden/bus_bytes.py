@@ -2,7 +2,8 @@
 
 Run by hand: ``python tests/golden/bus_bytes.py`` compares, ``--write`` pins what is sent now.
 Simulated time and seeded random numbers make a run repeatable on one kind of machine; another
-processor may round a sine otherwise, so the long form is not part of the test suite.
+processor may round a sine otherwise, so what is pinned is not part of the test suite: that compares
+two runs of one seed (test_run.py). Pin anew in the commit that moves anything otherwise on purpose.
 """
 
 import argparse

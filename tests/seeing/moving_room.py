@@ -193,10 +193,11 @@ def frames(
     people: tuple[Board, ...] = PEOPLE,
     room: tuple[Board, ...] = ROOM,
     seed: int = 1,
+    from_s: float = 0.0,
 ) -> Iterator[Seen]:
-    """Yield what the camera sees, frame by frame."""
-    rng = np.random.default_rng(seed)
-    for k in range(round(seconds * RATE_HZ)):
+    """Yield what the camera sees, frame by frame, for so long from a time on."""
+    rng, first = np.random.default_rng(seed), round(from_s * RATE_HZ)
+    for k in range(first, first + round(seconds * RATE_HZ)):
         yield frame(motion(k / RATE_HZ), k / RATE_HZ, (*room, *people), rng)
 
 

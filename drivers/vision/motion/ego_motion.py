@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, middle
+from gazerig.drivers.vision.motion.image import Floats, Grey, light_apart, middle
 from gazerig.drivers.vision.motion.optical_flow import Compared, Mask, corners, gradients, moved
 
 _GRID_PX = 4
@@ -33,6 +33,10 @@ _LEAST_POINTS = 30
 _CELLS, _LEAST_CELLS = (8, 6), 12
 # Of the points with texture, those that must agree with what was predicted.
 _LEAST_SHARE = 0.35
+# Share of the outlines that keep their place although all is said to have moved: .11 to .32 in
+# rendered rooms before a camera that moves, .49 to .77 behind people before one that stands. Their
+# brightness should change by more than so many grey levels, and does by less than a share of that.
+_KEPT_OUTLINES, _CLEAR_CHANGE, _UNCHANGED = 0.4, 4.0, 0.3
 _STEPS = 8
 # A step that moves the image by less is the last.
 _SMALL_PX = 0.01
@@ -120,7 +124,7 @@ def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = 
             there -= pair.shift[at]
         reach = _STANDING_REACH_PX + (_way(_inverse(pair.H), points) if predicted else 0.0)
         need = _AGAINST_JOINTS if predicted else _MOVES if moved_before else _STOOD
-        found = _room(points, there, K, pair.now.shape, reach, need)
+        found = _room(points, there, K, pair, reach, need)
         if found is not None:
             B, share, noise, free = found
             share, fitted = (share if noise <= _MOST_NOISE_PX else 0.0), True
@@ -171,11 +175,12 @@ def _room(
     points: Floats,
     there: Floats,
     K: Floats,
-    shape: tuple[int, ...],
+    pair: Compared,
     reach_px: float,
     need: _Need,
 ) -> HomographyFit | None:
     """Fit the motion of the room: as predicted, or standing; else as all of the image moves."""
+    shape = pair.now.shape
     off = np.hypot(*(there - points).T)
     near = off < reach_px
     stands = bool(near.mean() >= _LEAST_SHARE) and _cells(points[near], shape) >= _LEAST_CELLS
@@ -192,7 +197,32 @@ def _room(
     parted = np.hypot(*(moved(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
     edge = _edge(points, shape)
     kept = float(((off < _STANDING_REACH_PX) & parted)[edge].mean()) if edge.any() else 0.0
-    return free if kept < need.kept else found
+    return free if kept < need.kept and _outlines_kept(pair, free.B) < _KEPT_OUTLINES else found
+
+
+def _outlines_kept(pair: Compared, B: Floats) -> float:
+    """Return the share of the outlines at the edge that stay where they should have moved.
+
+    Boards and door frames before a plain wall have no corners, and people who walk before it have
+    all the texture there is.
+
+    Args:
+        pair: two images.
+        B: (3, 3) by which all of the image is said to have moved.
+    """
+    height, width = pair.now.shape
+    y, x = np.mgrid[:height, :width]
+    points = np.column_stack((x.ravel(), y.ravel())).astype(np.float64)
+    gx, gy = (g.ravel() for g in gradients(pair.now))
+    moves = moved(B, points) - points
+    # Farther than a pixel away brightness no longer changes as the gradient tells.
+    change = np.abs(gx * moves[:, 0] + gy * moves[:, 1]) / np.maximum(1.0, np.hypot(*moves.T))
+    should = (change > _CLEAR_CHANGE) & pair.known.ravel() & _edge(points, (height, width))
+    if not should.any():
+        return 0.0
+    off = light_apart(pair.now.astype(np.float32) - pair.before)
+    changed = np.abs(cv2.blur(off, (3, 3))).ravel()
+    return float((changed[should] < _UNCHANGED * change[should]).mean())
 
 
 def _of_two(

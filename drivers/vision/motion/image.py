@@ -19,6 +19,8 @@ Plane = NDArray[np.float32]
 """(height, width)."""
 
 
+# Wider changes than this are light, not things; and how many grey levels of them count.
+_LIGHT_PX, _LIGHT_STEP = 21, 8.0
 LEAST_SIDE_PX = 48
 """Flow is not searched in images with a shorter side."""
 
@@ -85,6 +87,13 @@ def _check(image: NDArray[Any]) -> None:
             "an image is (height, width), or that with 1, 3 or 4 channels, of uint8, not "
             f"{image.shape} of {image.dtype}"
         )
+
+
+def light_apart(change: Plane) -> Plane:
+    """Return a change of brightness without that of the light, which is wider."""
+    # Clipped, or a dark coat would darken all around it.
+    light = cv2.blur(np.clip(change, -_LIGHT_STEP, _LIGHT_STEP), (_LIGHT_PX, _LIGHT_PX))
+    return np.asarray(change - light, np.float32)
 
 
 def to_given(point_px: tuple[float, float], scale: tuple[float, float]) -> tuple[float, float]:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.vision.motion.ego_motion import Ego
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, light_apart
 from gazerig.drivers.vision.motion.optical_flow import Compared, Flow, Mask, gradients
 from gazerig.drivers.vision.motion.params import MotionParams
 
@@ -20,8 +20,6 @@ from gazerig.drivers.vision.motion.params import MotionParams
 _WINDOW_PX = 3
 # Where edges and light are.
 _NEAR_PX = 5
-# Wider changes than this are light, not things.
-_LIGHT_PX, _LIGHT_STEP = 21, 8.0
 # Of the change that the camera does not explain, what the flow may leave.
 _LEFT_SHARE = 0.5
 # How far above the noise a change must be (variances), and a grey level for rounding.
@@ -239,9 +237,7 @@ def _added(flow: Flow, sign: float) -> Flow:
 
 def _squares(now: Grey, before: Grey, there: Flow | None) -> Plane:
     """Return how unlike the older image is, seen through a map: a local mean of squares."""
-    off = now.astype(np.float32) - _through(before, there)
-    # Clipped, or a dark coat would darken all around it.
-    off -= cv2.blur(np.clip(off, -_LIGHT_STEP, _LIGHT_STEP), (_LIGHT_PX, _LIGHT_PX))
+    off = light_apart(now.astype(np.float32) - _through(before, there))
     return np.asarray(cv2.blur(off * off, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 
