@@ -24,7 +24,7 @@ from gazerig import __version__
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.robot.cli.command_group import CommandsByName
 from gazerig.robot.cli.command_list import shipped_commands
-from gazerig.robot.cli.examples import EXAMPLES
+from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, tidied_up
 from gazerig.robot.cli.welcome import next_steps
@@ -148,7 +148,7 @@ def test_every_command_has_examples_and_no_example_is_without_command() -> None:
     ctl, study = commands()["ctl"], commands()["study"]
     assert isinstance(ctl, TyperGroup) and isinstance(study, TyperGroup)
     of_studies = {f"study {name}" for name in study.commands}
-    assert {*commands(), *ctl.commands, *of_studies} == set(EXAMPLES)
+    assert {*commands(), *ctl.commands, *of_studies} == set(all_examples())
     for name, command in study.commands.items():
         assert f"gazerig study {name}" in str(command.epilog), name
     for name, command in commands().items():
@@ -158,7 +158,7 @@ def test_every_command_has_examples_and_no_example_is_without_command() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [words for examples in EXAMPLES.values() for words, _ in examples]
+    "words", [words for examples in all_examples().values() for words, _ in examples]
 )
 def test_every_example_names_options_that_there_are(words: str) -> None:
     skip_without(words.split()[0])

@@ -26,7 +26,7 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
-from gazerig.robot.cli.examples import EXAMPLES
+from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.scenes.registry import scenes
 
@@ -288,7 +288,7 @@ SAID = {
 def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper == EMULATOR:
         return  # its tables are held against the emulator below
-    words = {*keys(), *defined(), *SERVOS, *scenes(), *EXAMPLES, *_modes()}
+    words = {*keys(), *defined(), *SERVOS, *scenes(), *all_examples(), *_modes()}
     words |= {field.name for field in fields(camera_params.WorldCameraParams)}
     words |= {*RENAMED, *RENAMED.values(), "rules.*.pull"}
     words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {

@@ -6,48 +6,103 @@ SCAN = CommandEntry(
     "gazerig.features.bringup.cli.scan",
     "List serial ports, and who answers on one at every baud rate.",
     "Bring-up",
+    examples={
+        "scan": (
+            ("scan", "ports, and the servos on the only one"),
+            (
+                "scan --port /dev/ttyUSB0",
+                "who answers on this port, of any kind, at every baud rate",
+            ),
+            ("scan --port /dev/ttyUSB0 --kind feetech", "Feetech servos only"),
+        ),
+    },
 )
 SETUP = CommandEntry(
     "gazerig.features.bringup.cli.setup",
     "Set id and baud rate of each servo, one connected at a time; test a Maestro's channels.",
     "Bring-up",
+    examples={
+        "setup": (
+            ("setup my.yaml", "give new servos their ids, one at a time; try a Maestro's channels"),
+            ("setup my.yaml --joint neck_yaw", "one servo only"),
+        ),
+    },
 )
 DOCTOR = CommandEntry(
     "gazerig.features.bringup.cli.doctor",
     "Examine every port and servo against the rig's YAML; every finding has its cure.",
     "Bring-up",
+    examples={
+        "doctor": (
+            ("doctor my.yaml", "port, servos and settings against the file, with cures"),
+            ("doctor my.yaml --fix", "mend what is safe to mend; nothing moves"),
+            ("doctor my.yaml --mock", "see what it looks like without hardware"),
+        ),
+    },
 )
 CALIBRATE = CommandEntry(
     "gazerig.features.bringup.cli.calibrate.group",
     "Find out and write into the rig's YAML: joints (the default), camera, face.",
     "Bring-up",
+    examples={
+        "calibrate": (
+            ("calibrate joints my.yaml", "find zeros and ends of all joints"),
+            ("calibrate board board.pdf", "print the board for the next one"),
+            ("calibrate camera my.yaml", "the lens, and where the camera sits"),
+            (
+                "calibrate camera my.yaml --oak --what lens",
+                "the lens as an OAK camera has it in memory",
+            ),
+            ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
+        ),
+    },
 )
 JOG = CommandEntry(
     "gazerig.features.bringup.cli.motion",
     "Move one joint slowly while the others hold: gazerig jog my.yaml neck_yaw 20.",
     "Bring-up",
+    examples={
+        "jog": (("jog my.yaml neck_yaw 20", "turn the neck 20 deg to the left, slowly"),),
+    },
 )
 HOME = CommandEntry(
     "gazerig.features.bringup.cli.motion",
     "Move slowly to the centre: all joints to 0 deg, lids open; then torque off.",
     "Bring-up",
+    examples={
+        "home": (("home my.yaml", "all joints to 0 deg, then torque off"),),
+    },
 )
 LOOK_AT = CommandEntry(
     "gazerig.features.bringup.cli.motion",
     "Turn eyes and head to a point and tell how well they meet it: X Y Z in metres.",
     "Bring-up",
+    examples={
+        "look-at": (("look-at my.yaml 1 0.2 0.3", "1 m ahead, 20 cm left, 30 cm up"),),
+    },
 )
 MONITOR = CommandEntry(
     "gazerig.features.bringup.cli.monitor",
     "Watch all servos; reads alone: nothing is written, torque stays as it is.",
     "Bring-up",
+    examples={
+        "monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),),
+    },
 )
 REBOOT = CommandEntry(
     "gazerig.features.bringup.cli.reboot",
     "Restart servos, which clears latched errors; their torque is off afterwards.",
     "Bring-up",
+    examples={
+        "reboot": (("reboot my.yaml neck_yaw", "clear what a servo has latched"),),
+    },
 )
 RECORD_GESTURE = CommandEntry(
     "gazerig.features.bringup.cli.record_gesture",
     "Record a gesture by hand: torque off, move the head, and it is written as YAML.",
+    examples={
+        "record-gesture": (
+            ("record-gesture my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
+        ),
+    },
 )

@@ -6,18 +6,43 @@ REPORT = CommandEntry(
     "gazerig.features.lab.cli.report",
     "Report how human a run's gaze was: gazerig report run.mcap, then open report.html.",
     "Look back",
+    examples={
+        "report": (
+            ("report evening.mcap", "how human was the gaze? one HTML file and frames"),
+            ("report --scene face-to-face --seconds 120", "the same of a simulated scene"),
+        ),
+    },
 )
 COMPARE = CommandEntry(
     "gazerig.features.lab.cli.report",
     "Show two runs side by side, with the differences that exceed chance.",
     "Look back",
+    examples={
+        "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),
+    },
 )
 SWEEP = CommandEntry(
     "gazerig.features.lab.cli.sweep",
     "Vary parameters over many simulated runs: a table, and a picture of what responds.",
     "Look back",
+    examples={
+        "sweep": (
+            ("sweep --set gaze.head.comfort_deg=4:16:7 --seeds 8", "a table and curves of 56 runs"),
+            (
+                "sweep --set gaze.lids.blinks_per_min=8:30:5 --set gaze.lids.close_ms=50,75",
+                "a heat map",
+            ),
+            ("sweep my.yaml --set gaze.head.base_speed_deg_s=40:120 --samples 50", "a sample"),
+            ("sweep my.yaml --fit --set gaze.lids.blinks_per_min=4:40", "what is most like people"),
+        ),
+    },
 )
 FIT_SCANPATH = CommandEntry(
     "gazerig.features.lab.cli.fit_scanpath",
     "Fit a walk over the face to an eye-tracker recording, as YAML that run takes.",
+    examples={
+        "fit-scanpath": (
+            ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),
+        ),
+    },
 )

@@ -6,4 +6,30 @@ STUDY = CommandEntry(
     "gazerig.features.study.cli.group",
     "Let people judge two to six gazes, blind: design, run and analyse a study.",
     "Study",
+    examples={
+        "study": (
+            ("study design --example study.yaml", "a study of two gazes to start from"),
+            (
+                "study design study.yaml",
+                "check it; how many participants, and what is stated before",
+            ),
+            ("study run study.yaml --participant 1", "the first participant's session"),
+        ),
+        "study design": (
+            ("study design --example study.yaml", "a study of two gazes to start from"),
+            ("study design study.yaml", "check it and write its pre-registration"),
+            ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
+        ),
+        "study film": (("study film study.yaml", "its films, to look at before anybody comes"),),
+        "study run": (
+            ("study run study.yaml --participant 7", "a session, in the browser"),
+            ("study run study.yaml --participant 7 --mock", "on an emulated head"),
+            ("study run study.yaml --simulate 24 --data trial", "24 simulated participants"),
+        ),
+        "study delete": (("study delete study-data --participant 7", "all data of a participant"),),
+        "study analyse": (
+            ("study analyse study-data", "one page for reviewers, tables, a BIDS data set"),
+            ("study analyse study-data --out ../paper/report", "written elsewhere"),
+        ),
+    },
 )

@@ -15,7 +15,7 @@ from gazerig.robot.cli.command_list import (
     package_commands,
     shipped_commands,
 )
-from gazerig.robot.cli.examples import add_examples
+from gazerig.robot.cli.examples import EXAMPLES, add_examples
 from gazerig.robot.cli.terminal import clear_errors
 
 
@@ -37,15 +37,16 @@ class CommandsByName(UserDict[str, Any]):
 
     def _add(self, entries: Mapping[str, CommandEntry]) -> None:
         self.entries = {**entries, **self.entries}
-        for name, (_, summary, panel) in entries.items():
-            self.data.setdefault(name, TyperCommand(name, help=summary, rich_help_panel=panel))
+        for name, entry in entries.items():
+            listed = TyperCommand(name, help=entry.summary, rich_help_panel=entry.panel)
+            self.data.setdefault(name, listed)
 
     def __getitem__(self, name: str) -> Any:
         """Return a whole command; raise KeyError if there is none of this name."""
         if name in self.data and name not in self._imported:
             app = typer.Typer()
             app.add_typer(import_module(self.entries[name].module).app)
-            add_examples(app)
+            add_examples(app, {**EXAMPLES, **self.entries[name].examples})
             command: Any = typer.main.get_group(app).commands[name]
             command.rich_help_panel = self.entries[name].panel
             self.data[name] = command

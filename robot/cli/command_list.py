@@ -7,10 +7,14 @@ entry points.
 
 from collections.abc import Mapping
 from functools import cache
+from types import MappingProxyType
 from typing import NamedTuple
 
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import COMMAND, SHIPPED, Registration, find, registered
+
+Examples = tuple[tuple[str, str], ...]
+"""What to type after ``gazerig``, and what it is for."""
 
 
 class CommandEntry(NamedTuple):
@@ -20,11 +24,13 @@ class CommandEntry(NamedTuple):
         module: has the command in its ``app``, a ``typer.Typer``.
         summary: the first paragraph of its help.
         panel: of the help, under which it is listed.
+        examples: for its help, by its name; those of a group's commands by both names.
     """
 
     module: str
     summary: str
     panel: str = "Tools"
+    examples: Mapping[str, Examples] = MappingProxyType({})
 
 
 PANELS: dict[str, dict[str, CommandEntry]] = {

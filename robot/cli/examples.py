@@ -1,14 +1,14 @@
 """Examples for every command's help, and the names a shell completes."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import typer
 
 from gazerig.config.shipped import shipped_names
-from gazerig.robot.cli.command_list import PANELS
+from gazerig.robot.cli.command_list import PANELS, Examples, shipped_commands
 
-EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
+EXAMPLES: dict[str, Examples] = {
     "run": (
         ("run --mock", "no hardware: a visitor comes, the page shows what the head does"),
         ("run --mock --world living-room", "a room with physics, seen through a rendered camera"),
@@ -41,41 +41,9 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("models fetch yunet", "one of them"),
         ("models fetch people --from ~/downloads", "without a network, out of downloaded files"),
     ),
-    "scan": (
-        ("scan", "ports, and the servos on the only one"),
-        ("scan --port /dev/ttyUSB0", "who answers on this port, of any kind, at every baud rate"),
-        ("scan --port /dev/ttyUSB0 --kind feetech", "Feetech servos only"),
-    ),
-    "doctor": (
-        ("doctor my.yaml", "port, servos and settings against the file, with cures"),
-        ("doctor my.yaml --fix", "mend what is safe to mend; nothing moves"),
-        ("doctor my.yaml --mock", "see what it looks like without hardware"),
-    ),
-    "setup": (
-        ("setup my.yaml", "give new servos their ids, one at a time; try a Maestro's channels"),
-        ("setup my.yaml --joint neck_yaw", "one servo only"),
-    ),
-    "reboot": (("reboot my.yaml neck_yaw", "clear what a servo has latched"),),
-    "jog": (("jog my.yaml neck_yaw 20", "turn the neck 20 deg to the left, slowly"),),
-    "home": (("home my.yaml", "all joints to 0 deg, then torque off"),),
-    "look-at": (("look-at my.yaml 1 0.2 0.3", "1 m ahead, 20 cm left, 30 cm up"),),
-    "calibrate": (
-        ("calibrate joints my.yaml", "find zeros and ends of all joints"),
-        ("calibrate board board.pdf", "print the board for the next one"),
-        ("calibrate camera my.yaml", "the lens, and where the camera sits"),
-        (
-            "calibrate camera my.yaml --oak --what lens",
-            "the lens as an OAK camera has it in memory",
-        ),
-        ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
-    ),
-    "record-gesture": (
-        ("record-gesture my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
-    ),
     "import-gesture": (
         ("import-gesture my.yaml wave.csv wave --fps 24", "key frames of an animation program"),
     ),
-    "monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),),
     "record-camera": (
         ("record-camera seen.mcap --oak", "keep frames, depth and times of a camera"),
     ),
@@ -84,9 +52,6 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("emulate --servos 1-6:sts3215", "servos of Feetech"),
         ("emulate --maestro 12", "a Pololu Maestro with twelve hobby servos"),
         ("emulate my.yaml", "every bus of a rig, each on its own terminal"),
-    ),
-    "fit-scanpath": (
-        ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),
     ),
     "ctl": (
         ("ctl status", "what the running rig looks at and why, guard, joints"),
@@ -148,56 +113,31 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("export evening.mcap --csv --out gaze", "columns that eye-tracking tools read"),
         ("export evening.mcap --bids --out study", "a BIDS data set"),
     ),
-    "report": (
-        ("report evening.mcap", "how human was the gaze? one HTML file and frames"),
-        ("report --scene face-to-face --seconds 120", "the same of a simulated scene"),
-    ),
-    "sweep": (
-        ("sweep --set gaze.head.comfort_deg=4:16:7 --seeds 8", "a table and curves of 56 runs"),
-        (
-            "sweep --set gaze.lids.blinks_per_min=8:30:5 --set gaze.lids.close_ms=50,75",
-            "a heat map",
-        ),
-        ("sweep my.yaml --set gaze.head.base_speed_deg_s=40:120 --samples 50", "a sample"),
-        ("sweep my.yaml --fit --set gaze.lids.blinks_per_min=4:40", "what is most like people"),
-    ),
-    "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),
-    "study": (
-        ("study design --example study.yaml", "a study of two gazes to start from"),
-        ("study design study.yaml", "check it; how many participants, and what is stated before"),
-        ("study run study.yaml --participant 1", "the first participant's session"),
-    ),
-    "study design": (
-        ("study design --example study.yaml", "a study of two gazes to start from"),
-        ("study design study.yaml", "check it and write its pre-registration"),
-        ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
-    ),
-    "study film": (("study film study.yaml", "its films, to look at before anybody comes"),),
-    "study run": (
-        ("study run study.yaml --participant 7", "a session, in the browser"),
-        ("study run study.yaml --participant 7 --mock", "on an emulated head"),
-        ("study run study.yaml --simulate 24 --data trial", "24 simulated participants"),
-    ),
-    "study delete": (("study delete study-data --participant 7", "all data of a participant"),),
-    "study analyse": (
-        ("study analyse study-data", "one page for reviewers, tables, a BIDS data set"),
-        ("study analyse study-data --out ../paper/report", "written elsewhere"),
-    ),
 }
-"""Command -> examples, each with what it is for; of a study's commands with the group's name."""
+"""Command of the core -> examples, each with what it is for."""
 
 
-def add_examples(app: typer.Typer, panels: bool = True, within: str = "") -> None:
+def all_examples() -> dict[str, Examples]:
+    """Return the examples of the core and of the features that are there."""
+    return EXAMPLES | {k: v for one in shipped_commands().values() for k, v in one.examples.items()}
+
+
+def add_examples(
+    app: typer.Typer, given: Mapping[str, Examples], panels: bool = True, within: str = ""
+) -> None:
     """Add examples to the help of every command of an app.
 
-    panels: each command is put into its panel, too
-    within: the group that it is in, "" for none
+    Args:
+        app: the app.
+        given: examples by command; those in a group of a feature with the group's name.
+        panels: whether to put each command into its panel, too.
+        within: the group that it is in, "" for none.
     """
     for command in app.registered_commands:
         name = command.name or _dashed(command.callback)
         if panels:
             command.rich_help_panel = panel_of(name)
-        examples = EXAMPLES.get(f"{within} {name}") or EXAMPLES.get(name)
+        examples = given.get(f"{within} {name}") or given.get(name)
         if examples:
             command.epilog = epilog(examples)
     for group in app.registered_groups:
@@ -207,10 +147,10 @@ def add_examples(app: typer.Typer, panels: bool = True, within: str = "") -> Non
         title = part.info.name
         if isinstance(title, str):
             group.rich_help_panel = panel_of(title)
-        if title in EXAMPLES:
-            part.info.epilog = epilog(EXAMPLES[title])
+            if title in given:
+                part.info.epilog = epilog(given[title])
         named = isinstance(title, str)
-        add_examples(part, panels and not named, str(title) if named else within)
+        add_examples(part, given, panels and not named, str(title) if named else within)
 
 
 def panel_of(command: str) -> str:
