@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
 ATTENTION, GESTURES, RIGS = "gazerig.attention", "gazerig.gestures", "gazerig.rigs"
-COMMAND, SCHEMA = "gazerig.command", "gazerig.schema"
+COMMAND, SCHEMA, PAGE_PANEL = "gazerig.command", "gazerig.schema", "gazerig.page_panel"
 SURROUNDINGS = "gazerig.surroundings"
 GROUPS: Mapping[str, str] = {
     BUS: "bus",
@@ -35,6 +35,7 @@ GROUPS: Mapping[str, str] = {
     COMMAND: "command",
     SCHEMA: "schema",
     SURROUNDINGS: "surroundings",
+    PAGE_PANEL: "page panel",
 }
 """Group of entry points -> what people call a part of it."""
 
@@ -79,6 +80,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "study": "gazerig.features.study.design:StudyDesign",
         "questionnaire": "gazerig.features.study.questionnaire:Questionnaire",
     },
+    PAGE_PANEL: {},
     SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:World"},
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".

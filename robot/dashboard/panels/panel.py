@@ -15,6 +15,7 @@ from gazerig.robot.dashboard.panels.event_timeline import Timeline
 from gazerig.robot.dashboard.panels.gaze_map import GazeMap
 from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.panels.main_sequence_chart import MainSequenceChart
+from gazerig.robot.dashboard.panels.package_panels import PackagePanels
 from gazerig.robot.dashboard.panels.run_figures import HOW_TO, RunFigures
 from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.dashboard.panels.status import alarms, other_heads, silence
@@ -42,6 +43,7 @@ class PanelView:
         self._open: frozenset[str] = frozenset()
         self.depth: Callable[[bool], None] = _ignore
         self.silence = widgets.panel("watch").html(order=0)
+        self.packages = PackagePanels(widgets.panel("watch"))
         self._begin()
         self.alarms = widgets.panel("headline").html()
         self.image = widgets.panel("camera").image("what the camera sees", pick=True)
@@ -71,6 +73,7 @@ class PanelView:
         self._traces, self._timeline = JointSeries(), Timeline()
         self._sequence, self._dwell = MainSequenceChart(), DwellChart()
         self._map, self._figures = GazeMap(), RunFigures()
+        self.packages.begin()
 
     def update(self, snapshots: tuple[Snapshot, ...]) -> None:
         """Remember every snapshot for traces and figures, also those that are not drawn.
@@ -87,6 +90,7 @@ class PanelView:
             self._timeline.update(snapshot)
             self._map.update(snapshot)
             self._figures.update(snapshot)
+            self.packages.update(snapshot)
             for event in snapshot.events:
                 if isinstance(event, SeenSaccade):
                     self._sequence.update(event)
@@ -138,6 +142,7 @@ class PanelView:
             self.figures.content = self._figures.table(self._dwell)
         if "watch" not in self._open:
             return
+        self.packages.draw()
         self.dwells.content = self._dwell.drawing()
         self.saccades.content = self._sequence.drawing()
         if self._map.seconds > 0.0:

@@ -1,0 +1,43 @@
+"""Packages add panels to the page; one that fails shows why, and the page goes on."""
+
+from pathlib import Path
+
+from outside_package import install, on_path
+from test_page_figures import looking
+
+from gazerig.robot.dashboard.panels.package_panels import PackagePanels
+from gazerig.robot.dashboard.widgets.widgets import Widgets
+
+CODE = """
+from gazerig.robot.dashboard.panels.package_panels import PagePanel
+class Count(PagePanel):
+    title = "snapshots"
+    def __init__(self): self.n = 0
+    def update(self, snapshot): self.n += 1
+    def drawing(self): return f"<p>{self.n}</p>"
+class Broken(Count):
+    title = "broken"
+    def update(self, snapshot): raise RuntimeError("no bulb")
+class NoPanel: pass
+"""
+NAMES = {"count": "counter:Count", "broken": "counter:Broken", "none": "counter:NoPanel"}
+
+
+def contents(widgets: Widgets) -> list[str]:
+    return [widget.content for widget in widgets._widgets.values() if hasattr(widget, "content")]
+
+
+def test_panels_of_packages_are_drawn_and_failures_named(tmp_path: Path) -> None:
+    install(tmp_path, "counter", {"gazerig.page_panel": NAMES}, {"counter": CODE})
+    with on_path(tmp_path):
+        widgets = Widgets()
+        panels = PackagePanels(widgets.panel("watch"))
+        for _ in range(3):
+            panels.update(looking(0.0))
+        panels.draw()
+        shown = " ".join(contents(widgets))
+        assert "<p>3</p>" in shown and "RuntimeError: no bulb" in shown
+        assert "is no subclass of PagePanel" in shown
+        panels.begin()
+        panels.draw()
+        assert "<p>0</p>" in " ".join(contents(widgets))
