@@ -69,7 +69,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "study": "gazerig.features.study.design:StudyDesign",
         "questionnaire": "gazerig.features.study.questionnaire:Questionnaire",
     },
-    SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:World"},
+    SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:WorldSurroundings"},
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
