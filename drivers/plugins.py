@@ -81,7 +81,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "questionnaire": "gazerig.features.study.questionnaire:Questionnaire",
     },
     PAGE_PANEL: {},
-    SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:World"},
+    SURROUNDINGS: {"world": "gazerig.features.world.run.surroundings:WorldSurroundings"},
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 FEATURES = tuple(sorted(path.parent.name for path in ROOT.glob("features/*/__init__.py")))
-NEEDS = {"study": ("lab",)}
+NEEDS = {"study": ("lab", "world")}
 """Feature -> the features that it imports."""
 
 _MAIN = "from gazerig.robot.cli.entry_point import main; main()"
@@ -71,9 +71,11 @@ def imported(package: Path) -> list[str]:
     return done.stdout.split()
 
 
-def bus_digest(package: Path, seconds: float) -> str:
+def bus_digest(
+    package: Path, seconds: float, place: tuple[str, ...] = ("--scene", "visitor")
+) -> str:
     """Return the SHA-256 of all bytes that a simulated run sends to its servos."""
-    options = ("--mock", "--fast", "--no-page", "--scene", "visitor", "--summary", "-")
+    options = ("--mock", "--fast", "--no-page", *place, "--summary", "-")
     done = gazerig(package, "run", "desk", *options, "--seconds", str(seconds), "--seed", "0")
     if done.returncode not in (0, 1) or "{" not in done.stdout:
         raise RuntimeError(done.stderr)

@@ -4,16 +4,20 @@ from pathlib import Path
 
 import pytest
 from features_apart import FEATURES, bus_digest, gazerig, lay_out, removed_with
+from mcap.reader import make_reader
 from outside_package import install
+
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.run_format import WORLD
+from gazerig.robot.recording.world_info import WorldInfo
 
 COMMANDS = {
     "study": ("study",),
     "lab": ("report", "compare", "sweep", "fit-scanpath", "study"),
-    "bringup": (
-        *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
-        "record-gesture",
-    ),
+    "world": ("study",),
 }
+IN_WORLD = ("run", "desk", "--mock", "--fast", "--no-page", "--world", "living-room")
+"""An option that is the world's; a feature with commands names what is missing by the first."""
 SECONDS = 0.5
 
 
@@ -26,7 +30,8 @@ def with_all(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_without_a_feature_the_rest_runs(feature: str, with_all: str, tmp_path: Path) -> None:
     package = lay_out(tmp_path, removed_with(feature))
     assert bus_digest(package, SECONDS) == with_all
-    done = gazerig(package, COMMANDS[feature][0], "--help")
+    asked = IN_WORLD if feature == "world" else (COMMANDS[feature][0], "--help")
+    done = gazerig(package, *asked)
     (line,) = done.stderr.splitlines()
     assert done.returncode == 2 and line.endswith(f"No module named 'gazerig.features.{feature}'")
 
@@ -61,6 +66,52 @@ def test_another_package_brings_a_command_and_a_schema(tmp_path: Path) -> None:
     assert gazerig(package, "wave").stdout == "waved\n"
     assert "Wave a hand." in gazerig(package, "--help").stdout
     assert '"times"' in gazerig(package, "schema", "--of", "wave").stdout
+
+
+HALL = """
+from gazerig.robot.app.camera_factory import locator_of, scene_camera
+from gazerig.robot.app.run_bus import run_bus, true_head
+from gazerig.robot.app.surroundings import Surroundings
+from gazerig.robot.recording.run_format import WORLD
+from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.sim_mock.scenes.registry import scenes
+class Room:
+    stands = ()
+    def __init__(self, rig, options, clock):
+        self.scene, self.clock = scenes()["visitor"], clock
+        self.wires = run_bus(rig, options, clock)
+    def camera(self, rig, options, sight, placed, rng, own, say):
+        where = true_head(self.wires.true_steps, rig, sight.poses)
+        look = locator_of(placed)
+        return scene_camera(rig, options, self.scene, sight.mount, where, rng, look, own)
+    def start_s(self):
+        return 0.0
+    def shapes(self):
+        return None
+    def recorded(self):
+        return WorldInfo("hall", "a hall", 7, 0.0)
+class Hall(Surroundings):
+    def scene(self, options):
+        return scenes()["visitor"]
+    def open(self, rig, options, clock):
+        return Room(rig, options, clock)
+"""
+
+
+def test_another_package_brings_surroundings(with_all: str, tmp_path: Path) -> None:
+    """The visitor of a scene, seen by a camera of theirs: the head does just what it does there."""
+    package, file = lay_out(tmp_path), tmp_path / "run.mcap"
+    parts = {"gazerig.surroundings": {"hall": "hall:Hall", "yard": "hall:Room"}}
+    install(package, "hall", parts, {"hall": HALL})
+    place = ("--world", "hall", "--record", str(file))
+    assert bus_digest(package, SECONDS, place) == with_all
+    assert RunRecording(file).world == WorldInfo("hall", "a hall", 7, 0.0)
+    with file.open("rb") as recorded:
+        names = [one.name for one in make_reader(recorded).iter_metadata()]
+    assert names.count(WORLD) == 1
+    done = gazerig(package, *IN_WORLD[:-1], "yard")
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2 and "surroundings 'yard' of hall" in line
 
 
 def test_every_feature_has_tests() -> None:

@@ -123,6 +123,7 @@ def test_the_motion_detector_finds_them_when_it_is_told_to(gloves: bool) -> None
 
 
 def test_a_world_with_a_boxer_is_looked_at_by_both_and_others_are_not() -> None:
+    pytest.importorskip("gazerig.features.world")
     rig = load_rig("desk")
     for options, planned, gloves in (
         (RunOptions(mock=True, world="boxing"), True, True),

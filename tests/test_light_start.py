@@ -81,6 +81,7 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
 
     Where people are it reads from a file of the process that has the world.
     """
+    pytest.importorskip("gazerig.features.world")
     code = (
         "import sys; from gazerig.robot.app.assemble import assemble; "
         "from gazerig.config.schema import load_rig; "
@@ -98,6 +99,7 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
 
 @with_mujoco
 def test_sending_shapes_of_a_world_loads_no_mujoco(python: LightPython, tmp_path: Path) -> None:
+    pytest.importorskip("gazerig.features.world")
     code = (
         "import sys, pickle; from gazerig.features.world.run.run_world import world_scene;"
         "from gazerig.features.world.shapes import shapes_of;"

@@ -5,6 +5,6 @@ MuJoCo, the extra ``world``.
 
 In this folder: the script (script.py, its faults and timeline), the people's motion and shape, the
 room, the model for MuJoCo and its physics, the renderer, and the server's part of it
-(world_spec.py, served_world.py, state_file.py); run/: a run in it, its camera, several heads, the
-world of a recording; worlds/: the shipped YAML files.
+(world_spec.py, serve.py, served_world.py, state_file.py); run/: a run in it, its camera, several
+heads, the world of a recording; worlds/: the shipped YAML files.
 """

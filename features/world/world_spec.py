@@ -1,7 +1,6 @@
 """What a world is made of, as plain data that can be sent to another process."""
 
 import pickle
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,7 +10,6 @@ from gazerig.features.world.rig_in_world import RigInWorld
 
 if TYPE_CHECKING:
     from gazerig.features.world.model import WorldModel
-    from gazerig.features.world.served_world import ServedWorld
 
 
 _SPEC, _STATE, _PEOPLE = "world", "state", "people.npy"
@@ -45,11 +43,17 @@ class WorldSpec(NamedTuple):
     @property
     def make(self) -> str:
         """Return how the server makes it, as of ``SentSurroundings.make``."""
-        return f"{__name__}:{serve.__name__}"
+        return "gazerig.features.world.serve:serve"
 
     def write(self, folder: Path) -> None:
         """Write it for another process of this program, which has the people's motion in common."""
         (folder / _SPEC).write_bytes(pickle.dumps(self.sharing(folder)))
+
+    @staticmethod
+    def read(folder: Path) -> "WorldSpec":
+        """Read what ``write`` has written; never of a folder that another user can write."""
+        found: WorldSpec = pickle.loads((folder / _SPEC).read_bytes())
+        return found
 
     def sharing(self, folder: Path) -> "WorldSpec":
         """Return the same world; its people's motion is in a file of the folder."""
@@ -61,20 +65,3 @@ class WorldSpec(NamedTuple):
 def state_file(folder: Path) -> Path:
     """Return the file with the newest state of a world, in the folder of its server."""
     return folder / _STATE
-
-
-def serve(folder: Path, clock_s: Callable[[], float]) -> "ServedWorld":
-    """Return a world for a server; never of a folder that another user can write.
-
-    Args:
-        folder: with what ``WorldSpec.write`` has written.
-        clock_s: the host's time.
-
-    Raises:
-        SetupError: MuJoCo is not installed, or a user's own world cannot be used.
-    """
-    import_mujoco()  # whatever MUJOCO_GL says of pictures
-    from gazerig.features.world.served_world import ServedWorld
-
-    spec: WorldSpec = pickle.loads((folder / _SPEC).read_bytes())
-    return ServedWorld(spec, state_file(folder), clock_s)

@@ -43,7 +43,7 @@ from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.app.run_camera import run_camera, sight_of
 from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.app.run_scene import scene_of
-from gazerig.robot.app.surroundings import Room, surroundings
+from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import GuardedChooser, TargetChooser
 from gazerig.robot.control.gesture_choices import GestureChoices
@@ -95,7 +95,7 @@ class Assembly(NamedTuple):
     notes: tuple[str, ...]
     live: LiveParams
     fault: Callable[[str], str] | None = None
-    room: Room | None = None
+    room: RunRoom | None = None
     others: tuple[NamedRobot, ...] = ()
 
     def shown(self) -> ShownRig:
@@ -151,7 +151,7 @@ def assemble(
     rig: Rig,
     options: RunOptions,
     substitutes: Substitutes = RIGS_OWN,
-    room: Room | None = None,
+    room: RunRoom | None = None,
 ) -> Assembly:
     """Build the robot of a rig, once and whole; nothing is opened but the emulated bus.
 

@@ -25,7 +25,7 @@ from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_figures import SceneScore, run_figures
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_rig
-from gazerig.robot.app.surroundings import Room
+from gazerig.robot.app.surroundings import RunRoom
 from gazerig.robot.control.event_text import drawn_together, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
@@ -57,7 +57,7 @@ class ComposedRun(NamedTuple):
 
 
 def compose(
-    options: RunOptions, substitutes: Substitutes = RIGS_OWN, room: Room | None = None
+    options: RunOptions, substitutes: Substitutes = RIGS_OWN, room: RunRoom | None = None
 ) -> ComposedRun:
     """Assemble one run; nothing moves.
 

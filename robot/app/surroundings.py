@@ -31,7 +31,7 @@ WORLD = "world"
 """Our own surroundings: they have all names that no package has."""
 
 
-class Room(Protocol):
+class RunRoom(Protocol):
     """Surroundings of one run; the rig's emulated servos are in them."""
 
     @property
@@ -132,7 +132,7 @@ class Surroundings(ABC):
         """
 
     @abstractmethod
-    def open(self, rig: "Rig", options: "RunOptions", clock: "Clock") -> Room:
+    def open(self, rig: "Rig", options: "RunOptions", clock: "Clock") -> RunRoom:
         """Return the surroundings of a run, with the rig's emulated servos in them.
 
         Args:
@@ -160,7 +160,7 @@ class Surroundings(ABC):
         """Return how the surroundings of a recorded run looked, as from its head's neck base.
 
         Args:
-            info: what ``Room.recorded`` returned.
+            info: what ``RunRoom.recorded`` returned.
             stands: where the head was, as of ``RunInfo.stands``.
 
         Raises:

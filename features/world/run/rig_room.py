@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RigRoom:
-    """A ``Room`` of gazerig.robot.app.surroundings: a world as one of its rigs is in it.
+    """A ``RunRoom`` of gazerig.robot.app.surroundings: a world as one of its rigs is in it.
 
     Attributes:
         world: the world.
@@ -47,7 +47,7 @@ class RigRoom:
         head: where its head is.
         heads: the world's other heads, None where they are not shown.
         info: what a recording keeps of it but for its beginning, None without a recording.
-        stands: as of ``Room.stands``.
+        stands: as of ``RunRoom.stands``.
     """
 
     world: RunWorld
@@ -73,7 +73,7 @@ class RigRoom:
         own: ProgramParts,
         say: Callable[[str], None],
     ) -> Camera:
-        """Return what the rig looks through; arguments as of ``Room.camera``."""
+        """Return what the rig looks through; arguments as of ``RunRoom.camera``."""
         world = self.world
         rendered = RenderedWorld(
             world.spec, world.scene, sight.mount, placed, rng, world.camera, world.number
@@ -127,7 +127,7 @@ def simulated_room(
         clock: of the run.
         world: the world as the rig is in it.
         computed: the same in this process.
-        stands: as of ``Room.stands``.
+        stands: as of ``RunRoom.stands``.
     """
     if options.bus == "ideal":
         ideal, names = world_ideal_bus(rig, computed, world.number), rig.names
@@ -157,7 +157,7 @@ def served_room(
         clock: the host's.
         world: the world as the rig is in it.
         served: the terminals of the rig.
-        stands: as of ``Room.stands``.
+        stands: as of ``RunRoom.stands``.
     """
     buses, number = served.buses, world.number
     wires = RunBus(guarded_rig_bus(rig, served.paths), close=served.close, fault=buses.command)

@@ -4,14 +4,14 @@ from gazerig.config.schema import Rig
 from gazerig.config.shipped import shipped_names
 from gazerig.features.world.shipped import HOME
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.surroundings import GroupRun, Room, Surroundings
+from gazerig.robot.app.surroundings import GroupRun, RunRoom, Surroundings
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.recording.world_info import WorldInfo
 from gazerig.sim_mock.scenes.scene import Scene
 
 
-class World(Surroundings):
+class WorldSurroundings(Surroundings):
     """A world with physics of a script's name or path, or of a user's own MJCF file.
 
     Modules are imported where they are used: MuJoCo's and the people's are heavy.
@@ -23,7 +23,7 @@ class World(Surroundings):
 
         return world_scene(asked_world(options), options.seed)
 
-    def open(self, rig: Rig, options: RunOptions, clock: Clock) -> Room:
+    def open(self, rig: Rig, options: RunOptions, clock: Clock) -> RunRoom:
         """Return the world that was asked for, with one rig in it."""
         from gazerig.features.world.run.rig_room import open_room
         from gazerig.features.world.run.run_world import world_of

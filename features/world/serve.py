@@ -1,0 +1,27 @@
+"""Make the world of a server; light, so that MuJoCo is imported only here and as it needs."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gazerig.features.world.gl_context import import_mujoco
+from gazerig.features.world.world_spec import WorldSpec, state_file
+
+if TYPE_CHECKING:
+    from gazerig.features.world.served_world import ServedWorld
+
+
+def serve(folder: Path, clock_s: Callable[[], float]) -> "ServedWorld":
+    """Return the world of a server, as of ``SentSurroundings.make``.
+
+    Args:
+        folder: with what ``WorldSpec.write`` has written.
+        clock_s: the host's time.
+
+    Raises:
+        SetupError: MuJoCo is not installed, or a user's own world cannot be used.
+    """
+    import_mujoco()  # whatever MUJOCO_GL says of pictures
+    from gazerig.features.world.served_world import ServedWorld
+
+    return ServedWorld(WorldSpec.read(folder), state_file(folder), clock_s)
