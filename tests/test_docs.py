@@ -13,6 +13,7 @@ import pytest
 from features_there import needs_all_features
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, each_of_papers, prose, spans
 from ruamel.yaml import YAML
+from whole_program import need_every_feature
 
 import gazerig
 from gazerig.config.bounds import Shape, shapes_of
@@ -192,6 +193,7 @@ READERS_OWN = ("study.yaml", "myrig.yaml", "my.yaml", "myhead.yaml", "agree.yaml
 @needs_all_features
 @each_of_papers("paper")
 def test_files_named_exist(paper: Path) -> None:
+    need_every_feature()
     names = {path.name for folder in (*FOLDERS, "tests") for path in (ROOT / folder).rglob("*.*")}
     for span in spans(paper):
         if re.fullmatch(r"(?:[\w-]+/)+(?:[\w-]+\.(?:py|yaml|md))?", span):
@@ -234,6 +236,7 @@ def _names(node: ast.stmt, over: str = "") -> Iterator[str]:
 @needs_all_features
 @pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
 def test_tests_and_functions_named_exist(paper: Path) -> None:
+    need_every_feature()
     known = defined()
     text = paper.read_text(encoding="utf-8")
     for name in set(re.findall(r"\b(test_[a-z0-9_]+)\b", text)):

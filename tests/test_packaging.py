@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from command_line import parse
 from ruamel.yaml import YAML
+from whole_program import need_every_feature
 
 import gazerig
 
@@ -49,6 +50,7 @@ def test_every_file_that_is_not_python_is_named_as_data() -> None:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_every_pattern_of_data_names_a_file(pattern: str) -> None:
+    need_every_feature()
     assert any(list(folder.glob(pattern)) for folder in packages())
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
 from running_order import COSTS_S, spread
 from shared_compiling import order_of
+from whole_program import need_every_feature
 
 
 def item(file: str, *marks: str) -> Any:
@@ -31,8 +31,7 @@ def test_the_costliest_come_first() -> None:
 
 
 def test_every_file_with_a_cost_is_there() -> None:
-    for feature in ("lab", "study", "world"):
-        pytest.importorskip(f"gazerig.features.{feature}")
+    need_every_feature()
     there = {path.stem.removeprefix("test_") for path in Path(__file__).parent.rglob("test_*.py")}
     assert [name for name in COSTS_S if name not in there] == []
 
