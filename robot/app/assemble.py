@@ -39,8 +39,9 @@ from gazerig.robot.app.rig_limits import (
     own_parts,
     park_rad,
 )
-from gazerig.robot.app.run_bus import RunBus, run_bus
+from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.run_camera import run_camera, sight_of
+from gazerig.robot.app.run_parts import RunBus
 from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.app.run_scene import scene_of
 from gazerig.robot.app.surroundings import RunRoom, surroundings

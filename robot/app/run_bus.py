@@ -1,20 +1,19 @@
 """The bus of one run: real ports, emulated servos (on a pseudo-terminal or here), or ideal ones."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from operator import itemgetter
-from typing import NamedTuple
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port_owner import refuse_owner
-from gazerig.drivers.types import ServoBus
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
 from gazerig.robot.app.camera_factory import HeadPose
 from gazerig.robot.app.emulation import emulated_lines, ideal_bus, place_of
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_parts import RunBus, TrueSteps
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import PoseHistory
@@ -22,33 +21,6 @@ from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
-
-TrueSteps = Callable[[], Mapping[str, float]]
-"""Returns the true positions of the servos now in steps, by joint."""
-
-
-def _no_digest() -> str | None:
-    return None
-
-
-def _nothing() -> None:
-    return None
-
-
-class RunBus(NamedTuple):
-    """The bus of the rig.
-
-    true_steps: where the servos truly are, None where that is unknown in this process
-    digest: returns the SHA-256 of all bytes sent, None where they are not counted
-    close: ends what was started for it
-    fault: carries out a fault command of the emulated servos, None where they are real or ideal
-    """
-
-    bus: ServoBus
-    true_steps: TrueSteps | None = None
-    digest: Callable[[], str | None] = _no_digest
-    close: Callable[[], None] = _nothing
-    fault: Callable[[str], str] | None = None
 
 
 def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:

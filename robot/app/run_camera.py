@@ -1,7 +1,6 @@
 """The camera of a run: where it sits, and what it looks at."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,19 +11,12 @@ from gazerig.gaze.types import Mat3
 from gazerig.robot.app.camera_factory import locator_of, real_camera, scene_camera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.app.run_bus import RunBus, true_head
+from gazerig.robot.app.run_bus import true_head
+from gazerig.robot.app.run_parts import RunBus, Sight
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams, NewestPose, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.sim_mock.scenes.scene import Scene
-
-
-class Sight(NamedTuple):
-    """Where the camera sits, where the head was when, and who else receives it."""
-
-    mount: CameraMount
-    poses: PoseHistory
-    turns: PoseBuffer | None
 
 
 def sight_of(

@@ -23,8 +23,8 @@ from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.app.run_bus import RunBus, in_process
-from gazerig.robot.app.run_camera import Sight
+from gazerig.robot.app.run_bus import in_process
+from gazerig.robot.app.run_parts import RunBus, Sight
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraParams
