@@ -15,6 +15,10 @@ COMMANDS = {
     "study": ("study",),
     "lab": ("report", "compare", "sweep", "fit-scanpath", "study"),
     "world": ("study",),
+    "bringup": (
+        *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
+        "record-gesture",
+    ),
 }
 IN_WORLD = ("run", "desk", "--mock", "--fast", "--no-page", "--world", "living-room")
 """An option that is the world's; a feature with commands names what is missing by the first."""

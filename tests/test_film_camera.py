@@ -39,7 +39,7 @@ class Film:
             raise CameraError("the film is not open")
         assert not self.read or number > self.read[-1]
         self.read.append(number)
-        return np.full((12, 16, 3), number % 256, np.uint8)
+        return np.full((128, 128, 3), number % 256, np.uint8)
 
     def shot(self, number: int) -> Shot:
         return Shot(self.due_s(number), number, self.image(number))
