@@ -90,7 +90,7 @@ def test_picture_comes_through_after_the_delay(camera):
     assert camera.latest(0.0999) is first
     second = camera.latest(0.101)
     assert (second.number, second.captured_s) == (2, 0.04)
-    assert (second.width_px, second.height_px) == (16, 12)
+    assert (second.width_px, second.height_px) == (128, 128)
     assert int(second.image[0, 0, 0]) == 2
 
 
