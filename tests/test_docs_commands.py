@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 from command_line import options, parse, typed
+from features_there import needs_all_features
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_papers, spans
 
 import gazerig
@@ -23,6 +24,8 @@ from gazerig.sim_mock.dynamixel.chain import DynamixelChain
 from gazerig.sim_mock.feetech.chain import FeetechChain
 from gazerig.sim_mock.maestro.faults import COMMANDS as MAESTRO
 from gazerig.sim_mock.pty.client import PtyBus
+
+pytestmark = needs_all_features  # the documents describe every command
 
 DYNAMIXEL, FEETECH = DynamixelChain.commands, FeetechChain.commands
 
