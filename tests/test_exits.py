@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from attack.exits import EXITS, INTERFACES, case, meets
 from branch import Branch
+from features_there import skip_without
 
 pytestmark = pytest.mark.own_timeouts
 
@@ -41,6 +42,8 @@ def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[byte
     ],
 )
 def test_no_servo_keeps_its_torque(kind: str, interface: str, exit_: str) -> None:
+    if interface == "study":
+        skip_without("study")
     row = case(kind, interface, exit_, begin)
     assert row.void == "" and row.of > 0
     assert row.powered == 0
