@@ -105,8 +105,10 @@ class Lent:
         self.own.found = found(1)
         self.before: list[int] = []
         self.placed: list[bool] = []
-        self.camera = BorrowedCamera(cast(Camera, self.own), self.make, lambda: self.now_s)
-        self.camera.placed = lambda: self.placed.append(self.camera.lent)
+        self.camera = BorrowedCamera(
+            cast(Camera, self.own), self.make, lambda: self.now_s,
+            lambda: self.placed.append(self.camera.lent),
+        )  # fmt: skip
 
     def make(self, source: Callable[[], Any], before: int) -> CameraProcess:
         self.before.append(before)
@@ -167,13 +169,13 @@ def test_an_emulated_rig_can_be_lent_a_camera_that_stands_still() -> None:
         camera = made.robot.camera
         assert isinstance(camera, BorrowedCamera) and made.mount.on_head
         camera.lent = True
-        camera.placed()
+        camera._place()
         still = CameraMount(standing_still(rig.camera, made.shown().kinematics))
         level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         assert not made.mount.on_head
         assert made.mount.pose(level, (0.0, 0.0, 9.0)) == still.pose(level, (0.0, 0.0, 0.0))
         camera.lent = False
-        camera.placed()
+        camera._place()
         assert made.mount.on_head
     finally:
         made.close()

@@ -17,7 +17,6 @@ from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.robot.app.animation_tables import animation_tables
-from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import (
     lendable,
     placed_camera,
@@ -195,7 +194,9 @@ def assemble(
                 rig, options, scene, sight, wires, random.camera, camera, clock, program,
             )  # fmt: skip
         if options.mock and not options.fast:
-            seen = lendable(seen, rig, clock)
+            seen = lendable(
+                seen, rig, clock, lambda: sight.mount.retune(placement.camera(live.rig))
+            )
         parts = _components(
             rig, _body(rig, wires), kinematics, seen, sight.mount, camera, walk, random,
             _gyro_fusion(options, messages.append),
@@ -204,8 +205,6 @@ def assemble(
             lambda rig: placed_camera(rig, options, kinematics, seen)[0], camera.mount
         )
         live = LiveParams(parts, rig, placement)
-        if isinstance(seen, BorrowedCamera):
-            seen.placed = lambda: sight.mount.retune(placement.camera(live.rig))
         robot = _robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
     except BaseException:
         wires.close()

@@ -38,9 +38,9 @@ class BorrowedCamera:
         own: the rig's.
         make: returns the process that looks at the browser's pictures.
         now_s: the host's clock.
+        place: called in the loop's thread when ``lent`` has changed, to place the camera again.
 
     lent: the browser's camera stands in
-    placed: called in the loop's thread when that has changed, to place the camera anew
     """
 
     def __init__(
@@ -48,10 +48,11 @@ class BorrowedCamera:
         own: Camera,
         make: Make,
         now_s: Callable[[], float],
+        place: Callable[[], None],
     ) -> None:
         self.own = own
         self.lent = False
-        self.placed: Callable[[], None] = _nowhere
+        self._place = place
         self._make, self._now_s = make, now_s
         self._pictures = JpegSlot()
         self._process: CameraProcess | None = None
@@ -101,7 +102,7 @@ class BorrowedCamera:
             return self.own.latest(now_s)
         if not self.lent:
             self.lent = True
-            self.placed()
+            self._place()
             self._events.append(_BEGINS)
         return found
 
@@ -110,7 +111,7 @@ class BorrowedCamera:
         threading.Thread(target=process.close, name="browser camera", daemon=True).start()
         if self.lent:
             self.lent = False
-            self.placed()
+            self._place()
             self._events.append(_ENDS)
 
     def events(self) -> tuple[str, ...]:
@@ -130,7 +131,3 @@ class BorrowedCamera:
             both.callback(self.own.close)
             if process is not None:
                 both.callback(process.close)
-
-
-def _nowhere() -> None:
-    """Place nothing: nobody has said how."""

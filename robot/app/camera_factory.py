@@ -107,7 +107,7 @@ def placed_camera(
     return standing_still(rig.camera, kinematics), (note,)
 
 
-def lendable(own: Camera, rig: Rig, clock: Clock) -> BorrowedCamera:
+def lendable(own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]) -> BorrowedCamera:
     """Return an emulated rig's camera, in whose place a browser's may stand."""
     field_rad = radians(FIELD_DEG)
     detector = partial(face_detector, rig.detector)
@@ -118,7 +118,7 @@ def lendable(own: Camera, rig: Rig, clock: Clock) -> BorrowedCamera:
         parts = CameraParts(source, detector, motion, locate)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery, before)
 
-    return BorrowedCamera(own, process, clock.now_s)
+    return BorrowedCamera(own, process, clock.now_s, place)
 
 
 def real_camera(
