@@ -11,7 +11,6 @@ from rendering import why_not
 
 import gazerig
 from gazerig.config.schema import load_rig
-from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.world import gl_context
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.robot.app.assemble import assemble
@@ -20,6 +19,8 @@ from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose, run
 from gazerig.robot.recording.read import RunRecording
 from gazerig.sim_mock.cameras.detections import SceneCamera
+
+simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
 
 FAST = RunOptions(
     mock=True, fast=True, seed=3, world="living-room", no_pictures=True, seconds=1.0
