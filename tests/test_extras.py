@@ -71,6 +71,7 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
     assert not list(tmp_path.iterdir())
 
 
+@needs_all_features
 def test_the_head_runs_without_extras(python: LightPython, tmp_path: Path) -> None:
     codes, said = without_extras(
         python,
@@ -93,6 +94,7 @@ def test_a_package_that_is_there_and_does_not_load_is_told_with_the_reason() -> 
     assert extra_hint("depthai", "oak", within).startswith("depthai cannot be loaded (No module")
 
 
+@needs_all_features
 def test_every_extra_that_is_named_brings_its_package_and_the_tests_have_them_all() -> None:
     named = {
         (package, extra)
