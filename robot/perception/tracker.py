@@ -9,14 +9,11 @@ the detection by a Kalman filter of direction and range (kalman).
 from dataclasses import dataclass, field
 from math import inf, sqrt
 
-import numpy as np
-
 from gazerig.drivers.camera.located_frame import Clothing, FaceSigns
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
-from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.data_association import (
-    FORBIDDEN,
     NO_MARK,
     UNPAIRED,
     DetectionRow,
@@ -26,20 +23,13 @@ from gazerig.robot.perception.data_association import (
     pair_costs,
 )
 from gazerig.robot.perception.gaze_at_head import SeenEyes
+from gazerig.robot.perception.identities import KnownClothes, settle
 from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, sight
 from gazerig.robot.perception.speech import NO_SPEECH, Speech
 
 FACE = "face"
 """What people are called, also while their face is not seen."""
 _FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
-# How fast the colours of clothes are learned, and how fast if they do not fit; and in how many
-# frames they must have been seen to tell who somebody is.
-_COLOURS_GAIN, _UNFIT_GAIN, _PROVED, _OWN = 0.15, 0.005, 3, 60
-# Clothes that cost more than this do not fit; two people change their numbers when that costs so
-# much less, summed over frames, of each no more than the third number.
-_GAP_S, _LOST_S = 0.12, 0.25
-_CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
-_FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
 # Below this part of its usual measure the lower half of a face is covered, if that is so many
 # standard deviations of a frame below too; one frame alone is about so uncertain, as a part.
 _COVERED, _COVERED_SDS, _SHAPE_SD = 0.8, 4.0, 0.1
@@ -48,10 +38,6 @@ _COVERED, _COVERED_SDS, _SHAPE_SD = 0.8, 4.0, 0.1
 _BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 8, 0.03, 1.5, 0.03
 # Points that are guessed jump: a face is covered for so long after it was seen to be.
 _COVERED_S = 0.3
-# Inner product of colours that are much alike.
-_LIKE = 0.9
-# A doubt goes within so many frames in which nothing speaks for it.
-_DOUBT_KEPT = 0.9
 UNNAMED = "thing"
 """What a moving patch is called whose kind is not known; a named one is always itself."""
 
@@ -125,11 +111,7 @@ class Track:
         that was too uncertain
     speech: of a face, how its mouth has moved lately
     eyes: of a face, what its eyes did when they were seen last
-    colours: of a person, those of the clothes as they usually are seen, as in ``Clothing``
-    dressed: in how many frames they were seen, parts of them counting as such
-    doubts: how much more they are like those of others, by the numbers of these, as a cost
-    confirmed: in how many frames they were its own since it was out of sight
-    lost_sight: whether it was out of sight and they have not been seen to be its own since
+    clothes: of a person, as they usually are seen
     box_m, lower_face: as of a detection, of the face as it usually is; bare: in how many frames
         they were seen; lower_var: its variance from frame to frame, as a part of it
     covered: for how many frames the lower half of the face has been covered; covered_s: capture
@@ -149,10 +131,7 @@ class Track:
     speech: Speech = NO_SPEECH
     eyes: SeenEyes | None = None
     faced_s: float = -inf
-    colours: Floats | None = None
-    dressed: float = 0.0
-    confirmed: float = 0.0
-    lost_sight: bool = False
+    clothes: KnownClothes = field(default_factory=KnownClothes)
     box_m: float = 0.0
     lower_face: float = 0.0
     lower_var: float = _SHAPE_SD * _SHAPE_SD
@@ -160,7 +139,6 @@ class Track:
     covered: int = 0
     covered_s: float = -inf
     cover_share: float = 1.0
-    doubts: dict[int, float] = field(default_factory=dict)
 
     @property
     def p_world_m(self) -> Vec3:
@@ -233,7 +211,7 @@ class Tracker:
         for i, j in pairs:
             self._update(self._tracks[i], detections[j], p_world_camera_m)
         if self._worn is not None:
-            self._settle(self._worn, dict(pairs), detections)
+            settle(self._tracks, self._worn, dict(pairs), detections, self._params)
         taken = {j for _, j in pairs}
         renamed = {
             found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
@@ -309,98 +287,10 @@ class Tracker:
             for track in self._tracks
         ]
         self._worn = clothing_costs(
-            [track.colours for track in self._tracks], [found.clothing for found in detections]
+            [track.clothes.colours for track in self._tracks],
+            [found.clothing for found in detections],
         )
         return pair_costs(tracks, rows, self._params, self._worn)
-
-    def _settle(
-        self,
-        worn: list[list[float]],
-        column: dict[int, int],
-        detections: list[LocalisedDetection],
-    ) -> None:
-        """Give people who were confused while they were hidden the numbers of their clothes.
-
-        Who comes out from behind another shows the face first, and the clothes later.
-
-        Args:
-            worn: what clothes tell of each pair of track and detection, as a cost.
-            column: the detection of each track that has one.
-            detections: of the frame.
-        """
-        tracks, sure = self._tracks, True
-        for i, j in column.items():
-            track, own = tracks[i], worn[i][j]
-            clothing = detections[j].clothing
-            if clothing is None or not track.is_person:
-                continue
-            new = max(own, 0.0) if track.dressed < _OWN else own  # may be one who was here before
-            share = clothing.share
-            if new < _FITS:
-                track.confirmed = min(track.confirmed + share, _MOST_CONFIRMED)
-            elif own > _MISFITS:
-                track.confirmed -= share
-            if track.confirmed >= _CONFIRMED:
-                track.doubts, track.lost_sight = {}, False
-                continue
-            before, track.doubts = track.doubts, {}
-            for k, other in enumerate(tracks):
-                lost = other.at_s - other.seen_s > _LOST_S
-                if not lost and not (k in column and (track.lost_sight or other.lost_sight)):
-                    continue
-                if k != i and other.dressed >= _PROVED and other.is_person:
-                    than = new if lost else own
-                    gain = max(than - worn[k][j], -_MOST_OF_FRAME)
-                    gain = min(gain, _MOST_OF_FRAME if worn[k][j] < _FITS else 0.0)
-                    doubt = _DOUBT_KEPT * before.get(other.id, 0.0) + gain
-                    if doubt > 1.0:
-                        track.doubts[other.id] = doubt
-                        sure = sure and doubt < _SURE
-        if not sure:
-            self._renumber(
-                [
-                    tracks[i]
-                    for i in column
-                    if tracks[i].is_person and tracks[i].confirmed < _CONFIRMED
-                ]
-            )
-
-    def _renumber(self, seen: list[Track]) -> None:
-        """Give the tracks in sight the numbers that fit all of them best; they exchange them."""
-        people = [
-            track
-            for track in self._tracks
-            if track.is_person and (track in seen or track.at_s - track.seen_s > _LOST_S)
-        ]
-        costs = [
-            [
-                0.0 if one is other else _SURE - one.doubts.get(other.id, 0.0)
-                if other.seen_s == other.at_s or self._reachable(one, other) else FORBIDDEN
-                for other in people
-            ]
-            for one in seen
-        ]  # fmt: skip
-        persons = [(one.id, one.colours, one.dressed) for one in people]
-        place = {column: seen[row] for row, column in assign(costs)}
-        free = [one for one in people if one not in place.values()]
-        for k, one in enumerate(people):
-            if k not in place and one in free:
-                place[k] = one
-                free.remove(one)
-        for k, person in enumerate(persons):
-            one = place[k] if k in place else free.pop()
-            if one is not people[k]:
-                one.id, one.colours, one.dressed = person
-                one.doubts, one.confirmed = {}, 0.0
-                if one.seen_s < one.at_s and one.dressed < _OWN:
-                    self._tracks.remove(one)  # nobody new came: that was this one
-
-    def _reachable(self, one: Track, other: Track) -> bool:
-        """Return whether a person out of sight can have come to where a track is."""
-        known = 2.0 * sqrt(one.filter.along.p + other.filter.along.p)
-        gone = self._params.gate_speed_m_s * (other.at_s - other.seen_s)
-        reach = self._params.gate_m * max(1.0, one.filter.range_m) + gone + known
-        return norm(sub(one.p_world_m, other.p_world_m)) < reach
 
     def _moved_m(self, track: Track) -> float:
         """Return how much farther a track may be from its expected place for every time unseen."""
@@ -428,7 +318,7 @@ class Tracker:
         self._next_id += 1
         self._learn_size(track, detection, 1.0)
         _learn_shape(track, detection)
-        _learn_colours(track, detection.clothing)
+        track.clothes.learn(detection.clothing)
         _correct_velocity(track, detection)
         return track
 
@@ -445,10 +335,9 @@ class Tracker:
         _correct_velocity(track, detection)
         if track.is_person:
             track.filter.slow_to(_FASTEST_M_S)
-        if track.at_s - track.seen_s > _GAP_S:
-            track.confirmed, track.lost_sight = 0.0, True
+        track.clothes.miss(track.at_s - track.seen_s)
         track.seen_s = track.at_s
-        _learn_colours(track, detection.clothing)
+        track.clothes.learn(detection.clothing)
         R = detection.R_world_face
         if R is None and self.shows_face(track):
             return  # the face was missed in this frame
@@ -516,23 +405,6 @@ def _learn_shape(track: Track, found: LocalisedDetection) -> None:
     gain = max(1.0 / (track.bare + _BARE), _SHAPE_GAIN)
     if track.bare > 1:
         track.lower_var += gain * ((off / track.lower_face) ** 2 - track.lower_var)
-
-
-def _learn_colours(track: Track, clothing: Clothing | None) -> None:
-    """Learn how a person is dressed, the slower the less of it is seen."""
-    if clothing is None:
-        return
-    track.dressed += clothing.share
-    seen, before = np.array(clothing.colours), track.colours
-    if before is None:
-        track.colours = seen
-        return
-    fits = float(before @ seen) > _LIKE
-    gain = clothing.share * (
-        max(_COLOURS_GAIN, 1.0 / (1.0 + track.dressed)) if fits else _UNFIT_GAIN
-    )
-    mean = before + gain * (seen - before)
-    track.colours = mean / sqrt(float(mean @ mean))
 
 
 def _became_another(track: Track, renamed: set[int]) -> bool:
