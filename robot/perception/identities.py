@@ -1,6 +1,6 @@
 """Identities: people who were confused while they were hidden get their numbers back.
 
-What tells them apart is the colours of their clothes, as they were seen in many frames.
+The colours of their clothes, learned over many frames, distinguish them.
 """
 
 from dataclasses import dataclass, field
@@ -18,34 +18,34 @@ from gazerig.robot.perception.data_association import FORBIDDEN, assign
 if TYPE_CHECKING:
     from gazerig.robot.perception.tracker import LocalisedDetection, Track
 
-# How fast the colours of clothes are learned, and how fast if they do not fit; in how many frames
-# they must have been seen to tell who somebody is; and in how many until nobody takes the person
-# for one who was here before.
+# Gain with which the colours of clothes are learned, and gain if they do not fit; number of frames
+# after which they identify a person; number of frames below which the person may be one who was
+# here before.
 _COLOURS_GAIN, _UNFIT_GAIN, _PROVED, _OWN = 0.15, 0.005, 3, 60
 # Inner product of colours that are much alike.
 _LIKE = 0.9
-# Who was not seen for longer than the first has been out of sight; who is not for longer than the
-# second is lost.
+# A person who was not seen for longer than the first time was out of sight; one who is not seen for
+# longer than the second is lost.
 _GAP_S, _LOST_S = 0.12, 0.25
-# In so many frames they must be one's own; no more than so many count; clothes that cost more than
-# the third do not fit.
+# Number of frames that confirm a person's clothes; largest number that counts; cost above which
+# clothes do not fit.
 _CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
-# Clothes that cost less than the first fit; two people change their numbers when that costs so
-# much less, summed over frames, of each no more than the third number.
+# Cost below which clothes fit; advantage, summed over frames, at which two people exchange their
+# numbers; largest advantage of one frame.
 _FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
-# A doubt goes within so many frames in which nothing speaks for it.
+# Share of a doubt that remains after a frame without evidence for it.
 _DOUBT_KEPT = 0.9
 
 
 @dataclass(slots=True)
 class KnownClothes:
-    """What is known of the clothes of one person.
+    """Clothes of one person, as learned so far.
 
-    colours: as they usually are seen, as in ``Clothing``
-    frames: in how many frames they were seen, parts of them counting as such
-    confirmed: in how many frames they were the person's own since the person was out of sight
+    colours: their mean, as in ``Clothing``
+    frames: number of frames with clothes; a frame that shows a part counts as that part
+    confirmed: number of frames in which they fitted since the person was out of sight
     lost_sight: whether the person was out of sight, and they were not confirmed since
-    doubts: how much more they are like those of others, by the numbers of these, as a cost
+    doubts: by the number of another person, how much better that person's clothes fit, as a cost
     """
 
     colours: Floats | None = None
@@ -55,7 +55,7 @@ class KnownClothes:
     doubts: dict[int, float] = field(default_factory=dict)
 
     def miss(self, unseen_s: float) -> None:
-        """Note for how long the person was not seen before this frame."""
+        """Start the confirmation again if the person was out of sight, for a time in seconds."""
         if unseen_s > _GAP_S:
             self.confirmed, self.lost_sight = 0.0, True
 
@@ -85,14 +85,14 @@ def settle(
 ) -> None:
     """Give people who were confused while they were hidden the numbers of their clothes.
 
-    Who comes out from behind another shows the face first, and the clothes later.
+    A person who comes out from behind another shows the face first, and the clothes later.
 
     Args:
-        tracks: all of them; one that proves to be another's is taken out.
-        worn: what clothes tell of each pair of track and detection, as a cost.
+        tracks: all tracks; one that turns out to be a copy of another is removed.
+        worn: cost of the clothes of each pair of track and detection.
         column: the detection of each track that has one.
         detections: of the frame.
-        params: in force.
+        params: of tracking.
     """
     sure = True
     for i, j in column.items():
