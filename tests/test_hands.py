@@ -17,7 +17,7 @@ from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.hands import HAND, Hands, Known
-from gazerig.robot.perception.tracker import LocalisedDetection
+from gazerig.robot.perception.track import LocalisedDetection
 from gazerig.sim_mock.scenes.group import HEAD_M
 from gazerig.sim_mock.scenes.registry import scenes
 

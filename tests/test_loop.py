@@ -27,7 +27,8 @@ from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.tracker import LocalisedDetection, Tracker
+from gazerig.robot.perception.track import LocalisedDetection
+from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.scenes.visitor import Visitor
 
 

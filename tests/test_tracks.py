@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from gazerig.drivers.camera.located_frame import Clothing
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import covariance
-from gazerig.robot.perception.tracker import LocalisedDetection, Track, Tracker, blended
+from gazerig.robot.perception.track import LocalisedDetection, Track
+from gazerig.robot.perception.tracker import Tracker, blended
 
 CAMERA = (0.0, 0.0, 0.2)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

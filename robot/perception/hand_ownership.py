@@ -14,7 +14,7 @@ from math import hypot
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.hands import Known
-from gazerig.robot.perception.tracker import UNNAMED, LocalisedDetection
+from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
 
 _HEAD_M, _HALF_WIDTH_M, _BELOW_M, _ABOVE_M = 0.25, 0.35, 1.7, 0.25
 # Beside that in depth, and two standard deviations of it.

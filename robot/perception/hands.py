@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Vec3
-from gazerig.robot.perception.tracker import UNNAMED, LocalisedDetection
+from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
 
 HAND = "hand"
 Known = tuple[Vec3, Vec3 | None]

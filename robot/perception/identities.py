@@ -3,30 +3,18 @@
 The colours of their clothes, learned over many frames, distinguish them.
 """
 
-from dataclasses import dataclass, field
 from math import sqrt
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from gazerig.drivers.camera.located_frame import Clothing
 from gazerig.gaze.angles import norm, sub
-from gazerig.gaze.types import Floats
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.data_association import FORBIDDEN, assign
+from gazerig.robot.perception.track import KnownClothes, LocalisedDetection, Track
 
-if TYPE_CHECKING:
-    from gazerig.robot.perception.tracker import LocalisedDetection, Track
-
-# Gain with which the colours of clothes are learned, and gain if they do not fit; number of frames
-# after which they identify a person; number of frames below which the person may be one who was
-# here before.
-_COLOURS_GAIN, _UNFIT_GAIN, _PROVED, _OWN = 0.15, 0.005, 3, 60
-# Inner product of colours that are much alike.
-_LIKE = 0.9
-# A person who was not seen for longer than the first time was out of sight; one who is not seen for
-# longer than the second is lost.
-_GAP_S, _LOST_S = 0.12, 0.25
+# Number of frames with clothes after which they identify a person; number below which the person
+# may be one who was here before.
+_PROVED, _OWN = 3, 60
+# A person who is not seen for longer than this is lost.
+_LOST_S = 0.25
 # Number of frames that confirm a person's clothes; largest number that counts; cost above which
 # clothes do not fit.
 _CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
@@ -37,50 +25,11 @@ _FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
 _DOUBT_KEPT = 0.9
 
 
-@dataclass(slots=True)
-class KnownClothes:
-    """Clothes of one person, as learned so far.
-
-    colours: their mean, as in ``Clothing``
-    frames: number of frames with clothes; a frame that shows a part counts as that part
-    confirmed: number of frames in which they fitted since the person was out of sight
-    lost_sight: whether the person was out of sight, and they were not confirmed since
-    doubts: by the number of another person, how much better that person's clothes fit, as a cost
-    """
-
-    colours: Floats | None = None
-    frames: float = 0.0
-    confirmed: float = 0.0
-    lost_sight: bool = False
-    doubts: dict[int, float] = field(default_factory=dict)
-
-    def miss(self, unseen_s: float) -> None:
-        """Start the confirmation again if the person was out of sight, for a time in seconds."""
-        if unseen_s > _GAP_S:
-            self.confirmed, self.lost_sight = 0.0, True
-
-    def learn(self, clothing: Clothing | None) -> None:
-        """Learn how the person is dressed, the slower the less of it is seen."""
-        if clothing is None:
-            return
-        self.frames += clothing.share
-        seen, before = np.array(clothing.colours), self.colours
-        if before is None:
-            self.colours = seen
-            return
-        fits = float(before @ seen) > _LIKE
-        gain = clothing.share * (
-            max(_COLOURS_GAIN, 1.0 / (1.0 + self.frames)) if fits else _UNFIT_GAIN
-        )
-        mean = before + gain * (seen - before)
-        self.colours = mean / sqrt(float(mean @ mean))
-
-
 def settle(
-    tracks: "list[Track]",
+    tracks: list[Track],
     worn: list[list[float]],
     column: dict[int, int],
-    detections: "list[LocalisedDetection]",
+    detections: list[LocalisedDetection],
     params: TrackParams,
 ) -> None:
     """Give people who were confused while they were hidden the numbers of their clothes.
@@ -125,7 +74,7 @@ def settle(
         _renumber(tracks, [track for track in unsure if track.is_person], params)
 
 
-def _renumber(tracks: "list[Track]", seen: "list[Track]", params: TrackParams) -> None:
+def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> None:
     """Give the tracks in sight the numbers that fit all of them best; they exchange them."""
     people = [
         track
@@ -156,7 +105,7 @@ def _renumber(tracks: "list[Track]", seen: "list[Track]", params: TrackParams) -
                 tracks.remove(one)  # nobody new came: that was this one
 
 
-def _reachable(one: "Track", other: "Track", params: TrackParams) -> bool:
+def _reachable(one: Track, other: Track, params: TrackParams) -> bool:
     """Return whether a person out of sight can have come to where a track is."""
     known = 2.0 * sqrt(one.filter.along.p + other.filter.along.p)
     gone = params.gate_speed_m_s * (other.at_s - other.seen_s)

@@ -3,7 +3,7 @@
 from gazerig.drivers.camera.located_frame import DetectionInCamera
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.perception.tracker import LocalisedDetection
+from gazerig.robot.perception.track import LocalisedDetection
 
 
 def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> LocalisedDetection:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from gazerig.gaze.angles import norm, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.capsule import Capsule
-from gazerig.robot.perception.tracker import UNNAMED, LocalisedDetection
+from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
 
 OWN = "own"
 

@@ -39,7 +39,8 @@ from gazerig.robot.perception.kalman import Variances
 from gazerig.robot.perception.localisation import placed
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.own_body import OwnParts, own_named
-from gazerig.robot.perception.tracker import UNNAMED, LocalisedDetection, Track, Tracker
+from gazerig.robot.perception.track import UNNAMED, LocalisedDetection, Track
+from gazerig.robot.perception.tracker import Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
