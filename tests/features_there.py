@@ -1,6 +1,7 @@
 """Tests that need the features that the package ships: skipped where a folder was deleted."""
 
 from collections.abc import Callable
+from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
@@ -9,12 +10,8 @@ import pytest
 from gazerig.drivers.plugins import COMMAND, SHIPPED
 
 
-def is_there(command: str) -> bool:
-    """Return whether the feature of a command is there; those of the core always are."""
-    return _is_there(SHIPPED[COMMAND].get(command, "gazerig.features"))
-
-
-def _is_there(part: str) -> bool:
+@cache
+def is_there(part: str) -> bool:
     """Return whether the feature of a part "module:attribute" is there, or it is the core's."""
     if not part.startswith("gazerig.features."):
         return True
@@ -23,16 +20,23 @@ def _is_there(part: str) -> bool:
 
 def skip_without_part(part: str) -> None:
     """Skip a test of a part "module:attribute" whose feature is not there."""
-    if not _is_there(part):
+    if not is_there(part):
         pytest.skip(f"the feature of {part} is not there")
 
 
 def skip_without(command: str) -> None:
-    """Skip a test of a command whose feature is not there."""
-    if not is_there(command):
-        pytest.skip(f"the feature of {command} is not there")
+    """Skip a test of a command whose feature is not there; those of the core always are."""
+    skip_without_part(SHIPPED[COMMAND].get(command, ""))
+
+
+def need_every_feature() -> None:
+    """Skip a test of the whole program where a feature was deleted."""
+    for parts in SHIPPED.values():
+        for part in parts.values():
+            skip_without_part(part)
 
 
 needs_all_features: Callable[[Any], Any] = pytest.mark.skipif(
-    not all(map(is_there, SHIPPED[COMMAND])), reason="a feature is not there"
+    not all(is_there(part) for parts in SHIPPED.values() for part in parts.values()),
+    reason="a feature is not there",
 )

@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from features_there import needs_all_features
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, blocks, each_of_papers, prose, spans
 from ruamel.yaml import YAML
-from whole_program import need_every_feature
 
 import gazerig
 from gazerig.config.bounds import Shape, shapes_of
@@ -190,10 +188,8 @@ READERS_OWN = ("study.yaml", "myrig.yaml", "my.yaml", "myhead.yaml", "agree.yaml
 """Files that a reader writes."""
 
 
-@needs_all_features
 @each_of_papers("paper")
 def test_files_named_exist(paper: Path) -> None:
-    need_every_feature()
     names = {path.name for folder in (*FOLDERS, "tests") for path in (ROOT / folder).rglob("*.*")}
     for span in spans(paper):
         if re.fullmatch(r"(?:[\w-]+/)+(?:[\w-]+\.(?:py|yaml|md))?", span):
@@ -233,10 +229,8 @@ def _names(node: ast.stmt, over: str = "") -> Iterator[str]:
                 yield over + target.id
 
 
-@needs_all_features
 @pytest.mark.parametrize("paper", [*PAPERS, ROOT / "CHANGELOG.md"], ids=lambda path: path.name)
 def test_tests_and_functions_named_exist(paper: Path) -> None:
-    need_every_feature()
     known = defined()
     text = paper.read_text(encoding="utf-8")
     for name in set(re.findall(r"\b(test_[a-z0-9_]+)\b", text)):
@@ -286,7 +280,6 @@ SAID = {
 """Spans that name nothing which could be looked up."""
 
 
-@needs_all_features
 @each_of_papers("paper")
 def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper == EMULATOR:

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
+from features_there import need_every_feature
 from mutants import ALL, Mutant
-from whole_program import need_every_feature
 
 ROOT = Path(__file__).parents[1]
 

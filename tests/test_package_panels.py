@@ -32,6 +32,7 @@ def test_panels_of_packages_are_drawn_and_failures_named(tmp_path: Path) -> None
     with on_path(tmp_path):
         widgets = Widgets()
         panels = PackagePanels(widgets.panel("watch"))
+        panels.begin()
         for _ in range(3):
             panels.update(looking(0.0))
         panels.draw()

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 from command_line import parse
+from features_there import needs_all_features
 from ruamel.yaml import YAML
-from whole_program import need_every_feature
 
 import gazerig
 
@@ -48,9 +48,9 @@ def test_every_file_that_is_not_python_is_named_as_data() -> None:
     assert len(data) > 10 and named.issuperset(data)
 
 
+@needs_all_features
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_every_pattern_of_data_names_a_file(pattern: str) -> None:
-    need_every_feature()
     assert any(list(folder.glob(pattern)) for folder in packages())
 
 

@@ -7,7 +7,7 @@ import typer
 from features_there import skip_without
 from typer.core import TyperGroup
 
-from gazerig.robot.cli.examples import PANELS
+from gazerig.robot.cli.command_list import PANELS
 from gazerig.robot.cli.main import app
 
 

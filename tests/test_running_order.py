@@ -4,9 +4,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from features_there import needs_all_features
 from running_order import COSTS_S, spread
 from shared_compiling import order_of
-from whole_program import need_every_feature
 
 
 def item(file: str, *marks: str) -> Any:
@@ -30,8 +30,8 @@ def test_the_costliest_come_first() -> None:
     assert costs == sorted(COSTS_S.values(), reverse=True)
 
 
+@needs_all_features
 def test_every_file_with_a_cost_is_there() -> None:
-    need_every_feature()
     there = {path.stem.removeprefix("test_") for path in Path(__file__).parent.rglob("test_*.py")}
     assert [name for name in COSTS_S if name not in there] == []
 

@@ -15,12 +15,11 @@ def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
     points: list[tuple[float, float]] = face.landmarks_px.tolist()
     if not points:
         return False  # a face without points: whoever needs them says so
-    xs, ys = [x for x, _ in points], [y for _, y in points]
-    x, y = sum(xs) / len(xs), sum(ys) / len(ys)
+    x, y = sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
     if isnan(x) or isnan(y):
         return False  # no numbers: the same
     outside = _outside_px(x, y, width_px, height_px)
-    return outside > 0.0 or _is_misplaced(xs, ys, width_px, height_px)
+    return outside > 0.0 or _is_misplaced(points, width_px, height_px)
 
 
 def _outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
@@ -28,10 +27,10 @@ def _outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
     return max(-0.5 - x, x - width_px + 0.5, -0.5 - y, y - height_px + 0.5)
 
 
-def _is_misplaced(xs: list[float], ys: list[float], width_px: int, height_px: int) -> bool:
+def _is_misplaced(points: list[tuple[float, float]], width_px: int, height_px: int) -> bool:
     """Return whether a point lies farther outside the frame than the face is large."""
-    size = max(max(xs) - min(xs), max(ys) - min(ys))
-    return any(_outside_px(x, y, width_px, height_px) > size for x, y in zip(xs, ys, strict=True))
+    size = max((max(along) - min(along) for along in zip(*points, strict=True)), default=0.0)
+    return any(_outside_px(x, y, width_px, height_px) > size for x, y in points)
 
 
 class OffFrameReport:
@@ -47,9 +46,7 @@ class OffFrameReport:
         if self._told:
             return ()
         for face in faces:
-            points: list[tuple[float, float]] = face.landmarks_px.tolist()
-            xs, ys = [x for x, _ in points], [y for _, y in points]
-            if points and _is_misplaced(xs, ys, width_px, height_px):
+            if _is_misplaced(face.landmarks_px.tolist(), width_px, height_px):
                 self._told = True
                 x, y = face.landmarks_px.mean(axis=0).tolist()
                 return (

@@ -20,6 +20,7 @@ from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.ideal.bus import IdealBus
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 
 
@@ -39,14 +40,19 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
             refuse_owner(path, rig.bus_named(name).kind, here)
         return RunBus(guarded_rig_bus(rig, paths))
     if options.bus == "ideal":
-        ideal, names = ideal_bus(rig, clock.now_s), rig.names
-        return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
+        return without_wires(rig, ideal_bus(rig, clock.now_s))
     lines = emulated_lines(rig)
     if not options.fast and has_terminals():
         buses = PtyBuses()
         paths = buses.start(lines)
         return RunBus(guarded_rig_bus(rig, paths), close=buses.stop, fault=buses.command)
     return in_process(rig, {name: build(line, clock.now_s) for name, line in lines.items()})
+
+
+def without_wires(rig: Rig, ideal: IdealBus) -> RunBus:
+    """Return ideal servos of a rig, which know where they are."""
+    names = rig.names
+    return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
 
 
 def in_process(rig: Rig, devices: Mapping[str, Device]) -> RunBus:

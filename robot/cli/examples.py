@@ -6,7 +6,7 @@ from pathlib import Path
 import typer
 
 from gazerig.config.shipped import shipped_names
-from gazerig.robot.cli.command_list import PANELS, Examples, shipped_commands
+from gazerig.robot.cli.command_list import Examples, shipped_commands
 
 EXAMPLES: dict[str, Examples] = {
     "run": (
@@ -122,21 +122,16 @@ def all_examples() -> dict[str, Examples]:
     return EXAMPLES | {k: v for one in shipped_commands().values() for k, v in one.examples.items()}
 
 
-def add_examples(
-    app: typer.Typer, given: Mapping[str, Examples], panels: bool = True, within: str = ""
-) -> None:
+def add_examples(app: typer.Typer, given: Mapping[str, Examples], within: str = "") -> None:
     """Add examples to the help of every command of an app.
 
     Args:
         app: the app.
         given: examples by command; those in a group of a feature with the group's name.
-        panels: whether to put each command into its panel, too.
         within: the group that it is in, "" for none.
     """
     for command in app.registered_commands:
         name = command.name or _dashed(command.callback)
-        if panels:
-            command.rich_help_panel = panel_of(name)
         examples = given.get(f"{within} {name}") or given.get(name)
         if examples:
             command.epilog = epilog(examples)
@@ -145,17 +140,12 @@ def add_examples(
         if part is None:
             continue
         title = part.info.name
-        if isinstance(title, str):
-            group.rich_help_panel = panel_of(title)
-            if title in given:
-                part.info.epilog = epilog(given[title])
-        named = isinstance(title, str)
-        add_examples(part, given, panels and not named, str(title) if named else within)
-
-
-def panel_of(command: str) -> str:
-    """Return the panel of a command in the help of all."""
-    return next((panel for panel, commands in PANELS.items() if command in commands), "Tools")
+        if not isinstance(title, str):  # a module's commands
+            add_examples(part, given, within)
+            continue
+        if title in given:
+            part.info.epilog = epilog(given[title])
+        add_examples(part, given, title)
 
 
 def epilog(examples: Iterable[tuple[str, str]]) -> str:

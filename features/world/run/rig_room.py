@@ -23,7 +23,7 @@ from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.app.run_bus import in_process
+from gazerig.robot.app.run_bus import in_process, without_wires
 from gazerig.robot.app.run_parts import RunBus, Sight
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
@@ -130,8 +130,7 @@ def simulated_room(
         stands: as of ``RunRoom.stands``.
     """
     if options.bus == "ideal":
-        ideal, names = world_ideal_bus(rig, computed, world.number), rig.names
-        wires = RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
+        wires = without_wires(rig, world_ideal_bus(rig, computed, world.number))
     else:
         lines = emulated_lines(rig).items()
         devices = {name: computed.device(line, name, rig=world.number) for name, line in lines}

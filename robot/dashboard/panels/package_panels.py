@@ -34,7 +34,7 @@ class PagePanel(ABC):
 
 
 class PackagePanels:
-    """The panels of all packages; one that fails shows why and is not called again."""
+    """The panels of all packages, made by ``begin``; one that fails shows why and is dropped."""
 
     def __init__(self, place: Container) -> None:
         self._shown: list[tuple[type[PagePanel], Html]] = []
@@ -48,11 +48,11 @@ class PackagePanels:
                 continue
             section = place.section(part.title or one.name, is_open=False, order=_LAST)
             self._shown.append((part, section.html()))
-        self.begin()
+        self._panels: dict[Html, PagePanel] = {}
 
     def begin(self) -> None:
         """Start all panels from nothing."""
-        self._panels: dict[Html, PagePanel] = {}
+        self._panels = {}
         for part, html in self._shown:
             try:
                 self._panels[html] = part()
