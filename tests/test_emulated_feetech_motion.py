@@ -62,6 +62,19 @@ def test_goal_time_decides_how_long_it_takes_or_nothing():
         assert led_to(bench) == pytest.approx(at + (policy == "ignore") * 8)
 
 
+def test_no_goal_time_is_faster_than_the_motor_and_the_next_goal_brings_it_back():
+    bench = one()
+    bench.enable_torque()
+    command(bench, 3048, speed=2000, time_ms=7)
+    bench.wait(0.005)
+    command(bench, 2048, speed=2000, acceleration=170)
+    bench.wait(0.3)
+    # From the motor's top speed on it brakes within 415 steps.
+    assert led_to(bench) < 2048 + 450
+    bench.wait(1.0)
+    assert led_to(bench) == pytest.approx(2048)
+
+
 def test_goal_speed_0_is_the_fastest_of_the_data_sheet():
     bench = one(start=0.0)
     bench.enable_torque()

@@ -6,6 +6,8 @@ others; a fault is data and a name; a restarted servo is set up again and holds 
 """
 
 import random
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from copied import copied
@@ -18,8 +20,10 @@ from present import present
 from sts_rig import Rig
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
+from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE
+from gazerig.drivers.servo_bus.torque import positions
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.rows import rows
@@ -384,3 +388,17 @@ def test_mishap_upon_mishap(seed):
     assert rig.heard() == [True] * 4
     rig.run(0.8, [2100] * 4)
     assert rig.chain.positions_steps() == pytest.approx([2100] * 4, abs=8)
+
+
+@pytest.mark.parametrize(("again", "well"), [(2003, True), (1000, False)])
+def test_a_place_to_begin_from_is_taken_only_if_two_answers_agree(again, well):
+    answers = iter([{1: 2000}, {1: again}])
+    port = SimpleNamespace(port_name="port")
+    line: Any = SimpleNamespace(
+        family=FEETECH, port=port, label=str, ask=lambda ids, name: next(answers)
+    )
+    if well:
+        assert positions(line, (1,)) == (again,)
+    else:
+        with pytest.raises(ServoMissing):
+            positions(line, (1,))

@@ -10,6 +10,8 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 import child_processes
@@ -18,8 +20,11 @@ import shown_page
 from page_visitor import LOOKING, PATIENCE_S, Visitor, unpacked
 from shown_page import AHEAD, free_port, running_page, wait_for
 
-from gazerig.robot.dashboard.feed.page_process import PageProcess
+from gazerig.robot.dashboard.feed.page_process import URL, PageProcess, pack
 from gazerig.robot.dashboard.page_main import free_port as first_free_port
+from gazerig.robot.dashboard.page_main import watch
+from gazerig.robot.dashboard.requests.inbox import BEAT
+from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.view.views import BOTH, NAMES, view
 from gazerig.robot.dashboard.widgets.widgets import PANELS
 from gazerig.robot.model.types import SeenFace
@@ -214,6 +219,83 @@ def test_a_suspended_page_holds_up_nobody_and_is_replaced() -> None:
 
         wait_for(replaced, "another page")
         assert page.url() == url and page_here() not in (None, process)
+
+
+@pytest.mark.parametrize("beats", [True, False])
+def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool) -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    killed: list[bool] = []
+    now_s = [100.0]
+    page = PageProcess("127.0.0.1", 8080)
+    process = SimpleNamespace(
+        pid=os.getpid(), returncode=None, kill=lambda: killed.append(True), wait=lambda _: 0
+    )
+    page._process, page._clock = (
+        cast(Any, process),
+        cast(Any, SimpleNamespace(now_s=lambda: now_s[0])),
+    )
+    page.join(ours)
+    try:
+        theirs.send(URL + b"http://127.0.0.1:8080/?token=x")
+        wait_for(page.url, "the address")
+        for second in range(1, 9):
+            for _ in range(10):
+                now_s[0] += 0.1
+                page.show(SNAPSHOT)
+            if second != 5:  # the first look counts a little more
+                assert bool(killed) == (not beats and second > 5)
+            if beats:
+                theirs.send(BEAT)
+                wait_for(lambda: page._silent_s == 0.0, "the beat")
+        now_s[0] += 3600.0  # this machine slept: nobody can say what the page did
+        killed.clear()
+        page._silent_s = 0.0
+        page.show(SNAPSHOT)
+        assert not killed
+    finally:
+        page.close()
+        theirs.close()
+
+
+@pytest.mark.parametrize("stuck", ["drawing", "door", ""])
+def test_a_page_beats_while_it_draws_and_serves_browsers(stuck: str) -> None:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    drawn, let_go, draws = threading.Event(), threading.Event(), [0]
+
+    def show(_news: object) -> None:
+        draws[0] += 1
+        drawn.set()
+        if stuck == "drawing":
+            let_go.wait()
+
+    view = SimpleNamespace(
+        choices={}, emulated=None, watched=lambda: False, silent=lambda: None, show=show
+    )
+    # A door whose thread is stuck takes what is to be done and never does it.
+    door = SimpleNamespace(is_open=lambda: True, soon=lambda do: None if stuck == "door" else do())
+    served = SimpleNamespace(door=door, pointer=SimpleNamespace(), outbox=Outbox(cast(Any, theirs)))
+    run = threading.Thread(target=watch, args=(theirs, view, os.getppid(), served), daemon=True)
+    ours.send(pack(SNAPSHOT))
+    run.start()
+    try:
+        assert drawn.wait(PATIENCE_S)
+        ours.setblocking(False)
+        heard = 0
+        # The first beat is of the round before; a page that is stuck has no second one.
+        while heard < 2 and draws[0] < 20:
+            try:
+                heard += ours.recv(10) == BEAT
+            except BlockingIOError:
+                if stuck == "drawing":
+                    break
+                ours.send(pack(SNAPSHOT))
+                let_go.wait(0.02)
+        assert heard == {"drawing": 1, "door": 0, "": 2}[stuck]
+    finally:
+        ours.close()
+        let_go.set()
+        run.join(PATIENCE_S)
+        theirs.close()
 
 
 @pytest.mark.usefixtures("branched_children")

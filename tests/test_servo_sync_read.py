@@ -119,6 +119,17 @@ def test_noise_before_the_answer_does_no_harm(kind):
     assert {i: a.position for i, a in group.pieces(noisy).samples.items()} == PLACES
 
 
+def test_a_proved_block_in_the_place_of_another_s_makes_its_id_doubtful():
+    kind = Kind("dynamixel fast")
+    for command in ("wrong-id 9 4", "reorder"):
+        kind.chain.faults.command(command)
+    group, raw = kind.asked()
+    # Two servos say they are 4, and which of them is in its place is not known.
+    pieces = group.pieces(raw)
+    assert {i: a.position for i, a in pieces.samples.items()} == {1: PLACES[1]}
+    assert 4 in pieces.damaged
+
+
 def test_stuffed_answers_are_longer_and_understood():
     everyday = struct.pack("<hii", -1, -3, 2000)
     group = dynamixel_read(IDS, DIRECT)

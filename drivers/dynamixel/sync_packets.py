@@ -49,7 +49,7 @@ class FastSyncRead:
         is to blame: a lost byte moves all that follows, a spoilt CRC spoils the next proof.
         """
         samples: dict[int, Sample] = {}
-        damaged, unproved = set[int](), set[int]()
+        damaged, unproved, elsewhere = set[int](), set[int](), set[int]()
         at = raw.find(self._head)
         if at < 0:
             return PartialReply(samples, frozenset())
@@ -62,14 +62,20 @@ class FastSyncRead:
                 unproved.update(() if well else self.ids[i:])
                 break
             sent = int.from_bytes(block[-2:], "little")
-            if umts(block[:-2], crc) == sent and block[1] == servo_id:
+            proved = umts(block[:-2], crc) == sent
+            if proved and block[1] == servo_id:
                 samples[servo_id] = self.window.sample(block[0], block[2:-2])
                 well = True
             else:
+                if proved:
+                    elsewhere.add(block[1])
                 (damaged if well else unproved).add(servo_id)
                 well = False
             crc = umts(block[-2:], sent)
             at += self._block
+        for servo_id in elsewhere & samples.keys():
+            del samples[servo_id]
+            damaged.add(servo_id)
         return PartialReply(samples, frozenset(damaged), frozenset(unproved))
 
 

@@ -135,14 +135,17 @@ class SmartServoBus(PortBus):
         believed, dark = feedback.all_plausible(replies), not self._poll_list.group
         for servo_id, one in replies.items():
             slot = self._slot[servo_id]
+            garbled = servo_id in self._poll_list.garbling
             was_out = self._poll_list.answered(servo_id)
             if was_out:
                 supervisor.answers_again(servo_id)
             if one.sample.error & self._family.codec.REFUSAL:
                 supervisor.check_status(servo_id, one.sample, now_s)
                 self._line.errors["refused"] += 1
-            elif was_out and dark:
-                continue  # the first answer after long silence may be an old one
+            elif was_out and (dark or garbled):
+                # The first after long silence may be an old one. Answers of two servos at once are
+                # the AND of both, checks too: far more than one in 65,536 pass.
+                continue
             elif one.sample.blank:
                 supervisor.check_status(servo_id, one.sample, now_s)
             elif believed or feedback.is_plausible(slot, one):

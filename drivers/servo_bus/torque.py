@@ -35,10 +35,15 @@ Value = TypeVar("Value")
 def positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
     """Read every position, as the servos count.
 
+    The first goals are made of these: where the check over an answer is weak, two must agree.
+
     Raises:
-        ServoMissing: a servo does not answer.
+        ServoMissing: a servo does not answer, or says two things.
     """
     found = line.ask(ids, "present_position")
+    if line.family.weak_check:
+        again = line.ask(tuple(found), "present_position")
+        found = {i: now for i, now in again.items() if abs(now - found[i]) <= STILL_STEPS}
     _raise_missing(line, [servo_id for servo_id in ids if servo_id not in found])
     return tuple(found[servo_id] for servo_id in ids)
 

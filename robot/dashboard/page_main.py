@@ -19,6 +19,7 @@ import signal
 import socket
 import sys
 import threading
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,11 +46,13 @@ from gazerig.robot.dashboard.requests.outbox import DOOR, Outbox
 from gazerig.robot.dashboard.requests.pointer_to_look import PointerToLook
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import Widgets
+from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import LookAt
 
 _FRAME_S = 0.04
 _SILENT_AFTER_S = 1.0
+_BEAT_S = 0.5
 _PORTS_TRIED = 100
 _PORTS = 65536
 _NICENESS = 5  # the control loop comes first where both want the same core
@@ -148,9 +151,14 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
     door, pointer = served.door, served.pointer
     pause, live = threading.Event(), LiveFeed()
     live.choices = view.choices
+    clock, beat_s = RealClock(), -inf
     while True:
         if not door.is_open():
             raise RuntimeError("the page's door has closed by itself")
+        if clock.now_s() >= beat_s:
+            # Begun here and sent by the door's thread: both are alive.
+            beat_s = clock.now_s() + _BEAT_S
+            door.soon(served.outbox.beat)
         readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
         if readable:
             live.watched = view.watched()

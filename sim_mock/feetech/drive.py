@@ -256,7 +256,8 @@ class FeetechDrive(Drive):
         if cruise == 0.0 and self._stops_at_zero:
             return
         if time_ms and self._timed and self.mode == SERVO:
-            profile.by_time(to, time_ms, 0.0)
+            # No faster than it can: the next path begins at the speed of this one.
+            profile.by_time(to, max(time_ms, abs(to - profile.r) / self._top), 0.0)
         else:
             profile.by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
         self.shaft.resume()

@@ -145,6 +145,14 @@ class AuthProxy:
         if self._failed is not None:
             raise self._failed
 
+    def soon(self, do: Callable[[], None]) -> None:
+        """Let the thread that serves browsers do something in its turn.
+
+        Raises:
+            RuntimeError: it has ended.
+        """
+        self._loop.call_soon_threadsafe(do)
+
     def is_open(self) -> bool:
         """Return whether people can come in."""
         return self._thread.is_alive()

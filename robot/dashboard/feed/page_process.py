@@ -27,6 +27,7 @@ from gazerig.drivers.process import child_process, message_link
 from gazerig.drivers.process.message_link import MessageLink
 from gazerig.drivers.process.passed_image import CAN_PASS, send
 from gazerig.robot.dashboard.requests.inbox import (
+    BEAT,
     MESSAGE_BYTES,
     PICTURE,
     REQUEST,
@@ -62,7 +63,9 @@ OnRequest = Callable[[dict[str, object]], str | None]
 """Carries out a request of a user of the page; returns the reply, or None."""
 
 _CLOSE_TIMEOUT_S = 2.0
-_CHECK_S = 0.25  # between two checks that the process was not suspended
+_CHECK_S = 0.25  # between two checks that the process neither hangs nor was suspended
+_HANG_S = 5.0
+"""A page that is sent snapshots and has been silent so long hangs."""
 _LAST_LINES_BYTES = 4096
 _MOST_PIXELS = 1 << 23  # of a message, where images go along in it
 _MOST_WORDS = 20_000  # of one answer, in characters
@@ -140,7 +143,7 @@ class PageProcess:
         self._over = threading.Event()
         self._beginning = threading.Lock()
         self._clock = RealClock()
-        self._began_s = self._check_s = 0.0
+        self._began_s = self._check_s = self._silent_s = 0.0
         self._wait_s = _AGAIN_AFTER_S
         self._mourned = self._welcomed = False
         self.started = 0
@@ -199,7 +202,7 @@ class PageProcess:
 
     def show(self, snapshot: Snapshot) -> None:
         """Hand over a snapshot; dropped and counted where the page does not take it."""
-        self._end_suspended()
+        self._end_hung()
         if abs(snapshot.t_s - self._shown_s) < SHOWN_EVERY_S:
             return
         self._shown_s = snapshot.t_s
@@ -261,6 +264,8 @@ class PageProcess:
         if kind == PICTURE:
             if self._on_picture is not None:
                 self._on_picture(body)
+        elif kind == BEAT:
+            self._silent_s = 0.0
         elif kind == URL:
             self._take_url(body.decode())
         elif kind == NOTICE:
@@ -271,7 +276,7 @@ class PageProcess:
 
     def _take_url(self, url: str) -> None:
         """Record that the page is ready; a restarted page is sent its initial state."""
-        self._url = url
+        self._url, self._silent_s = url, 0.0
         self._port = int(urlsplit(url).port or self._port)
         self.started += 1
         if self.started > 1 and self._choices:
@@ -335,13 +340,19 @@ class PageProcess:
             except OSError as error:  # no memory, no processes, no files
                 self._notices.append(f"the page cannot be started again: {error.strerror}")
 
-    def _end_suspended(self) -> None:
-        """Kill a page that was suspended: its STOP button does nothing. It is started again."""
+    def _end_hung(self) -> None:
+        """Kill a page that hangs or was suspended: its STOP button may do nothing. It starts again.
+
+        One that is still starting, without an address, does not hang.
+        """
         now_s, process = self._clock.now_s(), self._process
         if now_s < self._check_s or process is None or process.returncode is not None:
             return
+        # Where nobody looked the whole machine may have stood still: that is not all counted.
+        looked_s = min(now_s - self._check_s + _CHECK_S, 2.0 * _CHECK_S)
+        self._silent_s = self._silent_s + looked_s if self._url is not None else 0.0
         self._check_s = now_s + _CHECK_S
-        if child_process.is_suspended(process.pid):
+        if self._silent_s >= _HANG_S or child_process.is_suspended(process.pid):
             process.kill()
 
     def _last_lines(self) -> str:

@@ -17,6 +17,8 @@ from gazerig.robot.model.commands import COMMANDS
 
 REQUEST = b"t"
 """First byte of a request of a user of the page."""
+BEAT = b"b"
+"""All of a message that says that the page draws and serves browsers."""
 PICTURE = b"j"
 """First byte of a picture of a browser's own camera."""
 MESSAGE_BYTES = 200_000

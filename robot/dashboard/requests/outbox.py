@@ -1,11 +1,12 @@
 """The page's voice: what people do in their browsers goes to the rig from here."""
 
+import contextlib
 import json
 import threading
 from collections.abc import Callable, Mapping
 
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
-from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES, PICTURE, request_message
+from gazerig.robot.dashboard.requests.inbox import BEAT, MESSAGE_BYTES, PICTURE, request_message
 from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import as_json
@@ -65,6 +66,11 @@ class Outbox:
         except OSError:  # full, gone, or too long
             return False
         return True
+
+    def beat(self) -> None:
+        """Tell the rig that this page is alive."""
+        with contextlib.suppress(OSError):  # full, or gone
+            self._feed.send(BEAT, DONT_WAIT)
 
     def hand_on(self, data: bytes, who: str = DOOR) -> bool:
         """Hand on a compact JSON object."""
