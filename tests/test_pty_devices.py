@@ -20,7 +20,7 @@ STS_PING, STS_PONG = bytes.fromhex("FFFF010201FB"), bytes.fromhex("FFFF010200FC"
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
     """A shared machine may stall a process for longer than the SDK waits for real servos."""
-    monkeypatch.setattr(serial_port, "SDK_MARGIN_S", 1.0)
+    monkeypatch.setattr(serial_port, "SDK_MARGIN_S", 5.0)
 
 
 def asked(path, data, length, baud=1_000_000):
@@ -28,7 +28,7 @@ def asked(path, data, length, baud=1_000_000):
     port = BlockingPort(path)
     port.setBaudRate(baud)
     port.write(data)
-    answer = port.read_until(length, port.now_s() + 1.0)
+    answer = port.read_until(length, port.now_s() + 20.0)
     port.closePort()
     return answer
 

@@ -11,6 +11,8 @@ from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.poll_list import silent_servos
 
 TRIES, HURRIED = 3, 4.0
+SETUP_PAUSES_S = 0.1, 0.4
+"""Pauses before a servo that stayed silent is asked again, outside the loop."""
 
 _ROOM = 4096
 _BACKLOG_S = 0.05
@@ -193,11 +195,14 @@ class Transactions:
             blamed = silent_servos(left, values)
             silent += blamed
             left = tuple(i for i in left if i not in values and i not in blamed)
-        for servo_id in silent:
-            for _ in range(self.tries - 1):
+        # A computer that is busy may have kept an answer back, and a servo may be restarting.
+        pauses_s = (*[0.0] * (self.tries - 1), *SETUP_PAUSES_S) if self.tries > 1 else ()
+        for pause_s in pauses_s:
+            silent = [i for i in silent if i not in values]
+            if silent and pause_s:
+                self.drain(pause_s)
+            for servo_id in silent:
                 values.update(self._ask((servo_id,), address, length))
-                if servo_id in values:
-                    break
         return values
 
     def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
