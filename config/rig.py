@@ -26,9 +26,7 @@ from gazerig.gaze.gesture.breathing import BreathingParams
 from gazerig.gaze.gesture.gesture import GestureParams
 from gazerig.gaze.gesture.level import LevelParams
 from gazerig.gaze.lids.lids import LidParams
-from gazerig.gaze.oculomotor.head import HeadParams
-from gazerig.gaze.oculomotor.oculomotor import OculomotorParams
-from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
+from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.params import Bounds, Choices, Unit

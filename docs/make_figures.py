@@ -15,18 +15,16 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
 import start_figures  # noqa: E402
-import trace_figure  # noqa: E402
 
 from gazerig.config.schema import load_rig, load_walk  # noqa: E402
-from gazerig.features.lab.sweep.axes import Axis, grid  # noqa: E402
-from gazerig.features.lab.sweep.outcome import Outcome  # noqa: E402
-from gazerig.features.lab.sweep.response_figure import response_png  # noqa: E402
-from gazerig.features.lab.sweep.worker import figures_at  # noqa: E402
 from gazerig.gaze.angles import rotation  # noqa: E402
 from gazerig.gaze.lids.lids import LidParams, Lids  # noqa: E402
 from gazerig.gaze.oculomotor.binocular import BinocularController  # noqa: E402
-from gazerig.gaze.oculomotor.head import HeadModel, HeadParams  # noqa: E402
-from gazerig.gaze.oculomotor.pursuit_params import PursuitParams  # noqa: E402
+from gazerig.gaze.oculomotor.head import HeadModel  # noqa: E402
+from gazerig.gaze.oculomotor.params import (
+    HeadParams,  # noqa: E402
+    PursuitParams,  # noqa: E402
+)
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
@@ -60,8 +58,6 @@ def main() -> None:
         blink,
         scanpath,
         capture_time,
-        sweep,
-        traces,
     ):
         draw()
         print(f"docs/figures/{draw.__name__}.png")
@@ -72,13 +68,6 @@ def saved(name: str, figure: plt.Figure) -> None:
     """Write one figure."""
     figure.tight_layout()
     figure.savefig(HERE / f"{name}.png", dpi=110)
-    plt.close(figure)
-
-
-def traces() -> None:
-    """Twenty seconds of a person by published numbers, of the default and of both papers."""
-    figure = trace_figure.figure_of(trace_figure.all_traces())
-    figure.savefig(HERE / "traces.png", dpi=110, bbox_inches="tight")
     plt.close(figure)
 
 
@@ -291,18 +280,6 @@ def capture_time() -> None:
     for axes in (left, middle, right):
         axes.legend(fontsize=7)
     saved("capture_time", figure)
-
-
-def sweep() -> None:
-    """What the rate of blinks does: the picture of a small sweep on ideal servos."""
-    rig = load_rig("desk")
-    axis = Axis("gaze.lids.blinks_per_min", (8.0, 14.0, 20.0, 26.0, 32.0), unit="1/min")
-    runs = []
-    for point in grid([axis]):
-        for seed in range(3):
-            options = RunOptions(True, True, seed, "visitor", seconds=44.0, bus="ideal")
-            runs.append(Outcome(point, seed, figures_at(rig, options, point, lambda: None)))
-    (HERE / "sweep.png").write_bytes(response_png([axis], runs))
 
 
 if __name__ == "__main__":

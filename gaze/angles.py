@@ -1,4 +1,4 @@
-"""Directions, great circles and rotations on plain tuples.
+"""Points, directions, great circles and rotations as plain tuples, without numpy.
 
 Frames and signs as in gaze.types: x forward, y left, z up; yaw + left, pitch + up,
 roll + right ear down. Radians throughout. Scalar arithmetic, because one numpy call on
@@ -7,7 +7,13 @@ three numbers costs as much as the whole of most functions here.
 
 from math import asin, atan2, cos, hypot, pi, sin, sqrt
 
-from gazerig.gaze.vectors import Angles2, Angles3, Mat3, Vec3
+Vec3 = tuple[float, float, float]
+Mat3 = tuple[Vec3, Vec3, Vec3]
+"""Rows of a rotation matrix."""
+Angles2 = tuple[float, float]
+"""(yaw, pitch) in radians, yaw + left, pitch + up."""
+Angles3 = tuple[float, float, float]
+"""(yaw, pitch, roll) in radians, roll + right ear down."""
 
 
 def wrap(angle_rad: float) -> float:

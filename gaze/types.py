@@ -14,10 +14,10 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.gaze.vectors import Angles2 as Angles2
-from gazerig.gaze.vectors import Angles3 as Angles3
-from gazerig.gaze.vectors import Mat3 as Mat3
-from gazerig.gaze.vectors import Vec3 as Vec3
+from gazerig.gaze.angles import Angles2 as Angles2
+from gazerig.gaze.angles import Angles3 as Angles3
+from gazerig.gaze.angles import Mat3 as Mat3
+from gazerig.gaze.angles import Vec3 as Vec3
 
 Floats = NDArray[np.float64]
 

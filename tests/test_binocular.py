@@ -17,7 +17,7 @@ from gaze_trace_rig import CENTRED, DESK, Rig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, angle_between, direction, scale
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
+from gazerig.gaze.oculomotor.params import PursuitParams
 from gazerig.gaze.types import GazeState, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState

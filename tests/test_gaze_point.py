@@ -9,10 +9,10 @@ import pytest
 from gaze_trace_rig import AT_ONCE, EXACT, HUMAN, Rig, still
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale, sub, unit
-from gazerig.gaze.oculomotor.oculomotor import OculomotorParams
-from gazerig.gaze.oculomotor.refixation import RefixationParams, Refixations
+from gazerig.gaze.oculomotor.params import OculomotorParams
+from gazerig.gaze.oculomotor.refixation import Refixations
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
-from gazerig.gaze.oculomotor.saccade_endpoint import EndpointParams, endpoint
+from gazerig.gaze.oculomotor.saccade_endpoint import endpoint
 from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
 from gazerig.gaze.types import Target, Vec3
 
@@ -87,12 +87,14 @@ def test_a_target_that_jumps_early_bends_the_saccade_and_a_late_jump_waits_100_m
 
 
 def test_a_saccade_falls_short_from_10_deg_on_and_scatters_with_its_size() -> None:
-    exact = EndpointParams(0.07, 0.0, 0.0)
+    exact = OculomotorParams(
+        undershoot=0.07, endpoint_scatter_along=0.0, endpoint_scatter_across=0.0
+    )
     for size, short in ((4.0, 0.0), (7.5, 0.2625), (10.0, 0.7), (20.0, 1.4)):
         landing = endpoint(at(size), at(0.0), EYE, exact, None)
         assert size - degrees(angle_between(at(0.0), landing)) == pytest.approx(short, abs=1e-6)
     rng = np.random.default_rng(0)
-    ends = [endpoint(at(20.0), at(0.0), EYE, EndpointParams(), rng) for _ in range(2000)]
+    ends = [endpoint(at(20.0), at(0.0), EYE, OculomotorParams(), rng) for _ in range(2000)]
     yaw = np.degrees([np.arctan2(y, x) for x, y, _ in ends])
     pitch = np.degrees([np.arcsin(unit(e)[2]) for e in ends])
     assert np.mean(yaw) == pytest.approx(18.4, abs=0.06) and np.std(yaw) == pytest.approx(
@@ -136,7 +138,7 @@ def test_refixations_stay_near_the_middle_and_come_one_to_two_a_second() -> None
 
 
 def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_followed() -> None:
-    points = Refixations(RefixationParams(), np.random.default_rng(0))
+    points = Refixations(OculomotorParams(), np.random.default_rng(0))
     times = np.arange(0.0, 20.0, 0.005)
     assert not any(points.due(t, still=False) for t in times)
     assert any(points.due(20.0 + t) for t in times)
@@ -147,8 +149,8 @@ def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_follow
 
 def test_without_sizes_or_a_generator_nothing_is_fixated_again() -> None:
     for params, rng in (
-        (RefixationParams(refixation_deg=0.0), np.random.default_rng(0)),
-        (RefixationParams(), None),
+        (OculomotorParams(refixation_deg=0.0), np.random.default_rng(0)),
+        (OculomotorParams(), None),
     ):
         points = Refixations(params, rng)
         assert not any(points.due(t) for t in np.arange(0.0, 10.0, 0.005))

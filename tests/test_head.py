@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.minimum_jerk import Quintic
-from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
+from gazerig.gaze.oculomotor.head import HeadModel
+from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.types import Floats, Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))

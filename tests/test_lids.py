@@ -10,10 +10,10 @@ from gaze_trace_rig import EXACT
 
 from gazerig.gaze.lids.blink_statistics import blink_pause_s
 from gazerig.gaze.lids.lids import LidMode, LidParams, Lids, Side
-from gazerig.gaze.oculomotor.head import HeadModel, HeadParams
+from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
+from gazerig.gaze.oculomotor.params import HeadParams, PursuitParams
 from gazerig.gaze.oculomotor.pursuit import Pursuit
-from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.types import Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics

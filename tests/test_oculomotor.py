@@ -25,7 +25,7 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.gesture.breathing import Breathing, BreathingParams
-from gazerig.gaze.oculomotor.head import HeadParams
+from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import Angles2, GazeState, Target, Vec3
 from gazerig.robot.model.types import JointState

@@ -15,7 +15,7 @@ from gazerig.gaze.angles import (
     scale,
     sub,
 )
-from gazerig.gaze.oculomotor.head import HeadParams
+from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import Target
 from gazerig.robot.model.kinematics import GeometryParams

@@ -6,8 +6,7 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, sub
-from gazerig.gaze.oculomotor.binocular import EyeGeometry, Eyes
-from gazerig.gaze.oculomotor.opposite_angles import OppositeAngles
+from gazerig.gaze.oculomotor.binocular import EyeGeometry, Eyes, OppositeAngles
 from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.app.gaze_models import kinematics_of
 

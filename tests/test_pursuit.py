@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale
+from gazerig.gaze.oculomotor.params import PursuitParams
 from gazerig.gaze.oculomotor.pursuit import Pursuit
-from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
 from gazerig.gaze.types import Vec3
 
 DT = 0.005

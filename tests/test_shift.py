@@ -4,17 +4,18 @@ from math import radians
 
 import pytest
 
+from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.oculomotor.pursuit import Slip
-from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
+from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger
 
 
 def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:
     return Slip((0.0, radians(error_deg), 0.0), (0.0, radians(slip_deg_s), 0.0))
 
 
-def settled(params: SaccadeTriggerParams | None = None, scatters: bool = False) -> SaccadeTrigger:
+def settled(params: OculomotorParams | None = None, scatters: bool = False) -> SaccadeTrigger:
     """Return a rule that has answered its first event and landed at 0."""
-    rule = SaccadeTrigger(params or SaccadeTriggerParams(), scatters)
+    rule = SaccadeTrigger(params or OculomotorParams(), scatters)
     rule.record_shift(1, 0.0, None, -1.0)
     assert not rule.due(slip(0.0), 0.0)
     assert not rule.waits
@@ -54,7 +55,7 @@ def test_new_target_jumps_at_once_unless_it_is_nearly_there() -> None:
 
 
 def test_latency_counts_from_the_first_unanswered_event() -> None:
-    rule = settled(SaccadeTriggerParams(latency_ms=200.0))
+    rule = settled(OculomotorParams(latency_ms=200.0))
     rule.record_shift(2, 0.0, None, 0.1)
     rule.record_shift(3, 0.0, None, 0.25)
     assert rule.waits

@@ -3,9 +3,7 @@
 Points are in the world, in metres.
 """
 
-from dataclasses import dataclass
 from math import sqrt
-from typing import Annotated
 
 import numpy as np
 
@@ -19,32 +17,23 @@ from gazerig.gaze.angles import (
     sub,
     yaw_pitch,
 )
+from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.oculomotor.pursuit import Pursuit, sight
-from gazerig.gaze.oculomotor.refixation import RefixationParams, Refixations
+from gazerig.gaze.oculomotor.refixation import Refixations
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
-from gazerig.gaze.oculomotor.saccade_endpoint import EndpointParams, endpoint
+from gazerig.gaze.oculomotor.saccade_endpoint import endpoint
 from gazerig.gaze.oculomotor.saccade_trajectory import (
     RedirectedTrajectory,
     SaccadeTrajectory,
     Trajectory,
 )
-from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
+from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
 from gazerig.gaze.types import Angles2, Vec3
-from gazerig.params import Bounds
 
 MOVING_M_S = 0.05
 """A target slower than this is fixated, not pursued."""
 _MIDDLE = (0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class GazePointParams(SaccadeTriggerParams, EndpointParams, RefixationParams):
-    """Saccade trigger and endpoints, re-fixations, and the nearest point."""
-
-    # fmt: off
-    nearest_m: Annotated[float, Bounds(0.05, 2), "nearest distance on which the eyes converge (0.2 m is 17.6 deg of vergence)"] = 0.2
-    # fmt: on
 
 
 class GazePoint:
@@ -66,7 +55,7 @@ class GazePoint:
 
     def __init__(
         self,
-        params: GazePointParams,
+        params: OculomotorParams,
         saccade: SaccadeModel,
         pursuit: Pursuit,
         prediction: TargetPrediction,
@@ -80,7 +69,7 @@ class GazePoint:
         self._exact = False
         self.reset(0.0, (1.0, 0.0, 0.0))
 
-    def retune(self, params: GazePointParams) -> None:
+    def retune(self, params: OculomotorParams) -> None:
         """Change thresholds and times; a saccade under way goes on to its end.
 
         Raises:

@@ -11,8 +11,8 @@ from math import degrees, hypot, radians
 
 from gazerig.gaze.angles import angle_between, direction, shortened, yaw_pitch
 from gazerig.gaze.minimum_jerk import Quintic
-from gazerig.gaze.oculomotor.head_params import HeadParams as HeadParams
 from gazerig.gaze.oculomotor.head_share import HeadShare
+from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
 from gazerig.gaze.types import Angles2, Angles3, Target, Vec3
 
 _NO_ROLL: Angles2 = (0.0, 0.0)

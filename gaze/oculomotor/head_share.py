@@ -8,7 +8,7 @@ straight ahead would turn a head that comes from 60 deg past a target at 25 deg.
 
 from math import exp, radians
 
-from gazerig.gaze.oculomotor.head_params import HeadParams
+from gazerig.gaze.oculomotor.params import HeadParams
 
 _LATERAL_RAD = radians(30.0)
 _LEAST_ROLL = 0.4

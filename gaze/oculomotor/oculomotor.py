@@ -5,8 +5,7 @@ whatever the head does during or after a gaze shift, planned or pushed, is compe
 exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own geometry.
 """
 
-from dataclasses import dataclass
-from typing import Annotated, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,11 +20,12 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.gesture.animation import NO_OFFSET, PoseOffset
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.binocular import EyeGeometry
-from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint, GazePointParams
+from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint
 from gazerig.gaze.oculomotor.head import HeadModel
+from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
-from gazerig.gaze.oculomotor.target_prediction import PredictionModel, TargetPrediction
+from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
 from gazerig.gaze.types import (
     ORDERED,
     Angles2,
@@ -39,24 +39,8 @@ from gazerig.gaze.types import (
     Target,
     Vec3,
 )
-from gazerig.params import Bounds
 
 _AT_END = "at the end of its range"
-
-
-@dataclass(frozen=True)
-class OculomotorParams(GazePointParams):
-    """The gaze point's parameters, and the prediction of target and head."""
-
-    # fmt: off
-    prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
-        "longest time over which a target's position is extrapolated with its velocity"] = 120.0
-    fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
-    target_prediction: Annotated[PredictionModel,
-        "where a target is expected: where its frame showed it, moved on with its velocity, or along its curve and its swing, "
-        "which is recognised after one to two cycles"] = "periodic"
-    eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
-    # fmt: on
 
 
 class Sway(Protocol):

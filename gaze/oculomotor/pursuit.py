@@ -14,9 +14,14 @@ from math import exp, radians, sqrt
 from typing import NamedTuple, Protocol
 
 from gazerig.gaze.angles import scale, sub
-from gazerig.gaze.oculomotor.binocular import BinocularController, EyeGeometry, Eyes, SaccadeState
-from gazerig.gaze.oculomotor.opposite_angles import OppositeAngles
-from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
+from gazerig.gaze.oculomotor.binocular import (
+    BinocularController,
+    EyeGeometry,
+    Eyes,
+    OppositeAngles,
+    SaccadeState,
+)
+from gazerig.gaze.oculomotor.params import PursuitParams
 from gazerig.gaze.types import Target, Vec3
 
 Sight = tuple[float, float, float, float]

@@ -5,29 +5,14 @@ below 1 deg (Otero-Millan et al. 2013). A servo shows those that are larger than
 play, so the gaze goes from one point near the middle of a target to another, and holds in between.
 """
 
-from dataclasses import dataclass
 from math import cos, hypot, inf, pi, radians, sin, sqrt
-from typing import Annotated
 
 import numpy as np
 
+from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.types import Angles2
-from gazerig.params import Bounds
 
 _TRIES = 12
-
-
-@dataclass(frozen=True)
-class RefixationParams:
-    """Sizes and intervals of re-fixations."""
-
-    # fmt: off
-    refixation_deg: Annotated[float, Bounds(0, 5),
-        "largest re-fixation, a small saccade within what is looked at; 0: none"] = 1.5
-    refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest one; three steps of the servos and their play show"] = 0.9
-    refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 350.0
-    refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is drawn from so long to so much longer"] = 700.0
-    # fmt: on
 
 
 class Refixations:
@@ -36,12 +21,12 @@ class Refixations:
     offset_rad: of the present one, to the left and up; (0, 0): the middle itself
     """
 
-    def __init__(self, params: RefixationParams, rng: np.random.Generator | None) -> None:
+    def __init__(self, params: OculomotorParams, rng: np.random.Generator | None) -> None:
         self._rng = rng
         self.retune(params)
         self.reset()
 
-    def retune(self, params: RefixationParams) -> None:
+    def retune(self, params: OculomotorParams) -> None:
         """Change sizes and intervals, from the next rest on."""
         self._least_rad = radians(params.refixation_least_deg)
         self._most_rad = radians(params.refixation_deg)

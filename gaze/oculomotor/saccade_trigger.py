@@ -11,35 +11,11 @@ nothing at all sooner than ``min_interval_ms`` after its landing. A new target t
 early in a saccade redirects it; one that comes later waits for that interval.
 """
 
-from dataclasses import dataclass
 from math import inf, radians
-from typing import Annotated
 
 from gazerig.gaze.angles import dot, norm
+from gazerig.gaze.oculomotor.params import OculomotorParams
 from gazerig.gaze.oculomotor.pursuit import Slip
-from gazerig.params import Bounds
-
-
-@dataclass(frozen=True)
-class SaccadeTriggerParams:
-    """Thresholds and times of the saccade trigger."""
-
-    # fmt: off
-    saccade_deg: Annotated[float, Bounds(0.1, 30), "position error above which a saccade is made instead of smooth pursuit"] = 2.0
-    smallest_shift_deg: Annotated[float, Bounds(0, 10), "a new target closer to the gaze than this gets no saccade"] = 0.3
-    refractory_ms: Annotated[float, Bounds(0, 2000),
-        "shortest time after a saccade before a position error alone triggers the next"] = 150.0
-    latency_ms: Annotated[float, Bounds(0, 1000), "latency from a new target to the saccade; people 200"] = 0.0
-    crossing_least_ms: Annotated[float, Bounds(0, 1000),
-        "no catch-up saccade if pursuit will bring the eye onto the target between this time ..."] = 40.0
-    crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and this time from now"] = 180.0
-    correct_deg: Annotated[float, Bounds(0.1, 30), "landing error above which a corrective saccade follows, if saccades err"] = 1.2
-    correct_after_ms: Annotated[float, Bounds(0, 1000), "mean delay from landing to the corrective saccade; people 100 to 200"] = 155.0
-    correct_spread_ms: Annotated[float, Bounds(0, 500), "that delay is drawn from so much less to so much more"] = 45.0
-    min_interval_ms: Annotated[float, Bounds(0, 1000), "shortest time from the landing of a saccade to the next one"] = 100.0
-    redirect_before_ms: Annotated[float, Bounds(0, 1000),
-        "a new target bends the saccade in flight if it comes at least this long before its end; 1000: never"] = 70.0
-    # fmt: on
 
 
 class SaccadeTrigger:
@@ -49,11 +25,11 @@ class SaccadeTrigger:
     onset_s: when the last saccade started, or the next one is to
     """
 
-    def __init__(self, params: SaccadeTriggerParams, errs: bool) -> None:
+    def __init__(self, params: OculomotorParams, errs: bool) -> None:
         self.retune(params, errs)
         self.reset(0.0)
 
-    def retune(self, params: SaccadeTriggerParams, errs: bool) -> None:
+    def retune(self, params: OculomotorParams, errs: bool) -> None:
         """Change thresholds and times; an event that waits for its saccade still does.
 
         errs: whether saccades land elsewhere than on their targets

@@ -12,14 +12,13 @@ World frame, metres, seconds; everything a function of the frames given and of t
 from collections import deque
 from itertools import islice
 from math import cos, exp, pi, sin, sqrt
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.angles import add, norm, scale, sub
+from gazerig.gaze.oculomotor.params import PredictionModel
 from gazerig.gaze.types import Floats, Target, Vec3
-
-PredictionModel = Literal["none", "velocity", "periodic"]
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _SLOPE_FRAMES = 4

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Protocol
 import typer
 
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.vectors import Angles2
+from gazerig.gaze.angles import Angles2
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say, status
 from gazerig.robot.model.clock import Clock, RealClock

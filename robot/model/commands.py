@@ -7,7 +7,7 @@ recording of a run holds it, so that the run can be done again.
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-from gazerig.gaze.vectors import Angles2, Vec3
+from gazerig.gaze.angles import Angles2, Vec3
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """What a key of a rig's YAML can hold."""

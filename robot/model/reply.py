@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from math import degrees, radians
 from typing import Any, NamedTuple
 
-from gazerig.gaze.vectors import Vec3
+from gazerig.gaze.angles import Vec3
 from gazerig.robot.model.commands import Command
 
 _BESIDE_DEG = 1.0

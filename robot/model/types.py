@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from gazerig.gaze.vectors import Mat3, Vec3
+from gazerig.gaze.angles import Mat3, Vec3
 from gazerig.robot.model.leader import Leader
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ let go when none has come for a while.
 from dataclasses import dataclass
 from math import hypot, radians
 
-from gazerig.gaze.vectors import Angles2
+from gazerig.gaze.angles import Angles2
 
 GESTURES = ("nod", "shake", "wink", "surprised", "sleepy")
 """What the buttons play, in the order of the page's."""

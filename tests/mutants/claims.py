@@ -614,7 +614,7 @@ CLAIMS = (
            "a fifth of the way in each frame",
            ("saccade::test_literal_frames_leave_a_fifth_at_each_and_do_not_know_the_tick",),
            ("N 3.3: 0.8 of the remaining distance per frame",)),
-    Mutant("gaze/oculomotor/opposite_angles.py", "eye_rad[0] - (head_rad[0] - head_before_rad[0])", "eye_rad[0]",
+    Mutant("gaze/oculomotor/binocular.py", "eye_rad[0] - (head_rad[0] - head_before_rad[0])", "eye_rad[0]",
            "standing eyes know no turn of the head",
            ("opposite_angles::test_e31_opposite_angles_hold_the_gaze_through_a_turn_about_one_axis",),
            ("N 3.4: vestibulo-ocular reflex, no turn beyond 20 deg",)),

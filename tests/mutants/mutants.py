@@ -97,7 +97,7 @@ MUTANTS = (
            "what short parts gain is not taken from the others", ("scanpath",)),
     Mutant("gaze/scanpath/scanpath.py", "return PARTS[away.index(min(away))]", "return PARTS[0]",
            "a face is entered anywhere", ("scanpath",)),
-    Mutant("gaze/oculomotor/opposite_angles.py", "view.in_range(wanted) == wanted", "True",
+    Mutant("gaze/oculomotor/binocular.py", "view.in_range(wanted) == wanted", "True",
            "eyes turn beyond their range", ("opposite_angles",)),
     Mutant("gaze/scanpath/scanpath.py", "for face in seen if face.id == face_id", "for face in seen",
            "the walk goes over the face of somebody else", ("scanpath", "scanpath_models", "attention")),

@@ -1,0 +1,140 @@
+"""Parameters of eye and head movements, with the sources of their values.
+
+How far the head goes: 0.77 of what exceeds the eye-only range, 35.8 deg wide (Stahl 1999;
+between people the range varies by 31.9 deg, the slope by 0.16), or eq 7 of Mitake et al.,
+or a fixed share. People roll their heads by a few degrees when they turn to somebody beside
+them; which ear goes down, and how much with how much interest, is a choice made here.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from gazerig.params import Bounds
+
+PredictionModel = Literal["none", "velocity", "periodic"]
+
+
+@dataclass(frozen=True)
+class OculomotorParams:
+    """Re-fixations, endpoints and trigger of saccades, and the prediction of target and head."""
+
+    # fmt: off
+    refixation_deg: Annotated[float, Bounds(0, 5),
+        "largest re-fixation, a small saccade within what is looked at; 0: none"] = 1.5
+    refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest one; three steps of the servos and their play show"] = 0.9
+    refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 350.0
+    refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is drawn from so long to so much longer"] = 700.0
+    undershoot: Annotated[float, Bounds(0, 0.3),
+        "share of its amplitude by which a saccade of 10 deg or more falls short, none up to 5 deg; people .05-.10"] = 0.08
+    endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
+        "scatter of saccade endpoints along the path, standard deviation as a share of the amplitude; people .03-.05"] = 0.04
+    endpoint_scatter_across: Annotated[float, Bounds(0, 0.2),
+        "scatter of saccade endpoints across the path, standard deviation as a share of the amplitude; people .02"] = 0.02
+    saccade_deg: Annotated[float, Bounds(0.1, 30), "position error above which a saccade is made instead of smooth pursuit"] = 2.0
+    smallest_shift_deg: Annotated[float, Bounds(0, 10), "a new target closer to the gaze than this gets no saccade"] = 0.3
+    refractory_ms: Annotated[float, Bounds(0, 2000),
+        "shortest time after a saccade before a position error alone triggers the next"] = 150.0
+    latency_ms: Annotated[float, Bounds(0, 1000), "latency from a new target to the saccade; people 200"] = 0.0
+    crossing_least_ms: Annotated[float, Bounds(0, 1000),
+        "no catch-up saccade if pursuit will bring the eye onto the target between this time ..."] = 40.0
+    crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and this time from now"] = 180.0
+    correct_deg: Annotated[float, Bounds(0.1, 30), "landing error above which a corrective saccade follows, if saccades err"] = 1.2
+    correct_after_ms: Annotated[float, Bounds(0, 1000), "mean delay from landing to the corrective saccade; people 100 to 200"] = 155.0
+    correct_spread_ms: Annotated[float, Bounds(0, 500), "that delay is drawn from so much less to so much more"] = 45.0
+    min_interval_ms: Annotated[float, Bounds(0, 1000), "shortest time from the landing of a saccade to the next one"] = 100.0
+    redirect_before_ms: Annotated[float, Bounds(0, 1000),
+        "a new target bends the saccade in flight if it comes at least this long before its end; 1000: never"] = 70.0
+    nearest_m: Annotated[float, Bounds(0.05, 2), "nearest distance on which the eyes converge (0.2 m is 17.6 deg of vergence)"] = 0.2
+    prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
+        "longest time over which a target's position is extrapolated with its velocity"] = 120.0
+    fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
+    target_prediction: Annotated[PredictionModel,
+        "where a target is expected: where its frame showed it, moved on with its velocity, or along its curve and its swing, "
+        "which is recognised after one to two cycles"] = "periodic"
+    eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
+    # fmt: on
+
+    @property
+    def errs(self) -> bool:
+        """Return whether saccades land anywhere else than on their targets."""
+        return self.undershoot > 0.0 or self.scatters
+
+    @property
+    def scatters(self) -> bool:
+        """Return whether endpoints are random."""
+        return self.endpoint_scatter_along > 0.0 or self.endpoint_scatter_across > 0.0
+
+
+@dataclass(frozen=True)
+class PursuitParams:
+    """Model, gains, delays and limits of the following.
+
+    Gains and limits are of both models, the delays, the reflex and the fading of the binocular
+    controller alone: in gaze space no delay of seeing is left, and the reflex is exact.
+    """
+
+    # fmt: off
+    model: Annotated[Literal["gaze_space", "binocular", "opposite_angles"],
+        "the gaze point follows the predicted target; or the binocular controller of Zhang & Wakamatsu moves the eyes; or they stand "
+        "between shifts and turn by the opposite of the head's angles (Nakamoto & Tsuruno 3.4)"] = "gaze_space"
+    gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc at which the position error is closed"] = 8.0
+    velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye follows at once; people .95"] = 0.95
+    vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0
+    divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv instead of Kd if the target is farther away than the gaze point"] = 3.0
+    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit, closing of the error included; people 63 deg/s"] = 60.0
+    reject_deg_s: Annotated[float, Bounds(1, 1000), "a target reported as faster than this is taken as a jump and not pursued"] = 100.0
+    max_error_deg: Annotated[float, Bounds(0.1, 90),
+        "the rate of closing applies to at most this error; larger errors are closed no faster"] = 5.0
+    delay_ms: Annotated[float, Bounds(0, 500), "binocular: delay tau_c of seeing, the age of a frame included"] = 100.0
+    smooth_ms: Annotated[float, Bounds(0.1, 500), "binocular: smoothing Tf of the direction seen"] = 40.0
+    vergence_delay_ms: Annotated[float, Bounds(0, 500), "binocular: what vergence is later than that; 60 makes 160 ms in all"] = 60.0
+    max_vergence_deg: Annotated[float, Bounds(1, 60), "binocular: largest vergence"] = 20.0
+    reflex_gain: Annotated[float, Bounds(0, 1.5), "binocular: gain of the vestibulo-ocular reflex; people .95"] = 1.0
+    reflex_delay_ms: Annotated[float, Bounds(0, 100), "binocular: delay of the reflex; people 7-10"] = 10.0
+    lost_fade_ms: Annotated[float, Bounds(1, 5000), "binocular: time constant of the eyes' speed when the target is lost"] = 300.0
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class HeadParams:
+    """Start, share, duration and roll of head movements."""
+
+    # fmt: off
+    goal_model: Annotated[Literal["attention", "align", "stahl"],
+        "share of the head in a gaze shift: head_slope of what exceeds the eye-only range (stahl), by salience (attention, eq 7), or "
+        "fixed (align)"] = "stahl"
+    eye_only_range_deg: Annotated[float, Bounds(0, 180),
+        "with goal_model stahl: full width of the range of targets, as seen from where the head points, that the eyes take alone; "
+        "people 4 to 68"] = 35.8
+    head_slope: Annotated[float, Bounds(0, 1),
+        "with goal_model stahl: degrees of head for each degree beyond that range; people .61 to .93"] = 0.77
+    max_offset_deg: Annotated[float, Bounds(0, 90),
+        "with the other two: how far short of the target the head stops at min_salience, and the eccentricity beyond which it starts to "
+        "move; both at most the eye's limit less eye_margin_deg"] = 30.0
+    eye_margin_deg: Annotated[float, Bounds(0, 30), "distance that the eyes keep from their limit"] = 2.0
+    min_salience: Annotated[float, Bounds(0, 10), "salience A1 of the least interest: the head turns and rolls least"] = 0.2
+    max_salience: Annotated[float, Bounds(0, 10), "salience A2 of the highest interest: the head turns and rolls most"] = 1.0
+    align: Annotated[float, Bounds(0, 1),
+        "with goal_model align: 0: the head stops max_offset_deg short of the target, 1: it faces the target"] = 0.5
+    literal_reach: Annotated[bool, "use max_offset_deg even if it exceeds the eyes' limit, as printed in the paper"] = False
+    roll_deg: Annotated[float, Bounds(0, 20),
+        "roll of the head, ear to the side that it turns to, at the highest interest for a target 30 deg or more aside; 0: none"] = 4.0
+    lead_ms: Annotated[float, Bounds(0, 100), "how long the head starts before the eyes, for top-down targets to which it turns"] = 0.0
+    start_delay_ms: Annotated[float, Bounds(0, 1000), "how long the head starts after the eyes, for bottom-up targets"] = 20.0
+    base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0: the peak speed of a head movement of A degrees is (4/3 A/50 + 0.4) V0"] = 70.0
+    min_move_ms: Annotated[float, Bounds(20, 5000), "shortest duration of a head movement; otherwise small ones would be twitches"] = 300.0
+    replan_deg: Annotated[float, Bounds(0.05, 20), "a moving head plans its movement again when the goal changes by this much"] = 1.0
+    recentre_after_ms: Annotated[float, Bounds(0, 60000),
+        "after an eye has been eccentric for this long, the head turns slowly to bring it back"] = 800.0
+    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 8.0
+    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it brings the eyes back"] = 30.0
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check the order of the two amounts of attention.
+
+        Raises:
+            ValueError: max_salience is not above min_salience.
+        """
+        if self.max_salience <= self.min_salience:
+            raise ValueError("max_salience must be above min_salience")
