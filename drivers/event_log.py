@@ -1,11 +1,7 @@
-"""Events of a bus as text, and the labels of servos in them."""
+"""Events of a bus as text."""
 
 from collections import deque
 from math import inf
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # the guardian, which names servos too, starts without numpy
-    from gazerig.drivers.types import ServoConfig
 
 MOST = 200
 """Most lines kept until they are drained."""
@@ -54,11 +50,6 @@ class RateLimitedLog:
         often = self._since.pop(kind, 0)
         times = "once more" if often == 1 else f"{often} more times"
         self._log.add(f"{text} ({times} since it was said last)" if often else text)
-
-
-def servo_label(setup: "ServoConfig", noun: str = "servo") -> str:
-    """Return a servo's label for messages: its joint and id, or its id alone."""
-    return f"{setup.name} ({noun} {setup.id})" if setup.name else f"{noun} {setup.id}"
 
 
 def register_label(register: str) -> str:

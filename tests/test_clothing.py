@@ -6,9 +6,8 @@ import pytest
 from seeing.row_09_identities import LENS, SIZE, Crowd, detected
 
 from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
-from gazerig.drivers.camera.located_frame import Clothing
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import DetectedFace, DetectedPerson, ImageArray
+from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, ImageArray
 from gazerig.drivers.vision.clothing import ClothingReader
 from gazerig.robot.model.intrinsics import project
 

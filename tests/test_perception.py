@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from seeing.material import background, noisy, paste, portrait
 from stand_in import StandIn
 
-from gazerig.drivers.camera.located_frame import Clothing
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.types import DetectedFace, DetectedPerson, Detections, MovingBlob
+from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, Detections, MovingBlob
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import norm, rotation

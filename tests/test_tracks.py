@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.camera.located_frame import Clothing
+from gazerig.drivers.types import Clothing
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import covariance
 from gazerig.robot.perception.track import LocalisedDetection, Track

@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Any, TypeVar
 
 from gazerig.drivers.errors import BusLost, DriverError, PluginError
-from gazerig.drivers.event_log import EventLog, RateLimitedLog, servo_label
+from gazerig.drivers.event_log import EventLog, RateLimitedLog
 from gazerig.drivers.plugins import failure
 from gazerig.drivers.process.bounded_call import BoundedCall, CallResult
 from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
@@ -109,7 +109,7 @@ class CheckedBus:
         }
         if not wrong:
             return feedback
-        names = ", ".join(servo_label(self._setups[i]) for i in sorted(wrong))
+        names = ", ".join(self._setups[i].label() for i in sorted(wrong))
         text = (
             f"{self._label}: no finite position, speed, load or time of {names}: taken as missing"
         )

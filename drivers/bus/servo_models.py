@@ -8,7 +8,6 @@ from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
 from gazerig.drivers.dynamixel.control_table import DynamixelModel
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.event_log import servo_label as label_with
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechModel
 from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS
@@ -129,4 +128,4 @@ def add_models(
 
 def servo_label(setup: "ServoConfig") -> str:
     """Return a servo's label for messages: its joint and its id, or its channel."""
-    return label_with(setup, "channel" if setup.model in HOBBY else "servo")
+    return setup.label("channel" if setup.model in HOBBY else "servo")

@@ -4,11 +4,10 @@ from collections.abc import Callable
 from math import degrees
 from time import perf_counter
 
-from gazerig.drivers.camera.located_frame import LocatedFrame
 from gazerig.drivers.camera.off_frame import OffFrameReport, is_off_frame
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, MovingBlob
+from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, LocatedFrame, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds what moves, from one frame to the next."""

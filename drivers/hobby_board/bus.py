@@ -21,7 +21,6 @@ from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.silence import SilenceMonitor
 from gazerig.drivers.hobby_board.start import enable_channels
@@ -205,7 +204,7 @@ class HobbyBoardBus(PortBus):
 
     def faults(self) -> tuple[str, ...]:
         """Return the present faults of channels and the board's errors of the last 10 s."""
-        channels = (f"{channel_label(c.setup)}: {c.fault}" for c in self._channels if c.fault)
+        channels = (f"{c.setup.label('channel')}: {c.fault}" for c in self._channels if c.fault)
         errors = self._supervisor.recent_errors(self._port.now_s())
         return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
 
@@ -290,7 +289,7 @@ class HobbyBoardBus(PortBus):
         return released
 
     def _servo_label(self, servo_id: int) -> str:
-        return channel_label(next(c.setup for c in self._channels if c.id == servo_id))
+        return next(c.setup for c in self._channels if c.id == servo_id).label("channel")
 
     def _cannot_release(self) -> str:
         """Return what the servos do when their pulses cannot be switched off."""

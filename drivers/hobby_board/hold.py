@@ -8,7 +8,7 @@ from enum import Enum
 
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
-from gazerig.drivers.hobby_board.models import US_STEPS, channel_label
+from gazerig.drivers.hobby_board.models import US_STEPS
 
 
 class HoldResult(Enum):
@@ -51,9 +51,9 @@ def refusal(board: Board, channel: Channel) -> str:
     """Return why a channel gives another pulse than commanded, with the remedy."""
     goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
     if not pulse:
-        return f"{channel_label(channel.setup)} gives no pulses: {board.texts.no_pulses}"
+        return f"{channel.setup.label('channel')} gives no pulses: {board.texts.no_pulses}"
     sent, got = f"{goal / US_STEPS:g} us", f"{pulse / US_STEPS:g} us"
     return (
-        f"{channel_label(channel.setup)} is sent to {sent} and gets {got}: "
+        f"{channel.setup.label('channel')} is sent to {sent} and gets {got}: "
         f"{board.texts.other_pulse}"
     )

@@ -1,11 +1,6 @@
 """Hobby servos, whatever board sends their pulses."""
 
-from typing import TYPE_CHECKING, NamedTuple
-
-from gazerig.drivers.event_log import servo_label
-
-if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.types import ServoConfig
+from typing import NamedTuple
 
 US_STEPS = 4
 """Pulse widths are counted in quarters of a microsecond."""
@@ -29,8 +24,3 @@ HOBBY = {
     model.name: model
     for model in (HobbyModel("hobby", 1000 * US_STEPS * 4.0, 500 * US_STEPS, 2500 * US_STEPS),)
 }
-
-
-def channel_label(setup: "ServoConfig") -> str:
-    """Return a hobby servo's label for messages: its joint and its channel."""
-    return servo_label(setup, "channel")

@@ -8,7 +8,6 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
-from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES
 from gazerig.drivers.types import ServoConfig
 
@@ -29,7 +28,7 @@ def every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
     for setup in setups:
         if board.pulses((setup.id,)) is None:
             raise ServoMissing(
-                f"{where}: no answer about {channel_label(setup)}: {board.texts.no_answer}"
+                f"{where}: no answer about {setup.label('channel')}: {board.texts.no_answer}"
             )
     raise ServoMissing(f"{where}: answers get lost: {board.texts.noise}")
 
@@ -46,7 +45,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
     pulses = every_pulse(board, [channel.setup for channel in channels])
     for channel, pulse in zip(channels, pulses, strict=True):
         channel.found(pulse)
-    without_pulses = [channel_label(channel.setup) for channel in channels if not channel.on]
+    without_pulses = [channel.setup.label("channel") for channel in channels if not channel.on]
     if without_pulses:
         log.add(f"{', '.join(without_pulses)} had no pulses: they go to their places at once")
     start_s = -inf
@@ -72,6 +71,6 @@ def _insist(board: Board, channel: Channel, pulse: int) -> None:
     where = board.line.port.port_name
     if outcome is HoldResult.NO_ANSWER:
         raise ServoMissing(
-            f"{where}: no answer about {channel_label(channel.setup)}: check its cable"
+            f"{where}: no answer about {channel.setup.label('channel')}: check its cable"
         )
     raise ServoMissing(f"{where}: {refusal(board, channel)}")

@@ -12,7 +12,7 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
-from gazerig.drivers.hobby_board.models import HOBBY, channel_label
+from gazerig.drivers.hobby_board.models import HOBBY
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A board that lets go of its channels more often within such a time stays without pulses."""
@@ -213,7 +213,7 @@ class BoardSupervisor:
         who = (
             "the board"
             if len(lost) == len(self._channels)
-            else ", ".join(channel_label(channel.setup) for channel in lost)
+            else ", ".join(channel.setup.label("channel") for channel in lost)
         )
         self._line.errors["restarted"] += 1
         for channel in lost:
@@ -262,7 +262,7 @@ class BoardSupervisor:
         fault = "restarts again and again: supply too weak"
         for channel in self.pending:
             channel.fault = fault
-            self._log.add(f"{channel_label(channel.setup)}: {fault}")
+            self._log.add(f"{channel.setup.label('channel')}: {fault}")
         self._board.stop([channel.id for channel in self.pending])
         for channel in self.pending:
             channel.stop()

@@ -10,7 +10,6 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing, goals_of
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.maestro.commands import (
     ERRORS,
@@ -69,7 +68,7 @@ class MaestroBoard:
         for setup, pulse in zip(setups, pulses, strict=True):
             if 0 < pulse <= MOST_INPUT:
                 raise ServoMissing(
-                    f"{where}: channel {setup.id} is an input, {channel_label(setup)} cannot "
+                    f"{where}: channel {setup.id} is an input, {setup.label('channel')} cannot "
                     "move: set it to Servo in Pololu's program"
                 )
         return pulses

@@ -9,7 +9,7 @@ from gazerig.drivers.bus.plausibility import DISTURBED_S
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
-from gazerig.drivers.event_log import EventLog, servo_label
+from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.servo_bus.discovery import find
@@ -79,7 +79,7 @@ class SmartServoBus(PortBus):
             params.prompt_timeout_ms / 1000.0,
             params.reply_timeout_ms / 1000.0,
             params.baud,
-            {setup.id: servo_label(setup) for setup in setups},
+            {setup.id: setup.label() for setup in setups},
         )
         self._damaged = 0
         self._assemble(None)
@@ -398,6 +398,6 @@ class SmartServoBus(PortBus):
         for setup in setups if self._family.single_turn else ():
             if not 0 <= setup.min_steps <= setup.max_steps < turn:
                 raise ValueError(
-                    f"{servo_label(setup)}: {setup.min_steps}..{setup.max_steps} is no range "
+                    f"{setup.label()}: {setup.min_steps}..{setup.max_steps} is no range "
                     f"within 0..{turn - 1} steps"
                 )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.event_log import EventLog, servo_label
+from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 from gazerig.drivers.servo_bus.family import Family, Identity, Status
 from gazerig.drivers.servo_bus.registers import REPLY_S, Registers, transact
@@ -264,7 +264,7 @@ def find(
 
 def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
     """Return what is wrong with one servo, "" where nothing is."""
-    who = servo_label(setup)
+    who = setup.label()
     if found is None:
         return f"{who} does not answer"
     if found.model_number != family.models[setup.model].number:

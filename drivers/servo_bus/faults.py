@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from gazerig.drivers.event_log import EventLog, RateLimitedLog, servo_label
+from gazerig.drivers.event_log import EventLog, RateLimitedLog
 from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 from gazerig.drivers.types import ServoConfig
 
@@ -62,14 +62,14 @@ class ServoHealth:
     def name(self, servo_id: int, fault: str) -> None:
         """Record a fault that stays until the servo has been restarted."""
         self.faults[servo_id] = fault
-        self._log.add(f"{servo_label(self._setups[servo_id])}: {fault}")
+        self._log.add(f"{self._setups[servo_id].label()}: {fault}")
 
     def cleared(self, servo_id: int) -> None:
         """Record that a servo's latched error is gone."""
         if servo_id in self.latches:
             self.latches.discard(servo_id)
             del self.faults[servo_id]
-            self._log.add(f"{servo_label(self._setups[servo_id])}: the fault is gone")
+            self._log.add(f"{self._setups[servo_id].label()}: the fault is gone")
 
     def exhausted(self, servo_id: int, now_s: float) -> bool:
         """Return whether a servo has restarted too often recently, which is then a fault."""
@@ -83,13 +83,13 @@ class ServoHealth:
     def restarted(self, servo_id: int, now_s: float) -> None:
         """Record that a servo had restarted and works again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
-        self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up again")
+        self._log.add(f"{self._setups[servo_id].label()} restarted: set up again")
 
     def not_set_up(self, servo_id: int) -> None:
         """Record that a servo could not be set up again, alone."""
         self._failed[servo_id] = failed = self._failed.get(servo_id, 0) + 1
         if failed == FAILED_IN_A_ROW:
-            self._log.add(f"{servo_label(self._setups[servo_id])} {NOT_SET_UP}")
+            self._log.add(f"{self._setups[servo_id].label()} {NOT_SET_UP}")
 
     def set_up(self, servo_id: int) -> None:
         """Record that a servo has been set up again."""
@@ -120,7 +120,7 @@ class ServoHealth:
             since_s = self._silent_since.pop(servo_id)
             if servo_id in self._reported:
                 self._reported.discard(servo_id)
-                who = servo_label(self._setups[servo_id])
+                who = self._setups[servo_id].label()
                 self._log.add(f"{who} answers again after {now_s - since_s:.1f} s")
         for servo_id in out:
             self._silent_since.setdefault(servo_id, now_s)
@@ -174,7 +174,7 @@ class ServoHealth:
             if servo_id not in self._reported and silent_s >= SAY_SILENT_S:
                 self._reported.add(servo_id)
                 what = GARBLES if servo_id in garbling else "does not answer"
-                self._log.add(f"{servo_label(self._setups[servo_id])} {what}")
+                self._log.add(f"{self._setups[servo_id].label()} {what}")
 
     def silent_for_s(self, now_s: float) -> float:
         """Return how long no servo has answered."""

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.event_log import EventLog, register_label, servo_label
+from gazerig.drivers.event_log import EventLog, register_label
 from gazerig.drivers.servo_bus.family import Register
 from gazerig.drivers.servo_bus.read_plan import AddressMap
 from gazerig.drivers.servo_bus.registers import Registers
@@ -136,7 +136,7 @@ class Provisioning:
                 self._write(servo_id, lock, 0)
         try:
             for servo_id, register, found, wanted in differences:
-                who = servo_label(self._setups[servo_id])
+                who = self._setups[servo_id].label()
                 if register.name == lock or self._write(servo_id, register.name, wanted):
                     self._log.add(f"{who}: {register_label(register.name)} {found} -> {wanted}")
         finally:
@@ -160,9 +160,9 @@ class Provisioning:
         for servo_id, data in self._addresses(ids, block).items():
             if data != block.data:
                 self._registers.write_bytes(servo_id, block.address, block.data)
-                self._log.add(f"{servo_label(self._setups[servo_id])}: Indirect Addresses set")
+                self._log.add(f"{self._setups[servo_id].label()}: Indirect Addresses set")
         found = self._addresses(ids, block)
-        bad = [servo_label(self._setups[i]) for i, data in found.items() if data != block.data]
+        bad = [self._setups[i].label() for i, data in found.items() if data != block.data]
         if bad:
             raise ServoMissing(
                 f"{self._where}: {', '.join(bad)} does not take the indirect addresses: restart "
@@ -179,14 +179,14 @@ class Provisioning:
         if not differences:
             return
         named = "; ".join(
-            f"{servo_label(self._setups[servo_id])} does not take "
+            f"{self._setups[servo_id].label()} does not take "
             f"{register_label(register.name)} {wanted}, it has {found}"
             for servo_id, register, found, wanted in differences
         )
         raise ServoMissing(f"{self._where}: {named}: restart its power or correct the rig file")
 
     def _raise_missing(self, ids: Iterable[int], found: Mapping[int, object], what: str) -> None:
-        missing = [servo_label(self._setups[i]) for i in ids if i not in found]
+        missing = [self._setups[i].label() for i in ids if i not in found]
         if missing:
             raise ServoMissing(
                 f"{self._where}: {', '.join(missing)} does not answer when asked for its "

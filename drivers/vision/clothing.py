@@ -14,8 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.camera.located_frame import Clothing
-from gazerig.drivers.types import DetectedFace, DetectedPerson, ImageArray
+from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, ImageArray
 
 Floats = NDArray[np.float32]
 

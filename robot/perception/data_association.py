@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.camera.located_frame import Clothing
+from gazerig.drivers.types import Clothing
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.track_params import TrackParams
 

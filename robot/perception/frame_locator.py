@@ -15,10 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera import depth_roi
-from gazerig.drivers.camera.located_frame import DetectionInCamera, LocatedFrame
 from gazerig.drivers.camera.off_frame import is_off_frame
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, Detections, MovingBlob
+from gazerig.drivers.types import (
+    DetectedFace,
+    DetectedPalm,
+    DetectedPerson,
+    DetectionInCamera,
+    Detections,
+    LocatedFrame,
+    MovingBlob,
+)
 from gazerig.gaze.angles import norm, scale
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M

@@ -1,6 +1,6 @@
 """Detections in the camera's axes, placed in the world by where the camera was."""
 
-from gazerig.drivers.camera.located_frame import DetectionInCamera
+from gazerig.drivers.types import DetectionInCamera
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.perception.track import LocalisedDetection

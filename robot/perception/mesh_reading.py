@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.camera.located_frame import FaceSigns
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import FaceMesh
+from gazerig.drivers.types import FaceMesh, FaceSigns
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.intrinsics import rays

@@ -11,9 +11,8 @@ from math import cos, hypot, radians, sqrt
 
 import numpy as np
 
-from gazerig.drivers.camera.located_frame import LocatedFrame
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
+from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, LocatedFrame
 from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
 from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M

@@ -5,7 +5,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from gazerig.drivers.camera.located_frame import Clothing, FaceSigns
+from gazerig.drivers.types import Clothing, FaceSigns
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.perception.gaze_at_head import SeenEyes
 from gazerig.robot.perception.kalman import TrackFilter
