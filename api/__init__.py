@@ -1,9 +1,9 @@
-"""Makes an animatronic head look at people the way people look at each other.
+"""Controls an animatronic head that looks at people as people look at each other.
 
 with gazerig.open("desk", mock=True) as head:
     head.look_at(1.0, 0.2, 0.3).wait()
 
-What stands in ``__all__`` is promised: it changes only with a word in the changelog.
+The names in ``__all__`` are stable; every change to them is listed in the changelog.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -58,7 +58,7 @@ _HOME = {
     "load_rig": "gazerig.config.schema",
     "open": "gazerig.opening",
 }
-"""Name -> the module it is imported from, when it is used: a short command may not wait for all."""
+"""Name -> module, imported at first use: a short command must not wait for all of them."""
 
 __all__ = [  # noqa: F822
     "ConfigError", "Error", "GazeReading", "Head", "HeadEnded", "HeadEvent", "HeadPose",

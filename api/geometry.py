@@ -1,4 +1,4 @@
-"""The geometry of a rig as plain functions: a point to joint angles, joint angles to sight."""
+"""Geometry of a rig: joint angles for a point, and lines of sight for joint angles."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ from gazerig.robot.model.types import JointState
 
 @dataclass(frozen=True, slots=True)
 class JointSolution:
-    """The joint angles with which a head comes to rest on a point.
+    """Joint angles at which a head comes to rest on a point.
 
     Attributes:
-        joints_rad: by name; lids open, joints that gaze does not move at 0.
+        joints_rad: by name; lids are open, joints that gaze does not move are at 0.
         reachable: both eyes meet the point within a degree.
-        error_deg: angle between the line of sight and the point, of the worse eye.
-        seen_m: the point as far away that is really looked at, world.
+        error_deg: angle between the point and the line of sight of the worse eye.
+        seen_m: the point at the target's distance that the eyes really look at, world frame.
         limited: the joints that keep the eyes from the point, with their ranges and the reason.
     """
 
@@ -46,7 +46,7 @@ class JointSolution:
 
 @dataclass(frozen=True, slots=True)
 class HeadPose:
-    """Where head and eyes are at given joint angles, in the world frame.
+    """Pose of head and eyes at given joint angles, in the world frame.
 
     Attributes:
         head_rad: (yaw, pitch, roll).
@@ -68,18 +68,18 @@ class HeadPose:
 
 
 def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolution:
-    """Return the joint angles with which head and eyes look at a point: nothing moves.
+    """Return the joint angles with which head and eyes look at a point; nothing moves.
 
-    The head takes the share of the turn that the rig's gaze gives it from straight ahead, the eyes
-    the rest. A head that is turned that way already may stay where it is.
+    The head starts straight ahead and makes its share of the turn; the eyes make the rest. A real
+    head that is already turned towards the point may stay in its position.
 
     Args:
-        rig: from ``load_rig``, or the name or path of one.
-        point_m: x ahead, y left, z up of the neck base, metres.
+        rig: from ``load_rig``, or the name or path of a rig.
+        point_m: metres from the neck base; x ahead, y left, z up.
 
     Raises:
-        Refused: it is no point.
-        ConfigError: the rig is at fault.
+        Refused: the coordinates are not a point.
+        ConfigError: the rig is invalid.
     """
     try:
         check(LookAt(point_m))
@@ -102,15 +102,15 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
 
 
 def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
-    """Return where head and eyes are at joint angles.
+    """Return the pose of head and eyes at joint angles.
 
     Args:
-        rig: from ``load_rig``, or the name or path of one.
-        joints_rad: angles by joint; those left out are at 0.
+        rig: from ``load_rig``, or the name or path of a rig.
+        joints_rad: angles by joint; the others are 0.
 
     Raises:
-        Refused: the rig has no such joint; the message lists those it has.
-        ConfigError: the rig is at fault.
+        Refused: the rig has no such joint; the message lists its joints.
+        ConfigError: the rig is invalid.
     """
     kinematics, _ = _parts(_loaded(rig))
     if strange := [name for name in joints_rad if name not in kinematics.names]:
@@ -139,7 +139,7 @@ def _parts(rig: Rig) -> tuple[Kinematics, Oculomotor]:
 
 
 class _RigKey:
-    """A rig as part of a key: equal only to itself, as rigs hold mappings."""
+    """A rig as a cache key: equal only to itself, because rigs hold mappings."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig

@@ -1,4 +1,4 @@
-"""What a program can ask of a head, wherever the head runs."""
+"""The interface of a head, whether it runs in this program or in another."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
@@ -38,18 +38,20 @@ from gazerig.robot.model.commands import (
 
 
 class Head(ABC):
-    """A head that a program speaks to: one of its own, or one that runs in another program.
+    """A head of this program, or one that runs in another program.
 
     World frame: at the neck base, x ahead, y left, z up. Head frame: the same axes, turned with
-    the head, from midway between the eyes. Metres and seconds; angles of arguments in degrees,
-    those of values as their names say; yaw + left, pitch + up.
+    the head, with the origin midway between the eyes. Units are metres and seconds. Arguments take
+    angles in degrees; the names of values end with their unit. Yaw is positive to the left, pitch
+    upwards.
 
-    Orders return at once; ``Order.reply`` says what is really done of them, ``Order.wait`` waits.
-    What takes the lead of gaze or joints keeps it until something else takes it, ``look_freely``,
-    its time (``for_s``), or the end of the head's ``with`` block or of the program.
+    Orders return immediately. ``Order.reply`` reports what the head makes of them, and
+    ``Order.wait`` waits for them to end. An order that takes control of gaze or joints keeps it
+    until another order takes it, until ``look_freely``, until its time (``for_s``) is over, or
+    until the head's ``with`` block or the program ends.
 
     Attributes:
-        rig: the rig by its name or path.
+        rig: name or path of the rig.
     """
 
     rig: str
@@ -58,7 +60,7 @@ class Head(ABC):
 
     @abstractmethod
     def __enter__(self) -> Self:
-        """Start, or connect."""
+        """Start the head, or connect to it."""
 
     @abstractmethod
     def __exit__(
@@ -67,9 +69,9 @@ class Head(ABC):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Let go: park and switch off a head of one's own, hang up on another program's."""
+        """Park and switch off a head of this program, or disconnect from another program's."""
 
-    # Where to look
+    # Gaze
 
     def look_at(
         self, x_m: float, y_m: float, z_m: float, *, frame: Frame = "world",
@@ -81,47 +83,47 @@ class Head(ABC):
             x_m: metres ahead.
             y_m: metres to the left.
             z_m: metres up.
-            frame: "world"; or "head": the point is where the head has it now, and stays there.
-            for_s: the lead ends after so many seconds.
+            frame: "world"; or "head": relative to the present pose, then fixed in the world.
+            for_s: seconds until the order gives up control.
 
         Raises:
-            Refused: it is no point.
+            Refused: the coordinates are not a point.
         """
         if frame == "head":
             return self._give(LookAtInHead((x_m, y_m, z_m), self._who, self._stay, for_s))
         if frame != "world":
             from gazerig.errors import Refused
 
-            raise Refused(f"frame {frame!r}: there is world, head")
+            raise Refused(f"frame {frame!r}: expected world or head")
         return self._give(LookAt((x_m, y_m, z_m), self._who, self._stay, for_s))
 
     def look_towards(
         self, yaw_deg: float, pitch_deg: float, *, frame: Frame = "world",
         distance_m: float = FAR_M, for_s: float | None = None,
     ) -> Order:  # fmt: skip
-        """Look in a direction from where the head is now.
+        """Look in a direction, seen from the present position of the head.
 
         Args:
             yaw_deg: to the left, -180..180.
             pitch_deg: upwards, -90..90.
-            frame: "world", or "head": from straight ahead of the head as it is now.
-            distance_m: on what the eyes converge.
-            for_s: the lead ends after so many seconds.
+            frame: "world", or "head": relative to the direction that the head faces now.
+            distance_m: distance at which the eyes converge.
+            for_s: seconds until the order gives up control.
 
         Raises:
-            Refused: it is no direction.
+            Refused: the angles are not a direction.
         """
         angles = (radians(yaw_deg), radians(pitch_deg))
         return self._give(LookAtDirection(angles, frame, distance_m, self._who, self._stay, for_s))
 
     def look_at_person(self, id: int, *, for_s: float | None = None) -> Order:
-        """Look at a person's face, part by part as people do, and follow.
+        """Look at a person's face, part by part as people do, and follow it.
 
-        The lead ends when the person was not seen for two seconds.
+        The order ends when the person has not been seen for two seconds.
 
         Args:
             id: ``Person.id``.
-            for_s: the lead ends after so many seconds.
+            for_s: seconds until the order gives up control.
         """
         return self._give(LookAtPerson(id, self._who, self._stay, for_s))
 
@@ -129,15 +131,15 @@ class Head(ABC):
         self, x_px: float, y_px: float, *, distance_m: float | None = None,
         captured_s: float | None = None, for_s: float | None = None,
     ) -> Order:  # fmt: skip
-        """Look at what a pixel of the camera's frame shows, by where the camera was then.
+        """Look at what a pixel of the camera image shows, from the camera's pose at that time.
 
         Args:
             x_px: to the right from the centre of the upper left pixel.
             y_px: down from there.
-            distance_m: of it from the camera; None: as measured by the camera, or as far as what
-                is seen there.
+            distance_m: from the camera; None: as measured by the camera, or as far as the object
+                that is seen there.
             captured_s: time of the frame (``HeadState.frame_s``); None: the newest frame.
-            for_s: the lead ends after so many seconds.
+            for_s: seconds until the order gives up control.
         """
         pixel = (x_px, y_px)
         return self._give(
@@ -156,29 +158,29 @@ class Head(ABC):
         Args:
             joint: its name, as in ``joints``.
             deg: its angle.
-            for_s: the lead ends after so many seconds.
+            for_s: seconds until the order gives up control.
 
         Raises:
-            Refused: there is no such joint, or the angle is outside its range.
+            Refused: the rig has no such joint, or the angle is outside its range.
         """
         return self._give(Jog(((joint, radians(deg)),), self._who, self._stay, for_s))
 
     def release_joints(self) -> Order:
-        """Return all joints from ``jog`` to gaze."""
+        """Return all joints from ``jog`` to the control of gaze."""
         return self._give(Jog((), self._who))
 
     # Face and behaviour
 
     def play(self, gesture: str, *, speed: float = 1.0, times: int = 0) -> Order:
-        """Play a gesture over gaze, once; the eyes stay where they look.
+        """Play a gesture over gaze, once; the eyes keep their target.
 
         Args:
-            gesture: its name; "" ends the one under way.
+            gesture: its name; "" ends the present one.
             speed: factor on the speed at which it was written.
-            times: how often it is repeated; 0: as the gesture says.
+            times: number of repetitions; 0: as the gesture defines.
 
         Raises:
-            Refused: there is no such gesture; the message lists those there are.
+            Refused: the rig has no such gesture; the message lists its gestures.
         """
         return self._give(Play(gesture, speed, times, self._who))
 
@@ -187,17 +189,17 @@ class Head(ABC):
 
         Args:
             expression: its name; "neutral" ends it.
-            strength: 0 none of it .. 1 as written.
+            strength: 0 (no effect) .. 1 (as written).
         """
         return self._give(Express(expression, strength))
 
     def level(self, name: str, value: float) -> Order:
-        """Set a level of the rig's table, such as a jaw by loudness.
+        """Set a level of the rig's table, such as the jaw's opening by loudness.
 
-        Without another call within half a second it falls to 0.
+        It falls to 0 unless it is set again within half a second.
 
         Args:
-            name: of the level.
+            name: name of the level.
             value: 0..1.
         """
         return self._give(SetLevel(name, value))
@@ -209,7 +211,7 @@ class Head(ABC):
             mode: "none", "talk", "listen" or "think".
 
         Raises:
-            Refused: there is no such mode.
+            Refused: the mode is unknown.
         """
         return self._give(Ask("conversation", mode))
 
@@ -217,7 +219,7 @@ class Head(ABC):
         """Choose a behaviour of the rig's rules.
 
         Raises:
-            Refused: there is no such behaviour; the message lists those there are.
+            Refused: the rig has no such behaviour; the message lists its behaviours.
         """
         return self._give(Ask("behaviour", behaviour))
 
@@ -228,17 +230,17 @@ class Head(ABC):
     # Stop
 
     def stop(self, why: str = "asked for by the program") -> Order:
-        """Switch the torque off at once, without parking; the program goes on."""
+        """Switch the torque off immediately, without parking; the program continues."""
         order = self._give(Stop(why, self._who))
-        _ = order.reply  # obeyed when this returns
+        _ = order.reply  # wait until the torque is off
         return order
 
     def resume(self, *, confirmed: bool = False) -> Order:
-        """Switch the torque on again after a stop, where the joints are, and go on slowly.
+        """Switch the torque on again after a stop, at the present angles, and start slowly.
 
         Args:
-            confirmed: a person has said that no hand is in the mechanism; needed where somebody
-                else has stopped the head.
+            confirmed: a person has confirmed that no hand is in the mechanism; needed if another
+                person or program has stopped the head.
         """
         order = self._give(Resume(self._who, confirmed))
         _ = order.reply
@@ -248,36 +250,36 @@ class Head(ABC):
 
     @abstractmethod
     def get(self, prefix: str = "") -> Mapping[str, Value]:
-        """Return the values in force of all keys of the rig that begin so."""
+        """Return the present values of all keys of the rig that start with a prefix."""
 
     @abstractmethod
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Put values at dotted keys in force, all of them or none.
+        """Apply values at dotted keys, all of them or none.
 
         Returns:
-            One line for each value that is another one now.
+            One line for each value that has changed.
 
         Raises:
-            Refused: with every rule that is broken.
+            Refused: rules are broken; the message names all of them.
         """
 
     @abstractmethod
     def save(self, path: Path | str | None = None) -> Path:
-        """Write what is in force into the rig's file, or another one; return the file.
+        """Write the present values into the rig's file, or into another one; return its path.
 
         Raises:
-            Refused: the file cannot be written, or comes with the program.
+            Refused: the file cannot be written, or is a file of the program.
         """
 
     @abstractmethod
     def revert(self) -> tuple[str, ...]:
-        """Put the values of the rig's file in force again; return a line for each."""
+        """Restore the values of the rig's file; return a line for each change."""
 
     @abstractmethod
     def menus(self) -> Mapping[str, tuple[str, ...]]:
-        """Return behaviours, modes of conversation and what the lids do; those in force first."""
+        """Return behaviours, conversation modes and lid states; the active one is the first."""
 
-    # What is
+    # State
 
     @property
     @abstractmethod
@@ -291,23 +293,23 @@ class Head(ABC):
 
     @property
     def gaze(self) -> GazeReading:
-        """Return where head and eyes are and what they look at."""
+        """Return the pose of head and eyes and their target."""
         return self.state.gaze
 
     @property
     def people(self) -> tuple[Person, ...]:
-        """Return the people who are seen."""
+        """Return the people who are visible."""
         return self.state.people
 
     def states(self, rate_hz: float = 50.0, *, seconds: float | None = None) -> Iterator[HeadState]:
-        """Return an iterator over the newest states; older ones that nobody took are dropped.
+        """Return an iterator over the newest states; states that are not read in time are dropped.
 
-        The loop never waits for it. Of a head in simulated time each step of the iterator steps
-        the head.
+        The control loop never waits for the reader. For a head in simulated time each step of the
+        iterator steps the head.
 
         Args:
-            rate_hz: states a second at most.
-            seconds: ends after so many, by the head's own clock; None: never.
+            rate_hz: highest number of states per second.
+            seconds: duration by the head's own clock; None: without end.
         """
         if not rate_hz > 0.0:
             from gazerig.errors import Refused
@@ -316,12 +318,13 @@ class Head(ABC):
         return self._states(1.0 / rate_hz, seconds)
 
     def events(self, timeout_s: float | None = None) -> Iterator[HeadEvent]:
-        """Return an iterator over what happens, from the start; it waits for the next event.
+        """Return an iterator over all events since the start; it waits for the next one.
 
-        At most the last 1000 events are kept for it.
+        The head stores the last 1000 events.
 
         Args:
-            timeout_s: ends after so long without an event; 0: with those there are; None: never.
+            timeout_s: ends after this time without an event; 0: after the stored events; None:
+                never.
         """
         number = 0
         while True:
@@ -335,27 +338,27 @@ class Head(ABC):
                 return
 
     def sleep(self, seconds: float) -> None:
-        """Wait so long by the head's own clock; in simulated time it is stepped.
+        """Wait by the head's own clock; a head in simulated time is stepped.
 
         Raises:
-            HeadEnded: the head has ended meanwhile.
+            HeadEnded: the head has ended in the meantime.
         """
         self._pause(lambda: False, seconds)
 
     @abstractmethod
     def _progress(self) -> Progress:
-        """Return the newest lead and gesture."""
+        """Return the owner of gaze and joints, and the newest gesture."""
 
     @abstractmethod
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Let the head's time pass until something is true, for so long at most.
+        """Let the head's time pass until a condition is true, or at most ``seconds``.
 
         Raises:
-            HeadEnded: the head has ended meanwhile.
+            HeadEnded: the head has ended in the meantime.
         """
 
     def _let_go(self) -> None:
-        """Let the head choose its targets again, and do not ask what came of it."""
+        """Let the head choose its targets again, without waiting for the reply."""
         self._give(LookAt(None, self._who))
 
     def _states(self, every_s: float, seconds: float | None) -> Iterator[HeadState]:
@@ -376,12 +379,12 @@ class Head(ABC):
 
     @abstractmethod
     def _events(self, after: int) -> tuple[HeadEvent, ...]:
-        """Return the events kept whose numbers are above ``after``."""
+        """Return the stored events with numbers above ``after``."""
 
     @abstractmethod
     def _give(self, command: Command) -> Order:
-        """Hand on a command.
+        """Send a command to the head.
 
         Raises:
-            Refused: it cannot be meant.
+            Refused: a value of the command is invalid.
         """

@@ -1,4 +1,4 @@
-"""Heads of this program: one that runs beside it, and one in simulated time."""
+"""Heads of this program: in real time in a thread, or in simulated time."""
 
 import contextlib
 import logging
@@ -35,12 +35,12 @@ _ENDED = "the program"
 
 
 class LocalHead(Head):
-    """A head whose control loop is in this program; ``gazerig.open`` makes one.
+    """A head whose control loop is in this program; ``gazerig.open`` creates it.
 
     Args:
         options: what to run.
-        substitutes: the program's own camera, detector or rule of attention.
-        say: gets one line about whatever happens; None: ``logging.getLogger("gazerig")``.
+        substitutes: the program's own camera, detector or attention rule.
+        say: receives one line per message; None: ``logging.getLogger("gazerig")``.
     """
 
     def __init__(
@@ -65,32 +65,32 @@ class LocalHead(Head):
             self._pause(lambda: self._feed.newest is not None, 10.0)
             tick = self._feed.newest
         if tick is None:
-            raise HeadEnded("the control loop does not tick")
+            raise HeadEnded("the control loop is not running")
         return head_state(tick)
 
     def get(self, prefix: str = "") -> Mapping[str, Value]:
-        """Return the values in force of all keys of the rig that begin so."""
+        """Return the present values of all keys of the rig that start with a prefix."""
         with _as_refused():
             return self._params().get(prefix)
 
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Put values at dotted keys in force from the next tick on, all of them or none."""
+        """Apply values at dotted keys from the next tick on, all of them or none."""
         with _as_refused():
             return self._params().set(changes)
 
     def save(self, path: Path | str | None = None) -> Path:
-        """Write what is in force into the rig's file, or another one; return the file."""
+        """Write the present values into the rig's file, or into another one; return its path."""
         whole = None if path is None else Path(path).expanduser().absolute()
         with _as_refused():
             return self._params().save(whole).path
 
     def revert(self) -> tuple[str, ...]:
-        """Put the values of the rig's file in force again; return a line for each."""
+        """Restore the values of the rig's file; return a line for each change."""
         with _as_refused():
             return self._params().revert()
 
     def menus(self) -> Mapping[str, tuple[str, ...]]:
-        """Return behaviours, modes of conversation and what the lids do; those in force first."""
+        """Return behaviours, conversation modes and lid states; the active one is the first."""
         return self._running().made.robot.menus()
 
     def _progress(self) -> Progress:
@@ -113,13 +113,13 @@ class LocalHead(Head):
         """Return the run.
 
         Raises:
-            Error: it has not begun.
+            Error: it has not started.
             HeadEnded: it has ended.
         """
         if self._ended:
             raise HeadEnded(f"the head has ended: {self._ended}")
         if self._composed is None:
-            raise Error(f"the head moves inside a block: with gazerig.open({self.rig!r}) as head:")
+            raise Error(f"use the head in a with block: with gazerig.open({self.rig!r}) as head:")
         return self._composed
 
     def _params(self) -> ParamStore:
@@ -130,22 +130,22 @@ class LocalHead(Head):
 
     def _compose(self) -> session.ComposedRun:
         if self._composed is not None:
-            raise Error("a head is used in one block: open another")
+            raise Error("a head can be used in one with block only: open another")
         self._composed = session.compose(self._options, self._substitutes)
         return self._composed
 
     @abstractmethod
     def __enter__(self) -> Self:
-        """Switch the torque on where the joints are, and begin."""
+        """Switch the torque on at the present joint angles, and start."""
 
 
 class RunningHead(LocalHead):
-    """A head whose loop runs in a thread beside the program, in real time.
+    """A head whose loop runs in its own thread, in real time.
 
-    Whatever ends the block parks the head and switches the torque off, as ``gazerig run`` does:
-    its end, an exception, Ctrl-C, SIGTERM and SIGHUP (``ProgramSignals``), the end of the thread
-    that opened it or of the interpreter. Further signals skip the rest of parking. What ends the
-    program at once (SIGKILL, a crash) leaves the torque to the guardian.
+    The head parks and switches the torque off, as ``gazerig run`` does, after each of these: the
+    end of the block, an exception, Ctrl-C, SIGTERM and SIGHUP (``ProgramSignals``), the end of the
+    thread that opened it or of the interpreter. Further signals skip the rest of parking. If the
+    program ends abruptly (SIGKILL, a crash), the guardian switches the torque off.
 
     Attributes:
         closing: the block has ended, and waits until the head has parked.
@@ -168,10 +168,10 @@ class RunningHead(LocalHead):
         self._ended_by = ""
 
     def __enter__(self) -> Self:
-        """Switch the torque on where the joints are, and run; return when the loop ticks."""
+        """Switch the torque on at the present joint angles; return after the first tick."""
         self._owner = threading.current_thread()
         composed = self._compose()
-        # Never a daemon, whatever thread opens the head: the interpreter's end waits for parking.
+        # Not a daemon thread, so that the interpreter waits for parking before it exits.
         self._thread = threading.Thread(
             target=self._run, args=(composed,), name=f"head {self.rig}", daemon=False
         )
@@ -196,9 +196,9 @@ class RunningHead(LocalHead):
         """Park, switch the torque off, and wait until that is done.
 
         Raises:
-            HeadEnded: a fault has ended the head before, and the block did not fail by itself.
-            KeyboardInterrupt: Ctrl-C came meanwhile.
-            SystemExit: SIGTERM or SIGHUP came meanwhile.
+            HeadEnded: a fault has ended the head, and the block raised no exception itself.
+            KeyboardInterrupt: Ctrl-C was pressed in the meantime.
+            SystemExit: SIGTERM or SIGHUP arrived in the meantime.
         """
         raised = self._close()
         if error is not None:
@@ -211,10 +211,10 @@ class RunningHead(LocalHead):
             raise HeadEnded(f"the head has ended: {self._ended}")
 
     def end(self, reason: str) -> None:
-        """Ask the head to park, from any thread or a signal handler; again, to park no further.
+        """Ask the head to park, from any thread or a signal handler; a second call skips parking.
 
         Args:
-            reason: for the line that reports the end.
+            reason: text for the line that reports the end.
         """
         if self.closing and reason in signal.Signals.__members__:
             self._ended_by = reason
@@ -230,7 +230,7 @@ class RunningHead(LocalHead):
             self._clock.sleep_until(min(now_s + _POLL_S, end_s))
 
     def _run(self, composed: session.ComposedRun) -> None:
-        """Run from torque on to torque off; the thread of the loop."""
+        """Run from torque on to torque off; the target of the loop's thread."""
         ended = "fault: unexpected error"
         try:
             name = "the logger gazerig" if self._say == _LOG.info else "say of the program"
@@ -252,29 +252,29 @@ class RunningHead(LocalHead):
             self._begun.set()
 
     def _abandoned(self) -> str | None:
-        """Return why nobody is left to end the block."""
+        """Return why the block cannot end the head any more, None if it can."""
         if not threading.main_thread().is_alive():
             return "the end of the program"
         return None if self._owner.is_alive() else "the end of the thread that opened it"
 
     def _close(self) -> BaseException | None:
-        """End the loop and wait for it; return what a signal asked for meanwhile."""
-        if os.getpid() != self._pid:  # a fork has no loop, and the head is its parent's
+        """End the loop and wait for it; return the exception that a signal requested meanwhile."""
+        if os.getpid() != self._pid:  # a fork has no loop; the head is its parent's
             return None
         self.closing = True
-        if not self._interrupts.requests:  # one more would skip parking
+        if not self._interrupts.requests:  # a second request would skip parking
             self._interrupts.request(_ENDED)
         raised: BaseException | None = None
-        # Not by the thread's join: when a signal interrupts it, CPython up to 3.12 takes the thread
-        # for ended, and the interpreter ends while the head parks.
+        # Not Thread.join: when a signal interrupts it, CPython up to 3.12 considers the thread
+        # ended, and the interpreter exits while the head parks.
         while self._thread.ident is not None and not self._over.is_set():
             try:
                 self._over.wait()
-            except BaseException as error:  # of a signal handler of the program's own
+            except BaseException as error:  # from a signal handler of the program
                 raised = error
                 self._interrupts.request(_ENDED)
         with contextlib.suppress(BaseException):
-            self._thread.join()  # it has no more than its last line to do
+            self._thread.join()  # only its last line is left to run
         SIGNALS.remove(self)
         if self._ended_by == "SIGINT":
             return KeyboardInterrupt()
@@ -286,12 +286,12 @@ class RunningHead(LocalHead):
 class SimulatedHead(LocalHead):
     """A head on emulated servos in simulated time, which passes only when it is stepped.
 
-    The same steps and orders give the same bytes on the bus, every time. Waiting for an order
-    and iterating over states step the head.
+    The same steps and orders always put the same bytes on the bus. Waiting for an order and
+    iterating over states step the head.
     """
 
     def __enter__(self) -> Self:
-        """Switch the torque on where the joints are; time stands still until ``step``."""
+        """Switch the torque on at the present joint angles; time passes only in ``step``."""
         composed = self._compose()
         stack = contextlib.ExitStack()
         with stack:
@@ -316,7 +316,7 @@ class SimulatedHead(LocalHead):
         """Park and switch off, in simulated time."""
         fault = self._ended
         self._session.stopped_by = self._ended = fault or _ENDED
-        # What fails in the program's own block is no fault of the head.
+        # An error of the program's own block is not a fault of the head.
         self._stack.close()
         if fault and error is None:
             raise HeadEnded(f"the head has ended: {fault}")
@@ -341,11 +341,11 @@ class SimulatedHead(LocalHead):
             self._tick()
 
     def run_until(self, condition: Callable[[HeadState], Any], timeout_s: float = 60.0) -> bool:
-        """Step until a condition holds; return whether it came to pass.
+        """Step until a condition is true; return whether it became true.
 
         Args:
-            condition: gets the state after each tick.
-            timeout_s: simulated seconds after which it is given up.
+            condition: is called with the state after each tick.
+            timeout_s: simulated seconds after which the method stops.
 
         Raises:
             HeadEnded: a fault has ended the head.
@@ -372,7 +372,7 @@ class SimulatedHead(LocalHead):
 
 @contextlib.contextmanager
 def _as_refused() -> Any:
-    """Raise what parameters refuse as this interface does."""
+    """Raise ``Refused`` when parameters refuse a request."""
     try:
         yield
     except (ConfigError, ValueError, OSError) as error:

@@ -1,4 +1,4 @@
-"""Heads for a program of its own."""
+"""Opens a head in this program."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -45,40 +45,40 @@ def open(
     character: str | None = None, profile: str | None = None, seed: int = 0,
     record: Path | str | None = None, say: Callable[[str], None] | None = None,
 ) -> LocalHead:  # fmt: skip
-    """Return a head; it starts with the ``with`` block, and parks and switches off at its end.
+    """Return a head; its ``with`` block starts it, and parks it and switches it off at the end.
 
         with gazerig.open("desk", mock=True) as head:
             head.look_at(1.0, 0.2, 0.3).wait()
 
-    Without anything to look at (``camera``, ``oak``, ``video``, ``scene``, ``world``) real servos
-    look where the program says, and emulated ones at a simulated visitor.
+    Real servos look where the program directs them. Emulated servos look at a simulated visitor,
+    unless ``camera``, ``oak``, ``video``, ``scene`` or ``world`` is given.
 
     Args:
-        rig: a shipped rig by name, or the path of a YAML file.
+        rig: name of a shipped rig, or the path of a YAML file.
         fast: emulated servos in simulated time, stepped by the program (``SimulatedHead.step``).
-        mock: emulated servos; else those of the rig.
-        bus: what replaces the servos, with ``mock`` or ``fast``: "emulated" (byte for byte, the
+        mock: emulated servos instead of the rig's.
+        bus: replacement of the servos, with ``mock`` or ``fast``: "emulated" (byte for byte, the
             default) or "ideal" (goals in, a lag out, no bytes: faster).
         port: serial port instead of the rig's.
-        page: HOST:PORT of the live page; its address is told to ``say``.
-        scene: simulated people, as of ``gazerig run --scene``.
-        world: a world with physics, by name or path, as of ``gazerig run --world``.
+        page: HOST:PORT of the live page; ``say`` receives its address.
+        scene: simulated people, as in ``gazerig run --scene``.
+        world: a world with physics, by name or path, as in ``gazerig run --world``.
         video: a film or image to look at.
-        camera: number of a webcam, name of another package's camera, or an object of one's own
-            that gives frames (``gazerig.drivers.camera.source.FrameSource``) or detections
+        camera: number of a webcam, name of another package's camera, or an object of the program
+            that returns frames (``gazerig.drivers.camera.source.FrameSource``) or detections
             (``gazerig.drivers.types.Camera``).
-        oak: look through an OAK-D.
+        oak: use an OAK-D camera.
         detector: finds faces in frames (``gazerig.drivers.types.FaceDetector``).
-        attention: chooses what to look at (``gazerig.robot.control.chooser.Chooser``).
-        character: laid over the rig, by name or path.
-        profile: style of gaze, by name or path.
-        seed: of all random numbers.
-        record: file to record to.
-        say: gets one line about whatever happens; else ``logging.getLogger("gazerig")`` does.
+        attention: chooses targets (``gazerig.robot.control.chooser.Chooser``).
+        character: name or path of a character, applied over the rig.
+        profile: name or path of a gaze profile.
+        seed: seed of all random numbers.
+        record: path of the recording.
+        say: receives one line per message; None: ``logging.getLogger("gazerig")``.
 
     Raises:
-        Error: the options do not fit together. What is wrong with the rig or its servos
-            (``ConfigError``, ``SetupError``) is raised where the block begins.
+        Error: the options do not fit together. Errors of the rig or its servos (``ConfigError``,
+            ``SetupError``) are raised at the start of the block.
     """
     own = camera if not isinstance(camera, int | str) else None
     seen = camera if isinstance(camera, int | str) else None
@@ -100,7 +100,7 @@ def open(
 
 
 _FOR_EVER_S = 1e9
-"""A scene in simulated time would end by itself after a round."""
+"""Seconds; without it, a scene in simulated time would end after one round."""
 
 
 def _path(given: Path | str | None) -> Path | None:

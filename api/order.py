@@ -1,4 +1,4 @@
-"""What became of something that a program asked of a head: its reply, and its outcome."""
+"""Orders to a head: their replies and outcomes."""
 
 import threading
 from collections.abc import Callable
@@ -13,29 +13,29 @@ from gazerig.robot.model.reply import CommandReply
 Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]
 """How an order ended.
 
-arrived: the gaze was measured within 1 degree of the point, the joint of its angle; a gesture has
-    come to its end; of other orders, the head has taken them up
-refused: nothing was done; ``Order.why`` says why
-out of reach: the gaze will rest more than 1 degree beside the point, as far as the joints reach;
-    known as soon as the reply is there. ``Order.why`` says how far beside, and which joints keep
-    it from there. The lead stays: the head goes as far as it can
-taken over: something else moves the head now, or the lead ended; ``Order.why`` says what
-timed out: none of these within the time given
+arrived: the gaze was measured within 1 degree of the point, or the joint within 1 degree of its
+    angle; a gesture has ended; any other order was accepted
+refused: nothing was done; ``Order.why`` gives the reason
+out of reach: the gaze will rest more than 1 degree off the point, at the limits of the joints.
+    This is known as soon as the reply arrives. ``Order.why`` gives the error, and the joints that
+    limit it. The order keeps control, and the head goes as far as it can
+taken over: something else moves the head now, or control has ended; ``Order.why`` gives the reason
+timed out: none of these within the given time
 """
 
 
 class OrderHost(Protocol):
-    """The head that an order was given to."""
+    """A head that accepts orders."""
 
     def _progress(self) -> Progress:
-        """Return the newest lead and gesture."""
+        """Return the owner of gaze and joints, and the newest gesture."""
         ...
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Let the head's time pass until something is true, for so long at most.
+        """Let the head's time pass until a condition is true, or at most ``seconds``.
 
         Raises:
-            HeadEnded: the head has ended meanwhile.
+            HeadEnded: the head has ended in the meantime.
         """
         ...
 
@@ -45,17 +45,17 @@ class OrderHost(Protocol):
 
 
 class Order:
-    """One order to a head, as ``look_at`` and its like return it.
+    """An order to a head, as returned by ``look_at`` and similar methods.
 
-    In a ``with`` block the lead that it took ends with the block:
+    In a ``with`` block, control ends with the block:
 
         with head.look_at(1.0, 0.2, 0.3) as order:
             order.wait()
 
     Args:
         host: the head.
-        answered: returns the reply once the head has taken the order up, None before.
-        within_s: the head must take it up in this time.
+        answered: returns the reply once the head has accepted the order, None before.
+        within_s: time in which the head must accept it, seconds.
     """
 
     def __init__(
@@ -68,15 +68,15 @@ class Order:
 
     def __repr__(self) -> str:
         reply = self._taken_up()
-        said = "not taken up yet" if reply is None else reply.text()
-        return f"<Order: {self._outcome or 'under way'}; {said}>"
+        said = "not accepted yet" if reply is None else reply.text()
+        return f"<Order: {self._outcome or 'in progress'}; {said}>"
 
     @property
     def reply(self) -> CommandReply:
-        """Return what the head made of the order; waits until it has taken it up, a tick or two.
+        """Return the head's reply; wait until it has accepted the order, a tick or two.
 
         Raises:
-            HeadEnded: the head has ended, or hangs.
+            HeadEnded: the head has ended, or does not respond.
         """
         reply = self._taken_up()
         if reply is None:
@@ -85,24 +85,24 @@ class Order:
         if reply is None:
             from gazerig.errors import HeadEnded
 
-            raise HeadEnded(f"the head has not taken the order up within {self._within_s:g} s")
+            raise HeadEnded(f"the head has not accepted the order within {self._within_s:g} s")
         return reply
 
     @property
     def refused(self) -> bool:
-        """Return whether nothing was done; ``why`` says why."""
+        """Return whether the head refused the order; ``why`` gives the reason."""
         return bool(self.reply.refused)
 
     @property
     def outcome(self) -> Outcome | None:
-        """Return how the order ended, None while it is under way."""
+        """Return how the order ended, None while it is in progress."""
         if self._outcome is None:
             self._see(self._host._progress())
         return self._outcome
 
     @property
     def active(self) -> bool:
-        """Return whether the lead that the order took is still in force."""
+        """Return whether the order still controls gaze or joints."""
         reply, lead = self._taken_up(), self._host._progress().lead
         return reply is not None and 0 < reply.lead == lead.number and lead.active
 
@@ -112,23 +112,23 @@ class Order:
         return self._why
 
     def wait(self, timeout_s: float | None = 10.0) -> Outcome:
-        """Wait until the order has ended; of a head in simulated time, step it until then.
+        """Wait until the order has ended; step a head in simulated time until then.
 
-        For a point that is out of reach this returns as soon as the reply says so; the head is
-        then still moving.
+        For a point that is out of reach this returns as soon as the reply arrives; the head is then
+        still moving.
 
         Args:
-            timeout_s: seconds of the head's own clock; None: for ever.
+            timeout_s: seconds by the head's own clock; None: without limit.
 
         Raises:
-            HeadEnded: the head has ended meanwhile.
+            HeadEnded: the head has ended in the meantime.
         """
         longest_s = timeout_s if timeout_s is not None else threading.TIMEOUT_MAX
         self._host._pause(lambda: self.outcome is not None, longest_s)
         return self._outcome or "timed out"
 
     def end(self) -> None:
-        """End the lead that the order took, if it is still in force."""
+        """Give up control, if the order still has it."""
         if self.active:
             self._host._let_go()
 
@@ -142,11 +142,11 @@ class Order:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End the lead."""
+        """Give up control."""
         self.end()
 
     def _see(self, now: Progress) -> bool:
-        """See the newest lead and gesture; return whether the order has ended."""
+        """Update from the newest owner and gesture; return whether the order has ended."""
         reply = self._taken_up()
         if reply is None or self._outcome is not None:
             return self._outcome is not None
@@ -155,7 +155,7 @@ class Order:
             self._end("refused", reply.refused)
         elif played:
             self._see_gesture(played, now.gesture)
-        elif reply.lead == 0:  # it takes no lead: done as soon as taken up
+        elif reply.lead == 0:  # it takes no control: done as soon as accepted
             self._end("arrived", "")
         elif reply.error_rad > ARRIVED_RAD:
             self._end("out of reach", reply.text())

@@ -1,10 +1,10 @@
-"""The declaration of a parameter: one annotated field of a frozen dataclass, one line.
+"""The declaration of a parameter: one annotated field of a frozen dataclass, in one line.
 
     comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity at which the eye is at ease"] = 8.0
     profile: Annotated[Literal["min_jerk", "main_sequence"], "how an eye jumps"] = "min_jerk"
 
-The configuration, its JSON Schema, live tuning, the page and the documents read the same line.
-Every part of the program may import this module; it stands on the standard library alone.
+The configuration, its JSON Schema, live tuning, the page and the documents read this line.
+Every part of the program may import this module; it needs the standard library only.
 """
 
 import dataclasses
@@ -53,7 +53,7 @@ class Bounds:
 
 @dataclasses.dataclass(frozen=True, slots=True, init=False)
 class Choices:
-    """The values allowed, or those allowed for every item, where a Literal cannot list them."""
+    """Allowed values, or allowed values of every item, if a Literal cannot list them."""
 
     values: tuple[object, ...]
 
@@ -63,7 +63,7 @@ class Choices:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Unit:
-    """The unit of a parameter whose name does not end with it."""
+    """Unit of a parameter whose name does not end with it."""
 
     name: str
 
@@ -72,9 +72,9 @@ class Unit:
 class Declaration:
     """One parameter as declared.
 
-    kind: the type annotation without what was said beside it
-    bounds: of a number, or of the numbers in it; None where there are none
-    choices: the values allowed, () where any are
+    kind: the type annotation without its metadata
+    bounds: of a number, or of the numbers in it; None without bounds
+    choices: the allowed values, () if all are allowed
     unit: e.g. "deg/s", "" for a bare number
     """
 
@@ -91,7 +91,7 @@ def declarations(params: type) -> dict[str, Declaration]:
     """Return the declaration of every field of a Params dataclass, by name, in order.
 
     Raises:
-        TypeError: a field has something beside its type that this module does not know.
+        TypeError: the metadata of a field is of an unknown kind.
     """
     hints = typing.get_type_hints(params, include_extras=True)
     return {
@@ -102,12 +102,12 @@ def declarations(params: type) -> dict[str, Declaration]:
 
 
 def choices_of(params: type, name: str) -> tuple[Any, ...]:
-    """Return the values that a parameter may have, () where it has no list of them."""
+    """Return the allowed values of a parameter, () without a list."""
     return declarations(params)[name].choices
 
 
 def unit_of(name: str) -> str:
-    """Return the unit that a parameter's name ends with, "" where it ends with none."""
+    """Return the unit with which a parameter's name ends, "" without one."""
     return next((UNITS[suffix] for suffix in _LONGEST_FIRST if name.endswith(suffix)), "")
 
 
@@ -117,9 +117,9 @@ def _declaration(place: str, name: str, hint: Any) -> Declaration:
     found: dict[type, Any] = {type(note): note for note in notes}
     if strange := found.keys() - {str, Bounds, Choices, Unit}:
         names = ", ".join(sorted(one.__name__ for one in strange))
-        raise TypeError(f"{place}: {names}: wanted Bounds, Choices, Unit or a description")
+        raise TypeError(f"{place}: {names}: expected Bounds, Choices, Unit or a description")
     if len(found) < len(notes):
-        raise TypeError(f"{place}: two of a kind beside the type")
+        raise TypeError(f"{place}: two metadata entries of the same kind")
     nested = dataclasses.is_dataclass(_innermost(kind))
     return Declaration(
         name,
@@ -138,7 +138,7 @@ def _literals(kind: Any) -> tuple[object, ...]:
 
 
 def _innermost(kind: Any) -> Any:
-    """Return the type of what stands in an optional, in tuples and in mappings."""
+    """Return the innermost type of optionals, tuples and mappings."""
     origin, args = typing.get_origin(kind), typing.get_args(kind)
     if origin in (typing.Union, types.UnionType, tuple):
         return _innermost(args[0])

@@ -1,4 +1,4 @@
-"""Signals to a program that has heads open: its heads park before it ends."""
+"""Signal handlers of a program with open heads: the heads park before the program ends."""
 
 import os
 import signal
@@ -17,20 +17,20 @@ class OpenHead(Protocol):
     """A head whose loop runs."""
 
     closing: bool
-    """Its block has ended, and waits until it has parked."""
+    """The block has ended, and waits until the head has parked."""
 
     def end(self, reason: str) -> None:
-        """Ask the head to park; asked again, to skip the rest of parking."""
+        """Ask the head to park; a second call skips the rest of parking."""
         ...
 
 
 class ProgramSignals:
     """Handlers for SIGINT, SIGTERM and SIGHUP while heads are open.
 
-    Only handlers that the program has left at their defaults are replaced. Ctrl-C raises
-    KeyboardInterrupt as always; while a head parks it skips the rest of parking instead, so that
-    no number of signals ends the program with the torque on. SIGTERM and SIGHUP make every open
-    head park and raise SystemExit(128 + number) in the main thread.
+    Only handlers that are still at their defaults are replaced. Ctrl-C raises KeyboardInterrupt as
+    usual. While a head parks, it skips the rest of parking instead, so that the program never ends
+    with the torque on, whatever the number of signals. SIGTERM and SIGHUP make every open head park
+    and raise SystemExit(128 + number) in the main thread.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class ProgramSignals:
         self._clock = RealClock()
 
     def add(self, head: OpenHead) -> None:
-        """Count a head as open; handlers can be set from the main thread alone."""
+        """Register an open head; only the main thread can set handlers."""
         self._heads.append(head)
         if threading.current_thread() is not threading.main_thread():
             return
@@ -50,7 +50,7 @@ class ProgramSignals:
                 self._installed.append(number)
 
     def remove(self, head: OpenHead) -> None:
-        """Count a head as ended; after the last, restore the default handlers."""
+        """Remove a head that has ended; after the last one, restore the default handlers."""
         if head in self._heads:
             self._heads.remove(head)
         if self._heads or threading.current_thread() is not threading.main_thread():
@@ -58,7 +58,7 @@ class ProgramSignals:
         self._restore()
 
     def forget(self) -> None:
-        """Leave the heads and signals to the parent; for a process that was forked."""
+        """Drop heads and handlers in a forked process; they belong to its parent."""
         self._heads.clear()
         self._restore()
 
@@ -73,11 +73,12 @@ class ProgramSignals:
         now_s, last_s = self._clock.now_s(), self._last_s
         self._last_s = now_s
         name = signal.Signals(number).name
-        # At the end of the interpreter an exception would end the loops of heads left open.
+        # While the interpreter exits, an exception would end the loops of heads that are still
+        # open.
         final = not threading.main_thread().is_alive()
         closing = [head for head in self._heads if head.closing or final]
         if closing and now_s - last_s < SAME_REQUEST_S:
-            return  # a shell and a runner each send their own
+            return  # a shell and a runner may both send the same signal
         if number != signal.SIGINT and not closing:
             closing = [*self._heads]
             for head in closing:
@@ -90,7 +91,7 @@ class ProgramSignals:
 
 
 SIGNALS = ProgramSignals()
-"""Handlers belong to the whole program."""
+"""One instance, because signal handlers belong to the whole process."""
 
 if hasattr(os, "register_at_fork"):  # not on Windows
     os.register_at_fork(after_in_child=SIGNALS.forget)

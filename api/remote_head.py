@@ -19,9 +19,9 @@ _POLL_S = 0.02
 
 
 class RemoteHead(Head):
-    """A connection to a head that runs; ``gazerig.connect`` makes one.
+    """A connection to a running head; ``gazerig.connect`` creates it.
 
-    The end of the block ends its leads and hangs up; the head runs on.
+    At the end of the block it gives up control and disconnects; the head continues to run.
 
     Args:
         client: the connection.
@@ -46,7 +46,7 @@ class RemoteHead(Head):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End what this program leads, and hang up."""
+        """Give up control and disconnect."""
         self._client.close()
 
     @property
@@ -54,27 +54,27 @@ class RemoteHead(Head):
         """Return the newest tick of the control loop."""
         state = self._client.state()[0]
         if state is None:
-            raise HeadEnded("the head has just been started: its loop does not tick yet")
+            raise HeadEnded("the head has just started: its loop is not running yet")
         return state
 
     def get(self, prefix: str = "") -> Mapping[str, Value]:
-        """Return the values in force of all keys of the rig that begin so."""
+        """Return the present values of all keys of the rig that start with a prefix."""
         return {key: as_value(value) for key, value in self._client.get(prefix).items()}
 
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Put values at dotted keys in force, all of them or none."""
+        """Apply values at dotted keys, all of them or none."""
         return self._client.set_many(changes)
 
     def save(self, path: Path | str | None = None) -> Path:
-        """Write what is in force into the rig's file, or another one; return the file."""
+        """Write the present values into the rig's file, or into another one; return its path."""
         return self._client.save(path).path
 
     def revert(self) -> tuple[str, ...]:
-        """Put the values of the rig's file in force again; return a line for each."""
+        """Restore the values of the rig's file; return a line for each change."""
         return self._client.revert()
 
     def menus(self) -> Mapping[str, tuple[str, ...]]:
-        """Return behaviours, modes of conversation and what the lids do; those in force first."""
+        """Return behaviours, conversation modes and lid states; the active one is the first."""
         return self._client.menus()
 
     def _progress(self) -> Progress:
@@ -108,12 +108,13 @@ def connect(
     """Connect to a head that runs in another program of the same user.
 
     Args:
-        pid: of its process, where several run.
-        rig: its rig, where several run.
-        who: what people are told of who asks.
+        pid: process id of the head, if several heads run.
+        rig: its rig, if several heads run.
+        who: name of this program in messages and on the page.
 
     Raises:
-        NotFound: none runs, or several and nothing says which; the message lists them.
+        NotFound: no head runs, or several run and the arguments do not select one; the message
+            lists them.
     """
     if rig is None:
         return RemoteHead(RobotClient.connect(pid, who))

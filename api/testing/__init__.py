@@ -1,6 +1,6 @@
-"""Suites that a package runs on its own servo bus or camera, with pytest.
+"""Test suites that a package runs on its own servo bus or camera, with pytest.
 
-They are those that gazerig's own kinds must pass. They need the extra ``gazerig[testing]``; the
+The kinds that gazerig ships pass the same suites. They need the extra ``gazerig[testing]``; the
 program itself never imports this package.
 """
 

@@ -1,6 +1,6 @@
-"""A bench for servo buses: emulated servos of one bus or several, and what a test does with them.
+"""Test bench for servo buses: the emulated servos of one or several buses.
 
-What a kind of bus is and how its devices behave is data (``BusUnderTest``), so that the suites
+The kind of bus and the behaviour of its devices are data (``BusUnderTest``), so that the suites
 run unchanged on buses of other packages.
 """
 
@@ -21,14 +21,14 @@ NAMES = ("eye", "jaw", "neck", "lid", "brow", "ear")
 IDS = (3, 1, 11, 7)
 PLACES = (0, 1, 2, 3)
 SHARES = (0.4, 0.5, 0.65, 0.55)
-"""Where servos stand at first, as a share of their range."""
+"""Initial positions of the servos, as shares of their range."""
 AWAY = (0.2, 0.8, 0.3, 0.7, 0.25, 0.75)
 NEAR_SHARE = 0.012
-"""Friction and dead bands leave a servo so far from its goal at most, in shares of its range."""
+"""Largest distance from the goal due to friction and dead bands, as a share of the range."""
 
 
 class Absence(NamedTuple):
-    """How a board is made to be absent and present again, and what its bus says (a pattern)."""
+    """Commands that make a board absent and present again, and the bus's message (a pattern)."""
 
     begin: str
     end: str
@@ -38,9 +38,10 @@ class Absence(NamedTuple):
 class Fault(NamedTuple):
     """A fault that a servo or board reports itself.
 
-    command: begins it; ``{id}`` is the servo's; ``times``: so often, a third of a second apart
-    cause: what the bus calls it, behind the servo's or board's name
-    board: how messages name a board that has it; "": it is one servo's
+    command: starts it; ``{id}`` is replaced by the servo's
+    times: number of calls of the command, a third of a second apart
+    cause: the text of the bus for it, after the servo's or board's name
+    board: name in messages of a board with the fault; "": the fault is one servo's
     """
 
     command: str
@@ -54,21 +55,22 @@ class BusUnderTest:
     """One kind of bus and its emulated devices.
 
     Attributes:
-        name: of the kind.
-        model: of its servos.
+        name: name of the kind.
+        model: model of its servos.
         low, high: their range in these tests, steps.
-        speed_steps_s: their speed limit; the servos must be able to go as fast.
-        make: the bus, of a port, configurations, whether the machine may stall for long (as with
-            a pseudo-terminal), and after how many seconds without any answer it gives up.
-        device: the emulated device, of the steps at which servos stand by their ids, and a clock.
-            It understands the commands of ``gazerig.sim_mock.faults``: ``status``, ``unplug``,
+        speed_steps_s: their speed limit; the servos must be able to reach it.
+        make: creates the bus from a port, configurations, whether the machine may stall for a long
+            time (as with a pseudo-terminal), and the seconds without any answer after which it
+            gives up.
+        device: creates the emulated device from the servos' initial steps by id, and a clock. It
+            understands the commands of ``gazerig.sim_mock.faults``: ``status``, ``unplug``,
             ``plug``, ``deny``, ``lose``, ``delay``, ``corrupt``, ``clear`` and ``brown-out``.
-        board: servos are channels of a board, which do not tell where they are; what befalls the
-            board befalls all.
-        grain_steps: a goal is that far off at most where the device counts in coarser steps.
+        board: servos are channels of a board that does not measure their positions; faults affect
+            the whole board.
+        grain_steps: largest rounding of a goal by a device that counts in coarser steps.
         fault: a fault that it reports; None: it reports none.
-        absence: of a board; None: a servo with another id stands for an absent one.
-        pulses_on: makes a board hold its servos already, of the bench and the kind's name.
+        absence: of a board; None: a servo with another id replaces an absent one.
+        pulses_on: makes a board hold its servos already; takes the bench and the kind's name.
     """
 
     name: str
@@ -86,7 +88,7 @@ class BusUnderTest:
 
 
 class Wires(NamedTuple):
-    """What is at the other end of the ports: a clock, a way to wait, and faults as commands."""
+    """The other end of the ports: a clock, a function that waits, and fault commands."""
 
     ports: Mapping[str, BusPort]
     now_s: Callable[[], float]
@@ -95,15 +97,15 @@ class Wires(NamedTuple):
 
 
 class BusBench:
-    """Servos of one kind of bus, or of several mixed, and what a test does with them.
+    """The servos of one kind of bus, or of several mixed, and actions of a test on them.
 
-    Places, goals and truths are shares of each servo's range, 0..1 within its limits.
+    Positions and goals are shares of each servo's range, 0..1 within its limits.
 
     Args:
         kinds: by name.
-        places: of the servos of each kind in the whole.
-        wires: what is at the other end.
-        patient: the machine may stall for long.
+        places: indices of each kind's servos among all servos.
+        wires: the other end of the ports.
+        patient: the machine may stall for a long time.
     """
 
     def __init__(
@@ -122,7 +124,7 @@ class BusBench:
         self.now_s, self.wait = wires.now_s, wires.wait
 
     def bus(self, setups: Sequence[ServoConfig] | None = None, give_up_s: float = 60.0) -> ServoBus:
-        """Make the bus."""
+        """Create the bus."""
         setups = setups or self.setups
         shares = [
             BusShare(name, self._one(name, [setups[p] for p in places], give_up_s), places)
@@ -138,50 +140,50 @@ class BusBench:
         return self.kinds[self.on[place]].board
 
     def smart(self) -> list[int]:
-        """Return the places of servos that answer for themselves."""
+        """Return the indices of servos that answer for themselves."""
         return [place for place in self.on if not self.is_board(place)]
 
     def starts(self) -> list[float]:
-        """Return where servos stand at first."""
+        """Return the initial positions, as shares."""
         return [SHARES[place % 4] for place in range(self.count)]
 
     def away(self) -> tuple[float, ...]:
-        """Return goals elsewhere."""
+        """Return goals away from the initial positions."""
         return AWAY[: self.count]
 
     # --- shares and steps
 
     def steps(self, shares: Sequence[float]) -> list[int]:
-        """Return steps of shares."""
+        """Convert shares of the ranges to steps."""
         pairs = zip(self.setups, shares, strict=True)
         return [round(s.min_steps + x * (s.max_steps - s.min_steps)) for s, x in pairs]
 
     def shares(self, steps: Sequence[float | None]) -> list[float]:
-        """Return shares of steps; far outside where there is none."""
+        """Convert steps to shares; a missing value becomes a share far outside."""
         return [
             -9.0 if at is None else (at - s.min_steps) / (s.max_steps - s.min_steps)
             for s, at in zip(self.setups, steps, strict=True)
         ]
 
     def seen(self, readings: Sequence[Row | None]) -> list[float]:
-        """Return the shares that readings tell."""
+        """Return the positions in readings, as shares."""
         return self.shares([None if r is None else r.position_steps for r in readings])
 
-    # --- the servos themselves, past the driver
+    # --- the servos themselves, without the driver
 
     def command(self, text: str, name: str = "") -> None:
-        """Carry out a fault on one bus, or on all."""
+        """Run a fault command on one bus, or on all."""
         for one in [name] if name else self.buses:
             self.wires.command(text, one)
 
     def strike(self, verb: str, place: int) -> None:
-        """Let something befall one servo; on a Maestro what befalls the board befalls all."""
+        """Apply a fault to one servo; a brown-out of a board affects all its channels."""
         name = self.on[place]
         board = self.kinds[name].board and verb == "brown-out"
         self.command(verb if board else f"{verb} {self.setups[place].id}", name)
 
     def reports(self) -> list[dict[str, Any]]:
-        """Return what servos truly are, in the order of the whole."""
+        """Return the true status of all servos, in order of their indices."""
         by_bus = {}
         for name in self.buses:
             servos = json.loads(self.wires.command("status", name))["servos"]
@@ -189,20 +191,20 @@ class BusBench:
         return [by_bus[self.on[p]][self.setups[p].id] for p in range(self.count)]
 
     def truth(self) -> list[float]:
-        """Return where servos truly are."""
+        """Return the true positions, as shares."""
         return self.shares([one.get("place", one.get("position")) for one in self.reports()])
 
     def goals(self) -> list[int | None]:
-        """Return the goals that servos truly have, in steps; None where there is none."""
+        """Return the true goals in steps, None for a servo without a goal."""
         found = [one.get("target", one.get("goal")) for one in self.reports()]
         return [goal or None for goal in found]
 
     def holding(self) -> list[bool]:
-        """Return which servos truly hold their place."""
+        """Return which servos truly hold their position."""
         return [bool(one.get("target", one.get("torque"))) for one in self.reports()]
 
     def pulses_on(self) -> None:
-        """Let boards give pulses already, where their servos stand; others know their place."""
+        """Let boards send pulses at their servos' positions; other servos measure theirs."""
         for name in self.buses:
             give = self.kinds[name].pulses_on
             if give is not None:
@@ -213,7 +215,7 @@ class BusBench:
     def run(
         self, bus: ServoBus, seconds: float, goals: Sequence[float] | None = None
     ) -> tuple[Row | None, ...]:
-        """Tick every 10 ms, with goals in shares; gives the last readings."""
+        """Tick every 10 ms, with goals in shares; return the last readings."""
         steps = None if goals is None else self.steps(goals)
         end_s = self.now_s() + seconds - 1e-9
         while True:
@@ -231,7 +233,7 @@ class BusBench:
         goals: Sequence[float] | None = None,
         timeout_s: float = 8.0,
     ) -> tuple[Row | None, ...]:
-        """Tick until something is so; gives the readings then."""
+        """Tick until a condition is true; return the readings at that time."""
         end_s = self.now_s() + timeout_s
         while self.now_s() < end_s:
             readings = self.run(bus, 0.0, goals)
@@ -241,12 +243,12 @@ class BusBench:
         raise AssertionError(f"not in {timeout_s} s: {readings}, {bus.faults()}, {bus.events()}")
 
     def near(self, shares: Sequence[float], goals: Sequence[float]) -> bool:
-        """Return whether all are where they should be."""
+        """Return whether all servos are near their goals."""
         return all(abs(x - goal) <= NEAR_SHARE for x, goal in zip(shares, goals, strict=True))
 
 
 def setups_of(kind: BusUnderTest, places: Sequence[int]) -> dict[int, ServoConfig]:
-    """Return the configurations of one bus by their place in the whole."""
+    """Return the configurations of the servos of one bus by their index among all servos."""
     rest = (kind.low + kind.high) // 2 if kind.board else None
     return {
         place: ServoConfig(
@@ -258,13 +260,13 @@ def setups_of(kind: BusUnderTest, places: Sequence[int]) -> dict[int, ServoConfi
 
 
 def starts_of(kind: BusUnderTest, places: Sequence[int]) -> dict[int, float]:
-    """Return where the servos of one bus stand at first, in steps, by their ids."""
+    """Return the initial positions of the servos of one bus by id, in steps."""
     setups = setups_of(kind, places)
     return {s.id: kind.low + SHARES[p % 4] * (kind.high - kind.low) for p, s in setups.items()}
 
 
 class InProcess(NamedTuple):
-    """A bench in this process, with the devices behind it and all that was sent to them."""
+    """A bench in this process, with its devices and all bytes that were sent to them."""
 
     bench: BusBench
     devices: Mapping[str, Device]
@@ -274,7 +276,7 @@ class InProcess(NamedTuple):
 def in_process(
     kinds: Mapping[str, BusUnderTest], places: Mapping[str, tuple[int, ...]]
 ) -> InProcess:
-    """Return a bench in this process, on a clock that waiting moves."""
+    """Return a bench in this process, on a clock that advances only by waiting."""
     now = [50.0]
 
     def sleep_until(t_s: float) -> None:
@@ -301,7 +303,7 @@ def in_process(
 
 
 def holding(bench: BusBench) -> Iterator[ServoBus]:
-    """Yield a bus that holds every servo where it stands; it is released after."""
+    """Yield a bus that holds every servo in its position; release it afterwards."""
     bench.pulses_on()
     bus = bench.bus()
     bus.open()

@@ -1,4 +1,4 @@
-"""What every kind of servo bus does when a servo, a port or a supply goes away, as a suite."""
+"""Test suite for every kind of servo bus: lost servos, ports and supplies."""
 
 import pytest
 
@@ -9,9 +9,9 @@ from gazerig.testing.rows import rows, well
 
 
 class BusLossSuite(BusBenches):
-    """Servos and ports that are absent, fall silent, restart or fail, and come back."""
+    """Servos and ports that are absent, fall silent, restart or fail, and recover."""
 
-    # --- somebody is missing
+    # --- absent servos
 
     def test_open_names_who_is_missing_and_leaves_the_ports_free(self, twin):
         place = twin.smart()[-1] if twin.smart() else None
@@ -45,7 +45,7 @@ class BusLossSuite(BusBenches):
         bus.close()
 
     def test_one_silent_servo_costs_only_itself(self, here, held_here):
-        """A Maestro answers for all its channels at once: there the board is one."""
+        """A Maestro answers for all its channels, so the whole board counts as one servo."""
         if not here.smart():
             return
         place = here.smart()[0]
@@ -75,7 +75,7 @@ class BusLossSuite(BusBenches):
         twin.command("unplug", name)
         twin.until(held, lambda r: all(r[p] is None for p in gone), twin.starts())
         for _ in range(20):
-            # Who plans goals goes on for a while as if nothing were.
+            # A planner continues to send goals for a while.
             readings = twin.run(held, 0.0, [0.5] * twin.count)
             assert [readings[p] for p in gone] == [None] * len(gone)
             assert all(readings[p] is not None for p in rest)
@@ -113,7 +113,7 @@ class BusLossSuite(BusBenches):
 
     def test_a_restart_is_found_and_the_servo_held_where_it_is(self, here, held_here):
         place = 0
-        # The board of a Maestro is one: all its channels restart.
+        # A Maestro restarts as a whole, so all its channels restart.
         struck = [p for p in range(here.count) if here.is_board(p)]
         struck = struck if here.is_board(place) else [place]
         here.run(held_here, 0.2, here.starts())
@@ -124,12 +124,12 @@ class BusLossSuite(BusBenches):
         told = held_here.events()
         assert any("restarted: set up again" in line for line in told), told
         assert held_here.faults() == ()
-        # It follows again, with the speed that it was set up with.
+        # It follows again, at the speed that was set at the start.
         here.until(held_here, lambda r: here.near(here.seen(r), here.away()), here.away())
 
     @pytest.mark.parametrize("befalls", ["", "brown-out", "power cut", "unplug"])
     def test_no_servo_is_faster_than_it_was_set_up_whatever_it_went_through(self, here, befalls):
-        """A goal far away at once: only what the servo or its board has armed holds it back."""
+        """Only the limit of the servo or its board restrains a goal that is suddenly far away."""
         here.pulses_on()
         slow = [s._replace(max_speed_steps_s=0.2 * s.max_speed_steps_s) for s in here.setups]
         bus = here.bus(slow)
@@ -178,13 +178,13 @@ class BusLossSuite(BusBenches):
 
 
 def _says(bus, twin, place, what):
-    """Return whether the bus says something of a servo by its joint's name."""
+    """Return whether the bus reports an event of a servo under its joint's name."""
     who = servo_label(twin.setups[place])
     return any(line.startswith(who) and what in line for line in bus.events())
 
 
 def _until_back(twin, bus, gone):
-    """Tick until all hold again, with goals far away until a servo says where it begins."""
+    """Tick until all hold again, with distant goals until a servo reports its position."""
     goals, rearmed = [0.9] * twin.count, []
     before = twin.truth()
 
@@ -218,7 +218,7 @@ def _given_up(here, name):
     assert here.now_s() - began_s < 1.3
     with pytest.raises(BusLost, match=f"emulated {name} is gone.*cut the servo power"):
         bus.disable_torque()
-    # What could be reached was let go of all the same.
+    # The servos that could be reached were released nevertheless.
     assert [on for p, on in enumerate(here.holding()) if here.on[p] != name] == [False] * (
         here.count - len(here.buses[name])
     )
@@ -229,7 +229,7 @@ def _given_up(here, name):
 
 
 def _befall(here, bus, what):
-    """Let something pass over all servos while they hold, until all hold again."""
+    """Apply a fault to all servos while they hold, until all hold again."""
     if what == "unplug":
         here.command("unplug for 0.2")
     elif what:

@@ -1,6 +1,6 @@
-"""What every kind of servo bus promises, as a suite for any of them.
+"""Test suite for every kind of servo bus.
 
-A package runs it on its own bus with a class of a few lines:
+A package runs it on its own bus with a short class:
 
     class TestMyBus(BusSuite):
         under_test = BusUnderTest("mine", "my-servo", 100, 900, 400.0, make, device)
@@ -23,7 +23,7 @@ FAULTS = ("", "lose all count 2", "delay all 15 count 3", "corrupt all count 3",
 
 
 class BusBenches:
-    """The benches that a suite of buses runs on; ours have several, a package's one.
+    """The benches on which the suites run; gazerig tests several, a package tests one.
 
     under_test: the kind of bus
     """
@@ -32,34 +32,34 @@ class BusBenches:
 
     @pytest.fixture
     def another(self) -> Callable[[], InProcess]:
-        """Return what makes one more bench in this process."""
+        """Return a function that creates another bench in this process."""
         kind = self.under_test
-        assert kind is not None, "set under_test, or have a fixture another of your own"
+        assert kind is not None, "set under_test, or define your own fixture another"
         return lambda: in_process({kind.name: kind}, {kind.name: PLACES})
 
     @pytest.fixture
     def here(self, another: Callable[[], InProcess]) -> BusBench:
-        """Return a bench in this process: for what takes long, or needs no terminal."""
+        """Return a bench in this process: for long tests, and for tests that need no terminal."""
         return another().bench
 
     @pytest.fixture
     def twin(self, here: BusBench) -> BusBench:
-        """Return a bench wherever there is one: in this process, or behind a terminal."""
+        """Return each available bench: in this process, or behind a terminal."""
         return here
 
     @pytest.fixture
     def held(self, twin: BusBench) -> Iterator[ServoBus]:
-        """Return the bus of ``twin``, which holds every servo where it stands."""
+        """Return the bus of ``twin``, which holds every servo in its position."""
         yield from holding(twin)
 
     @pytest.fixture
     def held_here(self, here: BusBench) -> Iterator[ServoBus]:
-        """Return the bus of ``here``, which holds every servo where it stands."""
+        """Return the bus of ``here``, which holds every servo in its position."""
         yield from holding(here)
 
 
 class BusSuite(BusBenches):
-    """Opening, holding, following, limits, nonsense and letting go."""
+    """Opening, holding, following, limits, invalid goals and release."""
 
     # --- open, engage, read, write, release
 
@@ -70,7 +70,7 @@ class BusSuite(BusBenches):
         bus.open()
         readings = rows(bus.read(twin.now_s()))
         assert twin.near(twin.seen(readings), twin.starts())
-        # A Maestro that gives pulses goes on to give them; nobody else holds anything.
+        # A Maestro that already sends pulses continues; no other servo holds its position.
         assert [present(r).torque for r in readings] == [
             twin.is_board(p) for p in range(twin.count)
         ]
@@ -163,7 +163,7 @@ class BusSuite(BusBenches):
         assert not any(r.torque for r in readings)
         assert twin.near(twin.truth(), twin.starts())
         assert "refused" not in held.health().errors
-        # A machine that has other work may let the emulator wait, which is no fault of the bus.
+        # A busy machine may delay the emulator, which is not a fault of the bus.
         assert [
             line for line in held.events() if not line.startswith("this computer was busy")
         ] == []
@@ -255,5 +255,5 @@ class BusSuite(BusBenches):
             for setup, goal in zip(twin.setups, twin.goals(), strict=True):
                 assert goal is None or setup.min_steps <= goal <= setup.max_steps
             twin.wait(0.02)
-        # Nothing stands beyond but for what a servo's own inertia does.
+        # No servo goes beyond, except by its own inertia.
         assert all(-0.02 <= share <= 1.02 for share in twin.truth())

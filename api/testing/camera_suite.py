@@ -1,4 +1,4 @@
-"""What every camera promises to the control loop, as a suite for any of them.
+"""Test suite for every kind of camera.
 
 class TestMyCamera(CameraSuite):
     @pytest.fixture
@@ -23,13 +23,13 @@ from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Camera, DetectedFace, Detections, ImageArray
 
 LONGEST_S = 60.0
-"""A camera that takes longer for anything is stuck; one that is well needs a thousandth."""
+"""A camera that takes longer hangs; a working camera needs a thousandth of this time."""
 
 QUICKLY = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=5.0, give_up_s=LONGEST_S)
 
 
 def _wait() -> None:
-    time.sleep(0.001)  # noqa: TID251 - a camera's thread is waited for
+    time.sleep(0.001)  # noqa: TID251 - waits for a camera's thread
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,11 @@ class CameraBench:
     """A camera and its device.
 
     Attributes:
-        make: a new camera on the same device.
-        now_s: the time of its frames.
-        wait: lets a little time pass.
-        lose, restore: take the device away and give it back; None where it cannot go.
-        block, release: let the device hold up whoever reads it, and no longer; None where it
-            cannot.
+        make: creates another camera on the same device.
+        now_s: time in which its frames are stamped.
+        wait: lets a short time pass.
+        lose, restore: remove the device and bring it back; None: not possible.
+        block, release: make the device block its reader, and release it; None: not possible.
     """
 
     make: Callable[[], Camera]
@@ -66,7 +65,7 @@ def of_source(
     block: Callable[[], None] | None = None,
     release: Callable[[], None] | None = None,
 ) -> CameraBench:
-    """Return the bench of a source of frames, which is read by a thread as in a run."""
+    """Return the bench of a frame source, which a thread reads as in a run."""
     now_s = time.monotonic  # noqa: TID251 - that of real cameras
     return CameraBench(
         lambda: CameraThread(make(), _NoDetections(), now_s, QUICKLY),
@@ -75,18 +74,18 @@ def of_source(
 
 
 class CameraSuite:
-    """Frames that rise in number and time, loss and return, and a loop that never waits."""
+    """Rising frame numbers and times, loss and recovery, and a loop that never waits."""
 
     @pytest.fixture
     def bench(self) -> CameraBench:
         """Return the camera under test."""
-        raise NotImplementedError("have a fixture bench that returns a CameraBench")
+        raise NotImplementedError("define a fixture bench that returns a CameraBench")
 
     def until(self, bench: CameraBench, done: Callable[[], object]) -> None:
-        """Wait until something is so."""
+        """Wait until a condition is true."""
         end_s = time.monotonic() + LONGEST_S  # noqa: TID251
         while not done():
-            assert time.monotonic() < end_s, "the camera is stuck"  # noqa: TID251
+            assert time.monotonic() < end_s, "the camera hangs"  # noqa: TID251
             bench.wait()
 
     def next_frame(self, bench: CameraBench, camera: Camera, after: int) -> Detections:
@@ -184,7 +183,7 @@ class CameraSuite:
         told = list(camera.events())
 
         def says(word: str) -> bool:
-            camera.latest(bench.now_s())  # as the loop asks in every tick
+            camera.latest(bench.now_s())  # as the loop does in every tick
             told.extend(camera.events())
             return any(word in line for line in told)
 

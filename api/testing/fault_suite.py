@@ -1,8 +1,8 @@
-"""What befalls a bus while a head moves on it, and how each of it ends, as a suite.
+"""Test suite for faults of a bus while a head moves on it.
 
-A fault lasts for 0.6 s in a running loop of bus and guard. In every tick the true servos are
-judged: goals inside the limits, places inside the range, speeds below the top. After it all
-joints move as before, or some are left limp or still, each named with its cause.
+Each fault lasts 0.6 s in a running loop of bus and guard. Every tick checks the true servos:
+goals inside the limits, positions inside the range, speeds below the maximum. After the fault
+all joints move as before, or some stay limp or still, each named with its cause.
 """
 
 import random
@@ -19,9 +19,9 @@ STRUCK_S = 0.6
 class FaultSuite:
     """Faults of line and servos, one at a time and three at a time.
 
-    rig_file: a rig whose servos are all on the bus; rate_hz: of its loop
-    cases: what befalls it; left: the names of those after which a servo is left
-    longest_s: no read may take longer
+    rig_file: a rig whose servos are all on the bus; rate_hz: rate of its loop
+    cases: the faults; left: names of the faults after which a servo does not recover
+    longest_s: longest permitted read
     """
 
     rig_file = ""
@@ -31,7 +31,7 @@ class FaultSuite:
     longest_s = 0.1
 
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
-        """Make a test of every case."""
+        """Create a test for every case."""
         if "case" in metafunc.fixturenames:
             metafunc.parametrize("case", self.cases, ids=[case.name for case in self.cases])
 
@@ -42,7 +42,7 @@ class FaultSuite:
 
     @pytest.fixture
     def machine(self, rig: Rig) -> Machine:
-        """Return the rig's joints, moving."""
+        """Return the rig's joints, in motion."""
         machine = Machine(rig, self.rate_hz)
         machine.start()
         return machine
@@ -51,16 +51,16 @@ class FaultSuite:
         outcome = machine.strike(*pair_of(rig, rig.bus.kind), case, STRUCK_S)
         assert outcome.survived, outcome
         assert (outcome.end == "left, named") == (case.name in self.left), outcome
-        # An adapter that takes nothing gives up after 0.25 s.
+        # A write to an adapter that accepts no bytes times out after 0.25 s.
         assert outcome.longest_s < (0.3 if "block" in case.name else self.longest_s)
         machine.body.stop()
         assert all(machine.true_goal(i) is None for i in range(len(machine.names)))
 
     def test_many_at_once_and_nothing_leaves_its_limits(self, rig, machine):
-        """Faults by the dice, three at a time; what is left of the head ends well all the same."""
+        """Three random faults at a time; the joints that are left end well nevertheless."""
         dice = random.Random(rig.bus.kind)
         gentle = [case for case in self.cases if case.name not in self.left]
-        # Servos that catch up by their own strength have no limit but that.
+        # Servos that catch up by themselves have no other limit.
         machine.own_speed = True
         for _ in range(6):
             three = dice.sample(gentle, 3)

@@ -1,4 +1,4 @@
-"""Feedback of a bus servo by servo, as tests look at it; the product has columns."""
+"""Feedback of a bus as one row per servo, for tests; the product has columns."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Row(NamedTuple):
-    """One servo's part of a ``Feedback``; its fields are those columns."""
+    """One servo's part of a ``Feedback``; the fields are its columns."""
 
     position_steps: float
     velocity_steps_s: float
@@ -24,13 +24,13 @@ class Row(NamedTuple):
 
 
 def rows(feedback: Feedback) -> tuple[Row | None, ...]:
-    """Return one row a servo, None for one without a fresh answer."""
+    """Return one row per servo, None for a servo without a fresh answer."""
     every = zip(*feedback[:-1], strict=True)
     return tuple([None if i in feedback.missing else Row(*row) for i, row in enumerate(every)])
 
 
 def feedback_of(given: list[Row | None]) -> Feedback:
-    """Return the feedback of which these are the rows."""
+    """Return the feedback that consists of these rows."""
     none = Feedback.of_none(1)
     columns: Any = (column[0] for column in none[:-1])
     blank = Row(*columns)
@@ -45,6 +45,6 @@ def well(readings: Sequence[Row | None]) -> bool:
 
 
 def present(thing: T | None) -> T:
-    """Return the thing; fail where it is None."""
+    """Return the argument; fail if it is None."""
     assert thing is not None
     return thing

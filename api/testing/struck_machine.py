@@ -1,7 +1,7 @@
-"""Whole machines that something befalls while they move: rig, buses, guard and true servos.
+"""Whole machines under faults while they move: rig, buses, guard and true servos.
 
-Everything runs in this process in simulated time, with the bytes' time on the wire. Whatever
-happens, every tick is judged by where the servos truly are.
+Everything runs in this process in simulated time, including the time of bytes on the wire.
+Every tick checks the true positions of the servos.
 """
 
 import json
@@ -26,20 +26,20 @@ from gazerig.sim_mock.smart_servo.chain import ServoChain
 
 STRUCK_S, PATIENCE_S = 1.0, 3.0
 FAST = 1.3
-"""Servos catch up after a fault so much faster than their limit."""
+"""Factor on its limit by which a servo may be faster while it catches up after a fault."""
 ROOM_RAD = 0.03
-"""And the end of their range by their inertia so much."""
+"""Largest overshoot beyond the end of the range, by inertia."""
 NEAR_RAD = 0.06
 GIVES_RAD = 0.06
-"""A joint under torque gives way to a load so far."""
+"""Largest deflection of a joint under torque by a load."""
 
 Commands = tuple[str, ...]
 
 
 class Case(NamedTuple):
-    """A fault: what begins it and what ends it. ``{i}`` and ``{j}`` are servos of one bus.
+    """A fault: commands that start and end it. ``{i}`` and ``{j}`` are servos of one bus.
 
-    own_speed: the servo itself catches up at its own speed, as nothing can hold it back
+    own_speed: the servo catches up at its own speed, because nothing can restrain it
     """
 
     begins: Commands
@@ -48,7 +48,7 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return what it is called."""
+        """Return its name."""
         return "; ".join(self.begins)
 
 
@@ -71,7 +71,7 @@ LINE = [
     Case(("unplug", "deny on"), ("plug", "deny off")),
     Case(("unplug for 0.02",), ("plug",)),
 ]  # fmt: skip
-"""What befalls any line."""
+"""Faults of any line."""
 
 RESTARTS = [
     Case(("brown-out {i}",)),
@@ -79,17 +79,17 @@ RESTARTS = [
     Case(("lose {i}", "brown-out {i}")),
     Case(("unplug", "brown-out {i}"), ("plug",)),
 ]
-"""What befalls servos that restart alone."""
+"""Faults of servos that restart individually."""
 
 
 class FaultOutcome(NamedTuple):
     """How a fault ended.
 
-    end: "came back": all joints move as before; "left, named": some are limp, stand still or
-        move slowly only, and each is named with its cause; else what is wrong
-    after_s: from the end of the fault until so
+    end: "came back": all joints move as before; "left, named": some are limp, still or slow, and
+        each is named with its cause; any other text is an error
+    after_s: time from the end of the fault until then
     longest_s: the longest read
-    said: what was told of it
+    said: messages about it
     """
 
     end: str
@@ -104,17 +104,17 @@ class FaultOutcome(NamedTuple):
 
 
 class Broken(AssertionError):
-    """A servo did what none may do."""
+    """A servo broke a rule."""
 
 
 class Machine:
-    """A rig's joints on emulated buses, led by the guard on their way to and fro.
+    """A rig's joints on emulated buses, which the guard moves to and fro.
 
-    said: what has been told; longest_s: the longest read; heard: joints that have answered
-    under torque in the last tick
+    said: the messages; longest_s: the longest read; heard: joints that answered under torque in the
+        last tick
     own_speed: servos may catch up at their own speed
-    volts: of their supply, to which faults of the supply return
-    room_rad: servos may be out of their range by so much
+    volts: their supply voltage, to which faults of the supply return
+    room_rad: how far servos may be out of their range, rad
     """
 
     volts = 5.0
@@ -150,7 +150,7 @@ class Machine:
         self._gentle_rad_s = 1.2 * radians(rig.guard.soft_start_speed_deg_s)
 
     def start(self) -> None:
-        """Torque on, and on the way until slow motion is over."""
+        """Switch the torque on, and move until slow motion is over."""
         goals = self.body.start()
         self._begin_s = self._last_s = self.clock.now_s()
         self._slot = 0
@@ -164,10 +164,10 @@ class Machine:
         self.said.clear()
         self.longest_s = 0.0
 
-    # --- what is true
+    # --- true values
 
     def true_rad(self) -> list[float]:
-        """Return where the joints truly are."""
+        """Return the true angles of the joints, rad."""
         steps = {name: device.positions_steps() for name, device in self.devices.items()}
         return [
             linkage.angle_rad(steps[bus][place])
@@ -175,7 +175,7 @@ class Machine:
         ]
 
     def true_goal(self, i: int) -> int | None:
-        """Return the goal that joint's servo follows; None where it is limp."""
+        """Return the goal that the joint's servo follows in steps; None if it is limp."""
         bus, place = self.places[i]
         device = self.devices[bus]
         if isinstance(device, EmulatedMaestro):
@@ -196,7 +196,7 @@ class Machine:
     # --- ticks
 
     def desired(self, t_s: float) -> list[float]:
-        """Return a wave through the middle of every range, well below its limits."""
+        """Return a sine through the middle of every range, well below its limits."""
         wave = []
         for i, limit in enumerate(self.limits):
             middle = 0.5 * (limit.low_rad + limit.high_rad)
@@ -207,13 +207,13 @@ class Machine:
         return wave
 
     def tick(self) -> tuple[bool, ...]:
-        """Run one tick at its slot; tells which joints are well.
+        """Run one tick at its time; return which joints work.
 
         Raises:
-            Broken: a servo is or moves where none may.
+            Broken: a servo has left its range or is too fast.
             DriverError: as in a run.
         """
-        # Slots that were overrun are left out, as in the loop.
+        # Slots that were overrun are skipped, as in the loop.
         slots = int((self.clock.now_s() - self._begin_s) / self.period_s + 1e-6) + 1
         self._slot = slots
         self.clock.sleep_until(self._begin_s + slots * self.period_s)
@@ -237,27 +237,27 @@ class Machine:
         )
 
     def _judge_command(self, command: Sequence[float], rearmed: Sequence[bool], t_s: float) -> None:
-        """See that commands keep range, speed and acceleration, but where a joint began again."""
+        """Check range, speed and acceleration of commands, except after a joint restarted."""
         dt_s = t_s - self._last_s
-        # No goal came meanwhile, and servos braked: commands go on from there as the guard may.
+        # No goal came meanwhile, and servos braked: the guard may restart from there.
         late = dt_s > 1.5 * self.period_s or self._late
         self._late = dt_s > 1.5 * self.period_s
         for i, limit in enumerate(self.limits):
             low, high, top, hard = limit[:4]
             if not low - 1e-6 <= command[i] <= high + 1e-6:
-                raise Broken(f"{self.names[i]} was sent to {command[i]:.4f} rad")
+                raise Broken(f"{self.names[i]} was commanded to {command[i]:.4f} rad")
             speed = (command[i] - self._command[i]) / dt_s
             if rearmed[i]:
                 speed = 0.0
             elif abs(speed) > top + 1e-6:
-                raise Broken(f"{self.names[i]} was sent at {speed:.3f} rad/s")
+                raise Broken(f"{self.names[i]} was commanded at {speed:.3f} rad/s")
             else:
-                # Where it began again, and with what speed from there, is not known to the judge.
+                # The position and speed at which it restarted are unknown here.
                 steps = 2.0 if self._began[i] else 1.0
                 most = steps * hard * max(dt_s, self._dt_s) * 1.001 + 1e-6
                 if not late and abs(speed - self._speed[i]) > most:
                     raise Broken(
-                        f"{self.names[i]} was sent with {speed - self._speed[i]:.3f} rad/s"
+                        f"{self.names[i]} was commanded with {speed - self._speed[i]:.3f} rad/s"
                     )
             self._command[i], self._speed[i] = command[i], speed
         self._began = tuple(rearmed)
@@ -267,14 +267,14 @@ class Machine:
     _late = False
 
     def _judge_servos(self) -> list[float]:
-        """See that servos are in their range and no faster than they may."""
+        """Check that servos are in their range and not faster than allowed."""
         now_s, true = self.clock.now_s(), self.true_rad()
         dt_s = now_s - self._true_s
         for i, (name, limit) in enumerate(zip(self.names, self.limits, strict=True)):
             goal, setup = self.true_goal(i), self.setups[i]
             moved, took_s = abs(true[i] - self._true[i]), dt_s
             if self._kinds[i] in HOBBY_KINDS:
-                took_s = max(dt_s, 0.01)  # a board moves its channels so often
+                took_s = max(dt_s, 0.01)  # a board updates its channels at this interval
             if goal is not None and not setup.min_steps <= goal <= setup.max_steps:
                 raise Broken(f"{name}'s servo has goal {goal}")
             room = self.room_rad + (GIVES_RAD if self._loaded else 0.0)
@@ -299,12 +299,12 @@ class Machine:
     def strike(
         self, bus: str, i: int, j: int, case: Case, struck_s: float = STRUCK_S
     ) -> FaultOutcome:
-        """Let something befall a bus for a while; tells how it ends.
+        """Apply a fault to a bus for a while; return how it ends.
 
-        i, j: places of two joints of that bus; struck_s: how long it lasts
+        i, j: indices of two joints of that bus; struck_s: duration of the fault
 
         Raises:
-            Broken: a servo is or moves where none may.
+            Broken: a servo has left its range or is too fast.
         """
         words = {
             "i": self.setups[i].id, "j": self.setups[j].id, "volts": self.volts,
@@ -337,13 +337,13 @@ class Machine:
             if well[i]:
                 continue
             if not any(servo_label(self.setups[i]) in line for line in said):
-                return f"{name} is not well and nobody says why"
+                return f"{name} does not work and no message gives the cause"
             if self.clock.now_s() - self._fast_s[i] < 0.5:
-                return f"{name} is not well and moves fast"
+                return f"{name} does not work and moves fast"
         return "left, named"
 
 
 def pair_of(rig: Rig, kind: str) -> tuple[str, int, int]:
-    """Return the bus of a kind, and the places of two of its joints."""
+    """Return the bus of a kind, and the indices of two of its joints."""
     places = [i for i, name in enumerate(rig.names) if rig.bus_of(name).kind == kind]
     return rig.joints[rig.names[places[0]]].bus, places[1 % len(places)], places[-1]

@@ -94,7 +94,7 @@ def _check_look(command: Look) -> None:
                     "within +-90 deg (up above 0)"
                 )
             if frame not in ("world", "head"):
-                raise ValueError(f"frame {frame!r:.40}: there is world, head")
+                raise ValueError(f"frame {frame!r:.40}: expected world or head")
             _check_distance(distance)
         case LookAtPerson(person):
             if isinstance(person, bool) or not isinstance(person, int) or person < 0:
