@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
-from gazerig.config.renamed import renamed_changes
 
 _KIND_OF_KEY = {
     "gaze.scanpath.transition_matrix": "scanpaths",
@@ -67,7 +66,7 @@ class AllowedFolder:
             gazerig.config.load.ConfigError: with every file that may not.
         """
         faults: list[ConfigFault] = []
-        for key, value in _leaves("", renamed_changes(changes)):
+        for key, value in _leaves("", changes):
             files = (value,) if isinstance(value, str) else value
             kind = "" if _MESH_FILE.fullmatch(key) else _KIND_OF_KEY.get(key)
             if kind is None or not isinstance(files, list | tuple):

@@ -18,7 +18,6 @@ from gazerig.config.export import Violation, abbreviated, suggestion, violation
 from gazerig.config.faults import ConfigError as ConfigError
 from gazerig.config.faults import ConfigFault as ConfigFault
 from gazerig.config.plugin_sections import extended
-from gazerig.config.renamed import renamed
 from gazerig.config.shipped import SHIPPED
 from gazerig.config.shipped import shipped_names as shipped_names
 from gazerig.drivers.errors import PluginError
@@ -63,14 +62,11 @@ def load(
     *,
     defaults: Sequence[Path] = (),
     checks: Sequence[Check[T]] = (),
-    report: bool = True,
 ) -> T:
     """Return the frozen dataclass that ``path`` over its ``defaults`` (the earliest lowest) makes.
 
     Checks are asked about the whole value; where fields are at fault, what they find
     is listed if it holds whatever right values take their place.
-
-    report: keys with the names of the version before are reported, each once
 
     Raises:
         ConfigError: with every fault of every file.
@@ -79,8 +75,7 @@ def load(
     faults: list[ConfigFault] = []
     known = tuple(shapes_of(cast(Any, into)))
     layers = [read(file, faults, known)[1] for file in files]
-    here = [_from_its_folder(layer) for layer in layers if layer is not None]
-    whole = [renamed(layer, into, faults, report) for layer in here]
+    whole = [_from_its_folder(layer) for layer in layers if layer is not None]
     if len(whole) < len(files):  # what a missing layer would have said is unknown
         raise ConfigError(faults)
     root = whole[0]

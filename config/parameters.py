@@ -11,17 +11,17 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
-from gazerig.config.bounds import Form, Shape, shapes_of, validate
+from gazerig.config.bounds import Shape, shapes_of, validate
 from gazerig.config.export import abbreviated, suggestion
 from gazerig.config.load import ConfigError, ConfigFault, Entry, validate_entries
 from gazerig.config.plugin_sections import extended
-from gazerig.config.renamed import renamed_changes, renamed_key
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import RULES, Rig
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.commands import Value
+from gazerig.robot.model.parameter import Parameter
 from gazerig.robot.model.types import in_order
 
 NEXT_TICK = "next tick"
@@ -61,34 +61,6 @@ _LEFT_OUT: dict[str, Value] = {"park_deg": 0.0}
 """What a left-out entry stands for; None where no value of its own does."""
 
 
-class Parameter(NamedTuple):
-    """One parameter.
-
-    key: dotted path in the YAML; group: the path above it, "" at the top
-    unit, description, low, high, choices: as declared beside the value; of a list they hold
-        for items
-    kind: number, whole, bool, text, choice, list or mapping
-    default: its value in the rig of defaults
-    live: "next tick", or "next start: " and why a running rig cannot take it
-    optional: null may stand here
-    length: number of items of a list, None where it is free; items: kind of its items
-    """
-
-    key: str
-    group: str
-    unit: str
-    description: str
-    low: float | None
-    high: float | None
-    choices: tuple[Value, ...]
-    kind: Form
-    default: Value
-    live: str
-    optional: bool = False
-    length: int | None = None
-    items: Form | None = None
-
-
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
     """Return the parameters of a rig in the order of its file."""
     known = values(defaults)
@@ -102,7 +74,7 @@ def value_of(rig: Rig, key: str) -> Value:
     Raises:
         gazerig.config.load.ConfigError: there is no such key; the message lists those that exist.
     """
-    key, value = renamed_key(key), rig
+    value: Any = rig
     for done, step in enumerate(steps := key.split(".")):
         held = _parts(value)
         if held is not None and step in held:
@@ -147,7 +119,6 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     Raises:
         gazerig.config.load.ConfigError: with every fault, as in loading a file.
     """
-    changes = renamed_changes(changes)
     made = _judged(rig, changes)
     return made if made is not None else _weighed(rig, changes)
 

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
-from gazerig.config.save import SaveResult, copy_shipped, rig_file, save
+from gazerig.config.save import copy_shipped, rig_file, save
 from gazerig.config.schema import Rig, layers_of, load_rig
 from gazerig.drivers.files.file_input import kind_of, read_limited
+from gazerig.robot.model.parameter import SavedFile
 
 _LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
 
@@ -59,7 +60,7 @@ def read_all(layers: RigLayers) -> tuple[Rig, RigFiles]:
 
 def save_over(
     layers: RigLayers, good: bytes, wanted: Mapping[str, Any], now: datetime
-) -> tuple[SaveResult, RigFiles]:
+) -> tuple[SavedFile, RigFiles]:
     """Write values into a rig's file; each must hold with character and profile laid over it.
 
     Args:
@@ -102,7 +103,7 @@ def refuse_copy(to: str) -> None:
 
 def save_copy(
     layers: RigLayers, good: bytes, to: str, wanted: Mapping[str, Any], now: datetime
-) -> tuple[SaveResult, RigFiles]:
+) -> tuple[SavedFile, RigFiles]:
     """Write values into a new copy of a rig's file, which is not there if that fails.
 
     Returns:

@@ -10,49 +10,24 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from gazerig.config.bounds import shapes_of
 from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, shipped
-from gazerig.config.renamed import renamed_changes
-from gazerig.config.save_text import EditRefused, Value, edited, with_new_names, written
+from gazerig.config.save_text import EditRefused, Value, edited, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.shipped import SHIPPED
 from gazerig.drivers.files.file_input import read_limited
+from gazerig.robot.model.parameter import ParamChange, SavedFile
 
 Check = Callable[[str], Any]
 """Loads a file by its path and returns its value; raises gazerig.config.load.ConfigError."""
 
 
-@dataclass(frozen=True, slots=True)
-class ValueChange:
-    """One value that differs; ``old`` is None where the key was not in the file.
-
-    key: dotted key path; old, new: as YAML
-    """
-
-    key: str
-    old: str | None
-    new: str
-
-    def __str__(self) -> str:
-        """Return ``key: old -> new``."""
-        return f"{self.key}: {'(not in the file)' if self.old is None else self.old} -> {self.new}"
-
-
-@dataclass(frozen=True, slots=True)
-class SaveResult:
-    """What was done: ``backup`` is None and the file untouched where nothing differed."""
-
-    path: Path
-    backup: Path | None
-    changes: tuple[ValueChange, ...]
-
-
-def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> SaveResult:
+def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> SavedFile:
     """Write values into a rig file: ``save_rig("my.yaml", {"loop.rate_hz": 100.0}, now)``.
 
     path: the file; the name of a shipped rig is understood too, to be refused with the remedy
@@ -82,12 +57,11 @@ def save(
     check: Check,
     into: type,
     base: bytes | None = None,
-) -> SaveResult:
+) -> SavedFile:
     """Write values at dotted key paths into a YAML file and keep the old file beside it.
 
-    Keys that are not there are added with a comment; old names of keys become those of now, as
-    soon as anything is written. Comments, order, style and anchors
-    stay. The file is replaced only after ``check`` has loaded the new one and found every
+    Keys that are not there are added with a comment. Comments, order, style and anchors stay. The
+    file is replaced only after ``check`` has loaded the new one and found every
     value in it; on any error the file is as it was.
 
     now: goes into the backup's name, ``rig.yaml.bak-20260131-235959``
@@ -103,7 +77,7 @@ def save(
     _refuse_shipped(target)
     before, text, found = _proposal(target, changes, into, base)
     if text == before:
-        return SaveResult(target, None, ())
+        return SavedFile(target, None, ())
     with _errors_named(target), _beside(target, text) as fresh:
         _check_new(target, fresh, changes, check)
         if _held(target) != before:
@@ -112,12 +86,12 @@ def save(
         if before is not None:
             shutil.copymode(target, fresh)
         os.replace(fresh, target)
-    return SaveResult(target, backup, found)
+    return SavedFile(target, backup, found)
 
 
 def propose(
     path: Path | str, changes: Mapping[str, Value], into: type = Rig
-) -> tuple[ValueChange, ...]:
+) -> tuple[ParamChange, ...]:
     """Return what ``save`` would change; nothing is written.
 
     Raises:
@@ -141,9 +115,9 @@ def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
 
 def _proposal(
     target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
-) -> tuple[bytes | None, bytes, tuple[ValueChange, ...]]:
+) -> tuple[bytes | None, bytes, tuple[ParamChange, ...]]:
     """Return the file as it is, None where there is none, as it would be, and the difference."""
-    known, changes = tuple(shapes_of(into)), renamed_changes(changes, into)
+    known = tuple(shapes_of(into))
     if base is None:
         before = read_yaml(target, known)  # refuses what is no YAML, with the line
         base = target.read_bytes()
@@ -151,8 +125,6 @@ def _proposal(
     else:
         raw, before = _held(target), _document(base)
     mark = b"\xef\xbb\xbf" if base.startswith(b"\xef\xbb\xbf") else b""
-    if (text := with_new_names(before.text, into)) != before.text:
-        before = _document(text.encode())
     try:
         text = edited(before.text, changes, into)
         _refuse_side_effects(before.data, text, changes)
@@ -160,7 +132,7 @@ def _proposal(
         raise _fault(target, str(error)) from None
     old = {key: _follow(before.data, key) for key in changes}
     found = tuple(
-        ValueChange(key, None if old[key] is _ABSENT else written(old[key]), written(value))
+        ParamChange(key, None if old[key] is _ABSENT else written(old[key]), written(value))
         for key, value in changes.items()
         if old[key] is _ABSENT or written(old[key]) != written(value)
     )

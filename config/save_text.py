@@ -16,7 +16,6 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.entries import composed
-from gazerig.config.renamed import old_keys
 
 Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
 WIDTH = 100
@@ -61,17 +60,6 @@ def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
         # One after the other: the first may make the mapping that the next one needs.
         edit = _added(text, _top(text), key, value, into)
         text = text[: edit.start] + edit.new + text[edit.end :]
-    return text
-
-
-def with_new_names(text: str, into: type) -> str:
-    """Return the text with the keys of the version before under their names of now.
-
-    Raises:
-        Unchangeable: the top level is no mapping.
-    """
-    for start, end, new in reversed(list(old_keys(_top(text), into))):
-        text = text[:start] + new + text[end:]
     return text
 
 

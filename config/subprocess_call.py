@@ -5,6 +5,7 @@ ticks last up to 90 ms instead of 1, as every answer of a servo was waited for b
 interpreter lock; in another process it costs the loop nothing that could be measured.
 """
 
+import logging
 import os
 import pickle
 import subprocess
@@ -13,12 +14,12 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
 from gazerig.config.load import ConfigError, ConfigFault
-from gazerig.config.renamed import report_once
 from gazerig.drivers.process import child_process
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
+_LOG = logging.getLogger("gazerig.config")
 _LONGEST_S = 30.0
 _MODULE = "gazerig.config.subprocess_call"
 
@@ -42,7 +43,7 @@ def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) ->
         last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
         raise _failed(work, f"ended by itself: {' '.join(last) or done.returncode}")
     for line in done.stderr.decode(errors="replace").splitlines():
-        report_once(line)  # what it logged
+        _LOG.warning("%s", line)
     value, faults = pickle.loads(done.stdout)
     if faults:
         raise ConfigError(faults)

@@ -4,7 +4,6 @@ import contextlib
 import socket
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from gazerig.config.schema import load_rig
@@ -12,7 +11,7 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Robot, Tick
 from gazerig.robot.model.commands import Tune, Value
-from gazerig.robot.remote.param_info import ParamInfo
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.remote.request_handler import Pulse
 from gazerig.robot.remote.socket_server import RemoteServer
 
@@ -20,20 +19,6 @@ RATE = "loop.rate_hz"
 
 
 BLINKS = "gaze.lids.blinks_per_min"
-
-
-@dataclass
-class Change:
-    key: str
-    old: Value
-    new: Value
-
-
-@dataclass
-class Saved:
-    path: Path
-    backup: Path | None
-    changes: tuple[Change, ...]
 
 
 class Broken(Exception):
@@ -48,10 +33,14 @@ class SecondTuning:
         self._file: dict[str, Value] = {RATE: 200.0, BLINKS: 17.0}
         self._now = dict(self._file)
         self.version = 0
+        self.path, self.character_name = Path("/nowhere/my.yaml"), "bold"
 
-    def parameters(self) -> tuple[ParamInfo, ...]:
+    def values(self) -> Mapping[str, Value]:
+        return self._now
+
+    def parameters(self) -> tuple[Parameter, ...]:
         return tuple(
-            ParamInfo(
+            Parameter(
                 key, key.rpartition(".")[0], "Hz", "a rate", 1.0, 1000.0, (), "number", 17.0, "now"
             )
             for key in self._now
@@ -75,20 +64,20 @@ class SecondTuning:
         self._order(Tune(tuple(changes.items())))
         return ("taken",)
 
-    def unsaved(self) -> tuple[Change, ...]:
+    def unsaved(self) -> tuple[ParamChange, ...]:
         return tuple(
-            Change(key, self._file.get(key), value)
+            ParamChange(key, str(self._file.get(key)), str(value))
             for key, value in self._now.items()
             if value != self._file.get(key)
         )
 
-    def differs(self) -> tuple[Change, ...]:
+    def differs(self) -> tuple[ParamChange, ...]:
         return self.unsaved()
 
-    def save(self, path: Path | None = None) -> Saved:
+    def save(self, path: Path | None = None) -> SavedFile:
         changes = self.unsaved()
         self._file = dict(self._now)
-        return Saved(path or Path("/nowhere/my.yaml"), None, changes)
+        return SavedFile(path or self.path, None, changes)
 
     def revert(self) -> tuple[str, ...]:
         self._now = dict(self._file)

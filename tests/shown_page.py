@@ -10,8 +10,8 @@ from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 
 from gazerig.robot.dashboard.feed.page_process import PageProcess
+from gazerig.robot.model.parameter import Parameter
 from gazerig.robot.model.types import Snapshot
-from gazerig.robot.remote.param_info import ParamInfo
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ SNAPSHOT = Snapshot(
     health="0 lost",
     joints=GAZE_JOINTS,
 )
-PARAM = ParamInfo("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
+PARAM = Parameter("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
 
 def wait_for(ready: Callable[[], T | None], what: str) -> T:

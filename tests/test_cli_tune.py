@@ -15,12 +15,13 @@ import pytest
 from tuned_rig import Running, a_rig, a_rig_beside
 from typer.testing import CliRunner
 
-from gazerig.config.parameters import Parameter, parameters
+from gazerig.config.parameters import parameters
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli.entry_point import main as quick_main
 from gazerig.robot.cli.steer import END, lead
 from gazerig.robot.cli.tune import app, state_lines
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.parameter import Parameter
 from gazerig.robot.remote.client import RobotClient, running
 from gazerig.robot.remote.steering import STOP, Steering, Stick
 

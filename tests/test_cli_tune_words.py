@@ -6,10 +6,9 @@ import pytest
 from present import present
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.cli.entry_point import MOVED, QUICK, as_now, is_quick
-from gazerig.robot.cli.lead import app as lead_app
+from gazerig.robot.cli.entry_point import QUICK, is_quick
 from gazerig.robot.cli.lead import read_look
-from gazerig.robot.cli.tune import app, ctl, read_pairs, read_value
+from gazerig.robot.cli.tune import app, read_pairs, read_value
 from gazerig.robot.model.commands import (
     LookAt,
     LookAtDirection,
@@ -59,17 +58,3 @@ def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
     ):
         environ = {"_GAZERIG_COMPLETE": "complete_bash", "COMP_WORDS": typed}
         assert is_quick([], environ) is quick
-
-
-def test_commands_of_before_work_and_name_their_new_place(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    grouped = (*ctl.registered_commands, *lead_app.registered_commands)
-    names = {c.name or c.callback.__name__ for c in grouped if c.callback}
-    assert names - {"stop"} == MOVED
-    for name in sorted(MOVED):
-        assert as_now([name, "x"]) == ["ctl", name, "x"]
-        assert capfd.readouterr().err == f"gazerig {name} is now gazerig ctl {name}\n"
-    for words in ([], ["stop"], ["run"], ["ctl", "get"], ["--debug", "get"]):
-        assert as_now(words) == words
-    assert not capfd.readouterr().err

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from present import present
 
 from gazerig.config.load import ConfigError, load, read_yaml, shipped
-from gazerig.config.save import ValueChange, copy_shipped, propose, rig_file, save, save_rig
+from gazerig.config.save import copy_shipped, propose, rig_file, save, save_rig
 from gazerig.config.save_text import EditRefused, edited, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.params import Bounds, Unit
+from gazerig.robot.model.parameter import ParamChange
 
 NOW = datetime(2026, 1, 31, 23, 59, 58)
 
@@ -80,7 +81,7 @@ def test_a_value_changes_and_every_other_byte_stays(small):
             "        zero_step:    2051   # by hand, 3 May",
         )
     ]
-    assert saved.changes == (ValueChange("joints.tilt.zero_step", "2048", "2051"),)
+    assert saved.changes == (ParamChange("joints.tilt.zero_step", "2048", "2051"),)
     assert str(saved.changes[0]) == "joints.tilt.zero_step: 2048 -> 2051"
     assert saved.backup == small.with_name("head.yaml.bak-20260131-235958")
     assert present(saved.backup).read_text() == SMALL
@@ -106,7 +107,7 @@ def test_missing_keys_are_added_with_what_they_mean(small):
     assert "spare:  # one on the shelf\n  id: 9  # 0..252; servo id\n  # long long" in text
     assert '\n        note: "y"\nspare:  #' in text  # behind the list, indented as its mapping
     assert all(len(line) <= 100 for line in text.splitlines())
-    assert saved.changes[1] == ValueChange("spare.id", None, "9")
+    assert saved.changes[1] == ParamChange("spare.id", None, "9")
     assert str(saved.changes[1]) == "spare.id: (not in the file) -> 9"
     assert check(small).spare.id == 9
 

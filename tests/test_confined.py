@@ -51,7 +51,7 @@ def test_files_elsewhere_are_refused(home: Path, given: str) -> None:
         with pytest.raises(ConfigError):
             AllowedFolder(home).changes({"gaze.scanpath.transition_matrix": given})
         with pytest.raises(ConfigError):
-            AllowedFolder(home).changes({"gaze.scanpath": {"walk": given}})
+            AllowedFolder(home).changes({"gaze.scanpath": {"transition_matrix": given}})
 
 
 def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:

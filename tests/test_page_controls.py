@@ -39,7 +39,7 @@ from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.requests.request_handler import PAGE, PageRequestHandler
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value
-from gazerig.robot.remote.param_info import ParamInfo
+from gazerig.robot.model.parameter import Parameter
 
 
 @contextmanager
@@ -239,7 +239,7 @@ class OneParam(StandIn):
         self.value = 1.0
         return ()
 
-    def parameters(self) -> tuple[ParamInfo, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         return tuple(PARAM._replace(key=f"a.{n}") for n in range(100))
 
     def values(self) -> dict[str, Value]:

@@ -35,7 +35,7 @@ from gazerig.robot.dashboard.widgets.widget import Slider, TextField
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.command_json import as_json, from_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt
-from gazerig.robot.remote.param_info import JsonValue, ParamInfo
+from gazerig.robot.model.parameter import JsonValue, Parameter
 
 # --- controls -----------------------------------------------------------------------------------
 
@@ -172,9 +172,7 @@ def test_sliders_are_those_of_the_rig(place: Container) -> None:
 
 def test_a_parameter_is_read_as_the_rig_writes_it() -> None:
     data = {**PARAM._asdict(), "choices": [1, -1], "length": None, "items": None}
-    assert ParamInfo.from_json(json.loads(json.dumps(data))) == PARAM._replace(choices=(1, -1))
-    older = {"says" if name == "description" else name: one for name, one in data.items()}
-    assert ParamInfo.from_json(older) == PARAM._replace(choices=(1, -1))
+    assert Parameter.from_json(json.loads(json.dumps(data))) == PARAM._replace(choices=(1, -1))
 
 
 def test_a_hint_says_all_there_is_to_know() -> None:
@@ -233,7 +231,7 @@ def test_every_parameter_of_every_rig_becomes_a_control(place: Container, name: 
     sent = json.loads(
         json.dumps([plain(param._asdict()) for param in parameters(rig, load_rig("desk"))])
     )
-    places = [ParamInfo.from_json(data) for data in sent]
+    places = [Parameter.from_json(data) for data in sent]
     assert {param.key for param in places} == set(now)
     refused: list[str] = []
     for param in places:

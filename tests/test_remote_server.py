@@ -67,19 +67,14 @@ def test_values_rules_and_changes(rig: RobotClient) -> None:
     assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
     assert rig.get("gaze.") == {BLINKS: 17.0}
     assert rig.parameter(RATE).high == 1000.0 and rig.parameter(RATE).group == "loop"
-    assert (
-        rig._connection.ask("knobs", prefix=RATE)
-        == rig._connection.ask("parameters", prefix=RATE)
-        != []
-    )
     assert isinstance(described := rig._connection.ask("parameters", prefix=RATE), list)
-    assert described[0]["description"] == described[0]["says"] == "a rate"
+    assert described[0]["description"] == "a rate"
     assert rig.set(RATE, 100.0) == ("taken",)
     assert rig.get(RATE) == {RATE: 100.0}
-    assert rig.unsaved() == rig.differs() == ((RATE, 200.0, 100.0),)
+    assert rig.unsaved() == rig.differs() == ((RATE, "200.0", "100.0"),)
     assert rig.status()["version"] == 1 and rig.status()["unsaved"] == 1
     saved = rig.save("/tmp/my.yaml")
-    assert saved.path == Path("/tmp/my.yaml") and saved.changes == ((RATE, 200.0, 100.0),)
+    assert saved.path == Path("/tmp/my.yaml") and saved.changes == ((RATE, "200.0", "100.0"),)
     assert rig.unsaved() == ()
     rig.set(BLINKS, 3.0)
     rig.revert()

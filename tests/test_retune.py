@@ -10,10 +10,11 @@ import pytest
 from retuned_run import DT_S, RIG, Judge, fresh, inside, put, started
 
 from gazerig.config.load import ConfigError, shipped, shipped_names
-from gazerig.config.parameters import NEXT_START, Parameter, changed, parameters, value_of
+from gazerig.config.parameters import NEXT_START, changed, parameters, value_of
 from gazerig.config.schema import Rig
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.model.commands import Value
+from gazerig.robot.model.parameter import Parameter
 
 
 def some_changes(

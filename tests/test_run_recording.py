@@ -393,14 +393,6 @@ def test_leads_and_gestures_come_back(recorded: Recorded) -> None:
     assert (back.lead, back.gesture) == (lead, gesture)
 
 
-def test_a_level_in_an_older_recording_has_its_present_name(recorded: Recorded) -> None:
-    values = moments.as_json(handed_over(recorded.ticks[-1])[1])
-    values["verdict"]["level"] = "limp"
-    assert (
-        moments.from_json({**values, "percept": None}, {}).tick.guard_result.level == "torque_off"
-    )
-
-
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])
 def test_any_percept_comes_back(recorded: Recorded, odd: float) -> None:
     face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)

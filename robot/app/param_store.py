@@ -20,7 +20,6 @@ from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 from gazerig.config.parameters import (
     NEXT_START,
-    Parameter,
     changed,
     differences,
     flattened,
@@ -30,7 +29,6 @@ from gazerig.config.parameters import (
     values_after,
 )
 from gazerig.config.parameters import parameters as described
-from gazerig.config.renamed import renamed_key
 from gazerig.config.rig_files import (
     RigFiles,
     RigLayers,
@@ -39,12 +37,13 @@ from gazerig.config.rig_files import (
     save_copy,
     save_over,
 )
-from gazerig.config.save import SaveResult, ValueChange, rig_file
+from gazerig.config.save import rig_file
 from gazerig.config.save_text import EditRefused, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.subprocess_call import in_subprocess
 from gazerig.robot.app.live_params import LiveParams
 from gazerig.robot.model.commands import Value
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import CommandTaker
 
 NO_CHARACTER = "none"
@@ -156,7 +155,7 @@ class ParamStore:
         Raises:
             gazerig.config.load.ConfigError: there is none; the message says what is near.
         """
-        state, prefix = self._state, renamed_key(prefix)
+        state = self._state
         found = {key: value for key, value in state.values.items() if key.startswith(prefix)}
         return found or {prefix: value_of(state.rig, prefix)}
 
@@ -171,12 +170,12 @@ class ParamStore:
         with self._changing:
             return self._put(self._state, changed(self._state.rig, changes))
 
-    def unsaved(self) -> tuple[ValueChange, ...]:
+    def unsaved(self) -> tuple[ParamChange, ...]:
         """Return what is in force and not in the files."""
         state = self._state
         return _changes(state.saved, state.rig, state.was)
 
-    def differs(self) -> tuple[ValueChange, ...]:
+    def differs(self) -> tuple[ParamChange, ...]:
         """Return what differs from the defaults, those of the shipped rig."""
         return _changes(self._defaults, self._state.rig, values(self._defaults))
 
@@ -185,7 +184,7 @@ class ParamStore:
         with self._changing:
             return self._put(self._state, self._state.saved)
 
-    def save(self, path: Path | str | None = None) -> SaveResult:
+    def save(self, path: Path | str | None = None) -> SavedFile:
         """Write what is in force into the rig's file, or into a copy of it at a new path.
 
         From then on the copy is this rig's file. A file that was spoilt by hand meanwhile is
@@ -214,7 +213,7 @@ class ParamStore:
             else:
                 layers = layers._replace(name=str(target))
                 done = self._elsewhere(save_over, layers, good, wanted, self._now())
-            saved: SaveResult
+            saved: SavedFile
             saved, files = done
             self._state = state._replace(
                 saved=state.rig, was=state.values, files=files, version=state.version + 1
@@ -303,11 +302,11 @@ def _refuse_lists(wanted: Mapping[str, Value]) -> None:
         raise ConfigError(faults)
 
 
-def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ValueChange, ...]:
+def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ParamChange, ...]:
     """Return each value that differs, as YAML; was: those before."""
     found = flattened(after, differences(before, after))
     return tuple(
-        ValueChange(key, _text(was[key]) if key in was else None, _text(value))
+        ParamChange(key, _text(was[key]) if key in was else None, _text(value))
         for key, value in found.items()
     )
 

@@ -340,7 +340,7 @@ def _rig(
 def _read(recording: RunRecording, whole: Path) -> Rig:
     """Read the recorded configuration."""
     try:
-        return load(whole, Rig, report=False)
+        return load(whole, Rig)
     except ConfigError as error:
         first = error.faults[0]
         raise BadRecording(

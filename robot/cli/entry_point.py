@@ -11,13 +11,6 @@ from types import FrameType
 
 QUICK = frozenset(("ctl", "stop"))
 """The commands of gazerig.robot.cli.tune."""
-MOVED = frozenset(
-    {
-        *("get", "set", "save", "revert", "character"),
-        *("ask", "look", "status", "resume"),
-    }
-)
-"""Commands that stood beside ``stop`` once and are part of ``ctl`` now."""
 _ELSEWHERE = {"--help", "--debug"}
 """Options that the whole program knows more about."""
 
@@ -29,7 +22,6 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, _gone)
     hold_standard_files()
-    sys.argv[1:] = as_now(sys.argv[1:])
     try:
         if is_quick(sys.argv[1:], os.environ):
             _quick()
@@ -39,17 +31,6 @@ def main() -> None:
             whole()
     finally:  # all is said: nothing is left to interrupt
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def as_now(arguments: Sequence[str]) -> list[str]:
-    """Return what was typed with a command of before in its group; one line names the new one.
-
-    arguments: what stands after ``gazerig``
-    """
-    if not arguments or arguments[0] not in MOVED:
-        return list(arguments)
-    os.write(2, f"gazerig {arguments[0]} is now gazerig ctl {arguments[0]}\n".encode())
-    return ["ctl", *arguments]
 
 
 def _gone(number: int, frame: FrameType | None) -> None:

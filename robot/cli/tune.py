@@ -17,8 +17,8 @@ from gazerig.robot.cli import lead as cli_lead
 from gazerig.robot.cli import steer as cli_steer
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
+from gazerig.robot.model.parameter import JsonValue, Parameter
 from gazerig.robot.remote.client import RobotClient
-from gazerig.robot.remote.param_info import JsonValue, ParamInfo
 
 ctl = typer.Typer(
     name="ctl",
@@ -300,7 +300,7 @@ def _choices(choices: Sequence[str]) -> str:
 
 
 def _table(
-    found: Iterable[ParamInfo], values: dict[str, JsonValue], unsaved: set[str]
+    found: Iterable[Parameter], values: dict[str, JsonValue], unsaved: set[str]
 ) -> list[str]:
     """Lay parameters out in columns, never cut: the lines are also read by programs."""
     rows = [("", "key", "value", "unit", "default", "")]
@@ -324,7 +324,7 @@ def _table(
     ]
 
 
-def _rule(param: ParamInfo) -> str:
+def _rule(param: Parameter) -> str:
     """Return what one parameter is, its range, and when a change takes effect."""
     bounds = "" if param.low is None or param.high is None else f"{param.low:g} .. {param.high:g}"
     choices = ", ".join(map(_written, param.choices))

@@ -14,6 +14,7 @@ from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.command_json import from_json
 from gazerig.robot.model.commands import COMMANDS, Command, Tune, Value
+from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import Ticket
 
 QUESTIONS = (
@@ -39,55 +40,6 @@ REAL = "these servos are real: only emulated ones have faults to order (gazerig 
 FIXED = "these parameters cannot be changed while the rig runs"
 
 
-class DescribedParam(Protocol):
-    """A parameter that can be changed, with its rule; a NamedTuple."""
-
-    @property
-    def key(self) -> str:
-        """Return the dotted key."""
-        ...
-
-    def _asdict(self) -> dict[str, object]: ...
-
-
-class ChangedParam(Protocol):
-    """A value that differs from another."""
-
-    @property
-    def key(self) -> str:
-        """Return the dotted key."""
-        ...
-
-    @property
-    def old(self) -> object:
-        """Return what it is compared with."""
-        ...
-
-    @property
-    def new(self) -> object:
-        """Return what is in force."""
-        ...
-
-
-class SavedParams(Protocol):
-    """What was written where."""
-
-    @property
-    def path(self) -> Path:
-        """Return the file."""
-        ...
-
-    @property
-    def backup(self) -> Path | None:
-        """Return where the old file was kept, None where nothing was written."""
-        ...
-
-    @property
-    def changes(self) -> Sequence[ChangedParam]:
-        """Return what was written."""
-        ...
-
-
 class ParamAccess(Protocol):
     """The parameters of a running rig, as ``gazerig.robot.app.param_store.ParamStore`` has them."""
 
@@ -96,8 +48,22 @@ class ParamAccess(Protocol):
         """Count the changes."""
         ...
 
-    def parameters(self) -> Iterable[DescribedParam]:
+    @property
+    def path(self) -> Path:
+        """Return the rig's file."""
+        ...
+
+    @property
+    def character_name(self) -> str:
+        """Return the character in force."""
+        ...
+
+    def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters."""
+        ...
+
+    def values(self) -> Mapping[str, Value]:
+        """Return all values in force."""
         ...
 
     def get(self, prefix: str) -> Mapping[str, Value]:
@@ -108,15 +74,15 @@ class ParamAccess(Protocol):
         """Apply values from the next tick on; return what the user should know."""
         ...
 
-    def unsaved(self) -> Iterable[ChangedParam]:
+    def unsaved(self) -> Sequence[ParamChange]:
         """Return what is in force and not in the file."""
         ...
 
-    def differs(self) -> Iterable[ChangedParam]:
+    def differs(self) -> Sequence[ParamChange]:
         """Return what differs from the defaults."""
         ...
 
-    def save(self, path: Path | None = None) -> SavedParams:
+    def save(self, path: Path | None = None) -> SavedFile:
         """Write what is in force."""
         ...
 
@@ -176,7 +142,7 @@ class ParamsChanged(NamedTuple):
 class ParamsSaved(NamedTuple):
     """The values in force were written."""
 
-    saved: SavedParams
+    saved: SavedFile
 
 
 class CommandGiven(NamedTuple):
@@ -222,7 +188,7 @@ class CommandHandler:
         self._state = state
         self._robot, self._params, self._status = robot, params, status
         self._saved, self._paths, self._fixed = saved, paths, fixed
-        self._described: tuple[Iterable[DescribedParam], list[tuple[str, object]]] = (), []
+        self._described: tuple[Iterable[Parameter], list[tuple[str, object]]] = (), []
         self.refusals: tuple[type[Exception], ...] = (
             ValueError, DriverError, OSError, *refusals,
         )  # fmt: skip
@@ -254,9 +220,6 @@ class CommandHandler:
                 return Answered(self._fault(text))
             case {"do": str(name)} if name in COMMANDS:
                 return self.give(sign(from_json(request)))
-            case {"do": "order", "order": dict(command), **rest} if not rest:
-                # As programs of before put it.
-                return self.give(sign(from_json(command)))
         return self._of_params(request)
 
     def give(self, command: Command) -> CommandGiven:
@@ -271,7 +234,7 @@ class CommandHandler:
 
     def _of_params(self, request: object) -> RequestResult:
         match request:
-            case {"do": "parameters" | "knobs", "prefix": str(prefix), **rest} if not rest:
+            case {"do": "parameters", "prefix": str(prefix), **rest} if not rest:
                 found = [text for key, text in self._all_described() if key.startswith(prefix)]
                 return Answered(found)
             case {"do": "get", "prefix": str(prefix), **rest} if not rest:
@@ -303,7 +266,7 @@ class CommandHandler:
             return []
         found = self._params.parameters()
         if found is not self._described[0]:
-            self._described = found, [(one.key, _param_json(one)) for one in found]
+            self._described = found, [(one.key, plain(one._asdict())) for one in found]
         return self._described[1]
 
     def _set(self, changes: Mapping[str, object]) -> RequestResult:
@@ -341,7 +304,7 @@ def plain(value: object) -> object:
     return value
 
 
-def as_changes(changes: Iterable[ChangedParam]) -> list[dict[str, object]]:
+def as_changes(changes: Sequence[ParamChange]) -> list[dict[str, object]]:
     """Return differing values as plain JSON."""
     return [{"key": c.key, "old": plain(c.old), "new": plain(c.new)} for c in changes]
 
@@ -354,12 +317,6 @@ def as_value(value: object) -> Value:
         return {key: as_value(item) for key, item in value.items()}
     assert value is None or isinstance(value, bool | int | float | str)
     return value
-
-
-def _param_json(param: DescribedParam) -> object:
-    """Return plain values of a parameter; older clients read its description as ``says``."""
-    described = param._asdict()
-    return plain({**described, "says": described.get("description", "")})
 
 
 def _notes(notes: object) -> tuple[str, ...]:

@@ -135,7 +135,6 @@ class CommandReply(NamedTuple):
             ],
             "gesture": None if self.gesture is None else self.gesture._asdict(),
             "text": text,
-            "words": text,  # its name before, for older clients
         }
 
     @classmethod

@@ -24,7 +24,7 @@ from gazerig.gaze.types import (
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_json import from_recording as command_from_json
 from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
-from gazerig.robot.model.types import GAZE_JOINTS, GuardResult, JointAngles, JointState
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
 
@@ -63,20 +63,6 @@ class TickRecord(NamedTuple):
     dt_s: float
     before: tuple[BodyRecord, ...] = ()
 
-
-_ONCE_ALL = tuple(
-    [name for name in GAZE_JOINTS if not name.startswith("eyes_") and "lower" not in name]
-)
-"""The joints of a recording that does not name them: every rig had these."""
-
-_FORMER = {
-    "pull": "salience", "pulls": "saliences", "slide": "translation", "loom": "looming",
-    "spin": "rotation", "interest": "habituation",
-}  # fmt: skip
-"""Fields of a target in older recordings -> their present names."""
-
-_FORMER_LEVELS = {"limp": "torque_off"}
-"""Guard levels in older recordings -> their present names."""
 
 _BODY_RECORDS: dict[str, type[BodyRecord]] = {
     "engaged": TorqueEnabled,
@@ -165,13 +151,10 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
     number = data["percept"]
     desired = tuple(data["wish_rad"])
     guard_result = _from_file(data["verdict"])
-    guard_result["level"] = _FORMER_LEVELS.get(guard_result["level"], guard_result["level"])
     if guard_result["desired_rad"] is None:
         guard_result["desired_rad"] = desired
-    guard_result.setdefault("joints", _ONCE_ALL)
-    target = _present_names(data["target"])
-    saliences = [Salience(**_present_names(one)) for one in target["saliences"]]
-    target["saliences"] = tuple(saliences)
+    target = dict(data["target"])
+    target["saliences"] = tuple([Salience(**one) for one in target["saliences"]])
     tick = Tick(
         data["t_s"],
         _made(JointState, data["joints"]),
@@ -191,11 +174,6 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])
     return TickRecord(tick, data["dt_s"], before)
-
-
-def _present_names(data: Json) -> Json:
-    """Return fields under their present names, however old the recording is."""
-    return {_FORMER.get(name, name): value for name, value in data.items()}
 
 
 def percept_as_json(values: Sequence[Any], finite: bool = False) -> Json:

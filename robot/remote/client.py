@@ -32,19 +32,18 @@ from gazerig.robot.model.commands import (
     Stop,
     Value,
 )
+from gazerig.robot.model.parameter import (
+    JsonValue,
+    ParamChange,
+    Parameter,
+    SavedFile,
+)
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.client_connection import CONNECT_S, ClientConnection
 from gazerig.robot.remote.client_connection import ConnectionLost as ConnectionLost
 from gazerig.robot.remote.client_connection import NoRobotError as NoRobotError
 from gazerig.robot.remote.client_connection import RequestRejected as RequestRejected
 from gazerig.robot.remote.heartbeat import LeadHeartbeat
-from gazerig.robot.remote.param_info import (
-    JsonValue,
-    ParamDifference,
-    ParamInfo,
-    SavedFile,
-    differences,
-)
 from gazerig.robot.remote.socket_io import (
     ANSWER_BYTES,
     Wire,
@@ -132,12 +131,12 @@ class RobotClient:
         """Return the values in force of all keys that begin with ``prefix``."""
         return cast(dict[str, JsonValue], self._connection.ask("get", prefix=prefix))
 
-    def parameters(self, prefix: str = "") -> tuple[ParamInfo, ...]:
+    def parameters(self, prefix: str = "") -> tuple[Parameter, ...]:
         """Return the rules and defaults of all keys that begin with ``prefix``."""
         found = cast(list[dict[str, Any]], self._connection.ask("parameters", prefix=prefix))
-        return tuple(ParamInfo.from_json(one) for one in found)
+        return tuple(Parameter.from_json(one) for one in found)
 
-    def parameter(self, key: str) -> ParamInfo:
+    def parameter(self, key: str) -> Parameter:
         """Return one parameter's rule and default.
 
         Raises:
@@ -164,13 +163,13 @@ class RobotClient:
         """
         return self._notes(self._connection.ask("set", changes=dict(changes)))
 
-    def unsaved(self) -> tuple[ParamDifference, ...]:
+    def unsaved(self) -> tuple[ParamChange, ...]:
         """Return what is in force and not in the rig's file."""
-        return differences(self._connection.ask("unsaved"))
+        return _changes(self._connection.ask("unsaved"))
 
-    def differs(self) -> tuple[ParamDifference, ...]:
+    def differs(self) -> tuple[ParamChange, ...]:
         """Return what differs from the defaults."""
-        return differences(self._connection.ask("differs"))
+        return _changes(self._connection.ask("differs"))
 
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write what is in force into the rig's own file, or another of this computer.
@@ -181,7 +180,7 @@ class RobotClient:
         whole = None if path is None else str(Path(path).expanduser().absolute())
         said = cast(dict[str, Any], self._connection.ask("save", path=whole))
         backup = None if said["backup"] is None else Path(said["backup"])
-        return SavedFile(Path(said["path"]), backup, differences(said["changes"]))
+        return SavedFile(Path(said["path"]), backup, _changes(said["changes"]))
 
     def revert(self) -> tuple[str, ...]:
         """Apply the values of the rig's file again."""
@@ -393,3 +392,8 @@ def _names(rigs: list[RobotClient]) -> str:
             except DriverError as error:
                 names.append(f"{rig.pid} ({error})")
     return ", ".join(names)
+
+
+def _changes(rows: object) -> tuple[ParamChange, ...]:
+    """Return the changes that a rig's answer lists."""
+    return tuple(ParamChange(**row) for row in cast(list[dict[str, Any]], rows))

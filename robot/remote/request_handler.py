@@ -239,6 +239,6 @@ def _signed(peer: str, command: Command) -> Command:
 def is_stop(request: object) -> bool:
     """True if a request is to stop: nothing may hold that up."""
     match request:
-        case {"do": "stop"} | {"do": "order", "order": {"order": "stop"}}:
+        case {"do": "stop"}:
             return True
     return False

@@ -12,12 +12,12 @@ from math import prod
 import numpy as np
 
 from gazerig.config.load import ConfigError, ConfigFault
-from gazerig.config.parameters import Parameter, changed, parameters, value_of
-from gazerig.config.renamed import renamed_key
+from gazerig.config.parameters import changed, parameters, value_of
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.commands import Value
+from gazerig.robot.model.parameter import Parameter
 
 Point = Mapping[str, Value]
 
@@ -111,7 +111,7 @@ def axes_of(rig: Rig, settings: Sequence[str], read: Callable[[str, str], Value]
     axes, faults = list[Axis](), list[ConfigFault]()
     for setting in settings:
         key, equals, text = setting.partition("=")
-        key = renamed_key(key.strip())
+        key = key.strip()
         if not equals or not text.strip():
             raise SetupError(f"--set {setting}: not KEY=VALUES; values are {_FORMS}")
         if any(axis.key == key for axis in axes):

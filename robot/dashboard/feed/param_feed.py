@@ -3,51 +3,14 @@
 import json
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Protocol
+from collections.abc import Callable
 
-from gazerig.robot.control.command_handler import ChangedParam, DescribedParam, plain
+from gazerig.robot.control.command_handler import ParamAccess, plain
 from gazerig.robot.control.observers import left_out
 from gazerig.robot.dashboard.feed.page_process import PARAMS, VALUES
 from gazerig.robot.model.commands import Value
 
 _PIECE = 40  # parameters a message: some 20 kB, a tenth of what a message may be
-
-
-class Fed(Protocol):
-    """What the feed asks of the parameters of a running rig (``app.param_store.ParamStore``)."""
-
-    @property
-    def version(self) -> int:
-        """Count the changes."""
-        ...
-
-    def parameters(self) -> Iterable[DescribedParam]:
-        """Return all parameters."""
-        ...
-
-    def values(self) -> Mapping[str, Value]:
-        """Return all values in force."""
-        ...
-
-    def unsaved(self) -> Iterable[ChangedParam]:
-        """Return what is in force and not in the file."""
-        ...
-
-    def characters(self) -> Sequence[str]:
-        """Return the characters there are."""
-        ...
-
-    @property
-    def character_name(self) -> str:
-        """Return the one in force."""
-        ...
-
-    @property
-    def path(self) -> Path:
-        """Return the rig's file."""
-        ...
 
 
 class ParamFeed:
@@ -61,7 +24,7 @@ class ParamFeed:
         tuning: the parameters.
     """
 
-    def __init__(self, send: Callable[[bytes], bool], tuning: Fed) -> None:
+    def __init__(self, send: Callable[[bytes], bool], tuning: ParamAccess) -> None:
         self._send = send
         self._tuning = tuning
         self._due: deque[bytes] = deque()

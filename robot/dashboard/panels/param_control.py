@@ -7,7 +7,7 @@ from typing import cast
 
 from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.widget import Checkbox, Choice, Slider, TextField
-from gazerig.robot.remote.param_info import ParamInfo
+from gazerig.robot.model.parameter import Parameter
 
 Put = Callable[[str, object], None]
 """Asks for another value: key, value."""
@@ -17,7 +17,7 @@ _FAR = 20.0
 """A range this many times wider than the value needs a number typed, not a slider."""
 
 
-def hint(param: ParamInfo) -> str:
+def hint(param: Parameter) -> str:
     """Return the tooltip of a parameter: description, range and default."""
     parts = [f"{param.key}: {param.description}" if param.description else param.key]
     unit = f" {param.unit}" if param.unit else ""
@@ -31,7 +31,7 @@ def hint(param: ParamInfo) -> str:
     return "; ".join(parts)
 
 
-def label(param: ParamInfo, unsaved: bool) -> str:
+def label(param: Parameter, unsaved: bool) -> str:
     """Name a control: the last parts of the key, its unit, a mark where it is not saved."""
     unit = f" ({param.unit})" if param.unit else ""
     name = ".".join(param.key.split(".")[-2:])
@@ -45,7 +45,7 @@ def step_of(low: float, high: float) -> float:
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
 
 
-def slides(param: ParamInfo, value: object) -> bool:
+def slides(param: Parameter, value: object) -> bool:
     """Return whether a slider can set a parameter finely enough."""
     if param.kind not in ("number", "whole") or isinstance(value, bool):
         return False
@@ -58,7 +58,7 @@ def slides(param: ParamInfo, value: object) -> bool:
     return low <= value <= high and (usual == 0.0 or high - low <= _FAR * usual)
 
 
-def written(param: ParamInfo, value: object) -> str:
+def written(param: Parameter, value: object) -> str:
     """Write a value as a person types it: text as it is, everything else as in the file."""
     if isinstance(value, str) and param.kind in ("text", "choice"):
         return value
@@ -67,7 +67,7 @@ def written(param: ParamInfo, value: object) -> str:
     return json.dumps(value)
 
 
-def read(param: ParamInfo, text: str) -> object:
+def read(param: Parameter, text: str) -> object:
     """Read what a person typed.
 
     Raises:
@@ -102,7 +102,7 @@ class ParamControl:
     def __init__(
         self,
         place: Container,
-        param: ParamInfo,
+        param: Parameter,
         value: object,
         unsaved: bool,
         put: Put,

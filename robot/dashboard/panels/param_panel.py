@@ -14,7 +14,7 @@ from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import Widgets
-from gazerig.robot.remote.param_info import ParamInfo
+from gazerig.robot.model.parameter import Parameter
 
 MOST_SHOWN = 30
 SAVE, REVERT = "save", "revert to the file"
@@ -31,7 +31,7 @@ class ParamState:
 
     def __init__(self, widgets: Widgets, place: Container, outbox: Outbox) -> None:
         self._widgets, self._place, self._outbox = widgets, place, outbox
-        self._params: dict[str, ParamInfo] = {}
+        self._params: dict[str, Parameter] = {}
         self._panels: dict[str, ParamPanel] = {}
         # What people do, and that they come and go, is told in a thread of its own.
         self._lock = threading.RLock()
@@ -65,7 +65,7 @@ class ParamState:
         """Add parameters that can be tuned."""
         with self._lock:
             for data in params:
-                param = ParamInfo.from_json(data)
+                param = Parameter.from_json(data)
                 self._params[param.key] = param
             for panel in self._panels.values():
                 panel.offer(self._params)
@@ -111,7 +111,7 @@ class ParamPanel:
         self._outbox = outbox
         self._lock = lock
         self._who = f"{client}{_OF_TUNING}"
-        self._params: Mapping[str, ParamInfo] = {}
+        self._params: Mapping[str, Parameter] = {}
         self._values: Mapping[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._controls: dict[str, ParamControl] = {}
@@ -142,7 +142,7 @@ class ParamPanel:
         self._find.value = ""
         self._show_chosen()
 
-    def offer(self, params: Mapping[str, ParamInfo]) -> None:
+    def offer(self, params: Mapping[str, Parameter]) -> None:
         """Set the parameters that there are."""
         self._params = params
         groups = tuple(dict.fromkeys(group_of(param) for param in params.values()))
@@ -232,12 +232,12 @@ class ParamPanel:
                 return [param.key for param in known if group_of(param) == group]
 
 
-def group_of(param: ParamInfo) -> str:
+def group_of(param: Parameter) -> str:
     """Return the group a parameter is listed in: as in the file, two names deep."""
     return ".".join(param.group.split(".")[:2]) if param.group else "rig"
 
 
-def found(text: str, params: Iterable[ParamInfo]) -> list[str]:
+def found(text: str, params: Iterable[Parameter]) -> list[str]:
     """Return the keys in which, with what they mean, every word of a text occurs."""
     words = text.lower().split()
     return [

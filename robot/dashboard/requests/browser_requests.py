@@ -27,8 +27,6 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
         return None
     if not isinstance(asked, dict):
         return None
-    if "order" in asked and "do" not in asked:  # a page from before this version
-        asked["do"] = asked.pop("order")
     if (name := asked.get("do")) in _SAY_WHO:
         asked = {"do": name, **asked, "who": who}
     if isinstance(pick := asked.get("pick"), dict):
