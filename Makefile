@@ -14,7 +14,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # In a living room with physics, where its pictures can be rendered; else one line says what that needs.
 run: $(VENV)/.installed
-	$(BIN)/gazerig run --mock $$($(BIN)/python -m gazerig.features.world.run.first_world)
+	$(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
+	  then $(BIN)/python -m gazerig.features.world.run.first_world; \
+	  else echo "a visitor without a room: features/world is not there" >&2; fi)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --workers auto
@@ -68,7 +70,7 @@ docs: $(VENV)/.installed-docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 
 figures: $(VENV)/.installed-dev
-	$(BIN)/python docs/make_figures.py
+	for each in docs/make_figures.py $(wildcard docs/lab/make_figures.py); do $(BIN)/python $$each || exit 1; done
 
 clean:
 	rm -rf $(VENV) build dist site .links/*.egg-info

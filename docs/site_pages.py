@@ -2,8 +2,9 @@
 
 README, CHANGELOG and the pages about attacks and examples stay where readers of the repository
 look for them, and every package gets a page of its reference. Links between them are turned to
-where the pages are on the site; a link to any other file of the repository becomes the file's
-name. A link to nothing is left as it is, and the build fails on it.
+where the pages are on the site; a link to any other file of the repository, or to a page of a
+feature that was deleted, becomes its words. A link to nothing is left as it is, and the build
+fails on it.
 """
 
 import os
@@ -12,8 +13,10 @@ from pathlib import Path, PurePosixPath
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
-from mkdocs.structure.nav import Navigation
+from mkdocs.structure.nav import Navigation, Section
 from mkdocs.structure.pages import Page
+
+from gazerig.drivers.plugins import SHIPPED
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("robot", "features", "drivers", "gaze", "config", "sim_mock")
@@ -37,9 +40,9 @@ FIRST = (
         "hardware",
         "raspberry-pi",
     ),
-    *("tuning", "gestures", "worlds", "studies", "study-analysis", "plugins"),
+    *("bringup", "tuning", "lab", "gestures", "world", "study", "plugins"),
 )
-"""Pages at the head of the navigation, in this order; all others follow by name."""
+"""Pages and folders at the head of the navigation, in this order; all others follow by name."""
 
 _LINK = re.compile(r"(!?\[([^\]]*)\])\(([^)#\s]*)(#[^)\s]*)?\)")
 
@@ -61,7 +64,9 @@ def on_nav(nav: Navigation, config: MkDocsConfig, files: Files) -> Navigation:
 
 
 def _place(item: object) -> int:
-    name = PurePosixPath(item.file.src_uri).stem if isinstance(item, Page) else ""
+    name = item.title.lower() if isinstance(item, Section) else ""
+    if isinstance(item, Page):
+        name = PurePosixPath(item.file.src_uri).stem
     return FIRST.index(name) if name in FIRST else len(FIRST)
 
 
@@ -86,6 +91,14 @@ def _reference() -> dict[str, str]:
     return pages
 
 
+def _is_gone(path: str) -> bool:
+    """Return whether a file belongs to a feature that was deleted."""
+    shipped = (part for parts in SHIPPED.values() for part in parts.values())
+    features = {part.split(".")[2] for part in shipped if part.startswith("gazerig.features.")}
+    gone = (name for name in features if not (ROOT / "features" / name).exists())
+    return any(path.startswith((f"docs/{name}/", f"features/{name}/")) for name in gone)
+
+
 def _moved(text: str, source: str, page: str) -> str:
     """Return the text with each relative link as it is on the site."""
 
@@ -98,6 +111,6 @@ def _moved(text: str, source: str, page: str) -> str:
         if path in FROM_ELSEWHERE or (path != on_site and (ROOT / path).is_file()):
             start = str(PurePosixPath(page).parent)
             return f"{label}({os.path.relpath(on_site, start)}{anchor})"
-        return words if (ROOT / path).exists() else match[0]
+        return words if (ROOT / path).exists() or _is_gone(path) else match[0]
 
     return _LINK.sub(link, text)

@@ -1,7 +1,8 @@
 """The program without a feature: all other modules import, help lists the rest, same bus bytes.
 
 Run by hand: ``python tests/features_apart.py`` does so for each folder of features/;
-``--suite NAME`` deletes the folder with its tests in a clone, and runs all other tests there.
+``--suite NAME`` deletes the folder with its tests and pages in a clone, and runs all other tests
+there.
 """
 
 import argparse
@@ -15,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 FEATURES = tuple(sorted(path.parent.name for path in ROOT.glob("features/*/__init__.py")))
-NEEDS = {"study": ("lab", "world")}
+NEEDS = {"study": ("lab",)}
 """Feature -> the features that it imports."""
 
 _MAIN = "from gazerig.robot.cli.entry_point import main; main()"
@@ -83,13 +84,13 @@ def bus_digest(
 
 
 def suite(feature: str) -> int:
-    """Delete a feature with its tests in a clone, run the other tests, and return the exit code."""
+    """Delete a feature, its tests and pages in a clone; return the exit code of the other tests."""
     with tempfile.TemporaryDirectory() as temporary:
         clone = Path(temporary) / "clone"
         subprocess.run(["git", "clone", "-q", str(ROOT), str(clone)], check=True)
         for name in removed_with(feature):
-            shutil.rmtree(clone / "features" / name)
-            shutil.rmtree(clone / "tests" / name)
+            for folder in ("features", "tests", "docs"):
+                shutil.rmtree(clone / folder / name)
         return subprocess.run(
             [sys.executable, "-m", "pytest", "--workers", "auto"],
             cwd=clone,

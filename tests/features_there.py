@@ -9,6 +9,12 @@ import pytest
 
 from gazerig.drivers.plugins import COMMAND, SHIPPED
 
+_PARTS = [part for parts in SHIPPED.values() for part in parts.values()]
+SHIPPED_FEATURES = sorted(
+    {part.split(".")[2] for part in _PARTS if part.startswith("gazerig.features.")}
+)
+"""The features that the package ships, those included that were deleted."""
+
 
 @cache
 def is_there(part: str) -> bool:
@@ -31,12 +37,10 @@ def skip_without(command: str) -> None:
 
 def need_every_feature() -> None:
     """Skip a test of the whole program where a feature was deleted."""
-    for parts in SHIPPED.values():
-        for part in parts.values():
-            skip_without_part(part)
+    for part in _PARTS:
+        skip_without_part(part)
 
 
 needs_all_features: Callable[[Any], Any] = pytest.mark.skipif(
-    not all(is_there(part) for parts in SHIPPED.values() for part in parts.values()),
-    reason="a feature is not there",
+    not all(map(is_there, _PARTS)), reason="a feature is not there"
 )

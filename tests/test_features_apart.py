@@ -1,9 +1,11 @@
 """Each feature can be removed: the rest runs as before, and its command names what is missing."""
 
+import os
+import subprocess
 from pathlib import Path
 
 import pytest
-from features_apart import FEATURES, bus_digest, gazerig, lay_out, removed_with
+from features_apart import FEATURES, ROOT, bus_digest, gazerig, lay_out, removed_with
 from mcap.reader import make_reader
 from outside_package import install
 
@@ -14,7 +16,7 @@ from gazerig.robot.recording.world_info import WorldInfo
 COMMANDS = {
     "study": ("study",),
     "lab": ("report", "compare", "sweep", "fit-scanpath", "study"),
-    "world": ("study",),
+    "world": (),
     "bringup": (
         *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
         "record-gesture",
@@ -44,7 +46,8 @@ def test_without_a_feature_the_rest_runs(feature: str, with_all: str, tmp_path: 
 def test_help_lists_only_the_commands_that_are_there(feature: str, tmp_path: Path) -> None:
     shown = gazerig(lay_out(tmp_path, removed_with(feature)), "--help").stdout
     listed = {line.split()[1] for line in shown.splitlines() if line.startswith("│ ")}
-    assert {"run", "replay", "export", "check"} <= listed
+    others = {one for name in FEATURES for one in COMMANDS[name]} - set(COMMANDS[feature])
+    assert {"run", "replay", "export", "check", *others} <= listed
     assert not listed & set(COMMANDS[feature])
 
 
@@ -121,3 +124,20 @@ def test_another_package_brings_surroundings(with_all: str, tmp_path: Path) -> N
 def test_every_feature_has_tests() -> None:
     for feature in FEATURES:
         assert list(Path(__file__).parent.glob(f"{feature}/test_*.py"))
+
+
+def test_make_run_has_a_scene_where_there_is_no_world(tmp_path: Path) -> None:
+    """In a folder without features, with a program that prints its arguments."""
+    (tmp_path / "pyproject.toml").touch()
+    program = tmp_path / ".venv" / "bin" / "gazerig"
+    program.parent.mkdir(parents=True)
+    program.write_text('#!/bin/sh\necho "$@"\n')
+    program.chmod(0o755)
+    (tmp_path / ".venv" / ".installed").touch()
+    done = subprocess.run(
+        ["make", "--silent", "-C", str(tmp_path), "-f", str(ROOT / "Makefile"), "run"],
+        capture_output=True, text=True, check=True,
+        env={key: value for key, value in os.environ.items() if not key.startswith("MAKE")},
+    )  # fmt: skip
+    assert done.stdout == "run --mock\n"
+    assert done.stderr == "a visitor without a room: features/world is not there\n"

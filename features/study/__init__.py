@@ -2,7 +2,7 @@
 
 Interface: the command ``study`` (commands.py); the schemas ``study`` and ``questionnaire``
 (``design.StudyDesign``, ``questionnaire.Questionnaire``); ``run.study_check.checked_study`` reads
-a study. It needs the features ``lab`` and ``world``.
+a study. It needs the feature ``lab``, and ``world`` to render films.
 
 In this folder: the design, the order of trials, records, decisions and their texts; statistics/:
 tests and effect sizes; run/: the head in a process of its own, films, measures of trials; pages/:

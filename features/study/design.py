@@ -15,7 +15,7 @@ Task = Literal["rating", "pairwise"]
 Test = Literal["signed_rank", "rank_sum", "sign", "chi_square", "friedman"]
 """Tests of one hypothesis (gazerig.features.study.statistics)."""
 DECIDING: tuple[Test, ...] = ("signed_rank", "rank_sum", "sign")
-"""Tests with a measured rate of false positives (docs/study-analysis.md); others explore."""
+"""Tests with a measured rate of false positives (docs/study/study-analysis.md); others explore."""
 
 
 # fmt: off

@@ -6,6 +6,7 @@ from textwrap import dedent, indent
 
 import pytest
 from command_line import typed
+from outside_package import install, on_path
 from recorded_run import record
 
 from gazerig.config.faults import ConfigError
@@ -186,7 +187,7 @@ def test_faults_of_conditions_name_line_key_and_cure(
     ("more", "wanted"),
     [
         ("presentation: {scene: visitors}", "8: presentation.scene: no scene 'visitors'; did you"),
-        ("presentation: {world: boxin}", "8: presentation.world: no world 'boxin'; did you mean"),
+        ("presentation: {world: boxin}", "8: presentation.world: no world 'boxin'"),
         ("presentation: {rig: dusk}", "8: presentation.rig: nothing named 'dusk' is shipped; did"),
         (
             "presentation: {scene: visitor, world: boxing}",
@@ -219,6 +220,15 @@ def test_faults_of_conditions_name_line_key_and_cure(
 def test_faults_of_a_design_name_line_key_and_cure(tmp_path: Path, more: str, wanted: str) -> None:
     said = faults(tmp_path, f"{HEAD}{TWO}{more}\n")
     assert any(one.startswith(wanted) for one in said), said
+
+
+def test_a_world_is_any_surroundings_that_there_are(tmp_path: Path) -> None:
+    install(tmp_path, "hall", {"gazerig.surroundings": {"hall": "hall:Hall"}}, {})
+    (tmp_path / "s.yaml").write_text(f"{HEAD}{TWO}presentation: {{world: hall}}\n")
+    with on_path(tmp_path):
+        assert checked_study(str(tmp_path / "s.yaml")).design.presentation.world == "hall"
+        said = faults(tmp_path, f"{HEAD}{TWO}presentation: {{world: hal}}\n")
+    assert any("no world 'hal'; did you mean 'hall'?" in one for one in said), said
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from command_line import invoked
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.run.first_world import what_it_needs
 from gazerig.features.world.run.head_group import Following, compose_group, has_other_heads
+from gazerig.features.world.run.kept_time import fell_behind
 from gazerig.features.world.run.lockstep import Lockstep
-from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.interrupts import Interrupts

@@ -134,6 +134,6 @@ def test_every_shipped_world_can_be_read() -> None:
 
 
 def test_the_paper_has_every_parameter_of_the_camera() -> None:
-    paper = (Path(__file__).parents[2] / "docs/worlds.md").read_text(encoding="utf-8")
+    paper = (Path(__file__).parents[2] / "docs/world/worlds.md").read_text(encoding="utf-8")
     for field in fields(WorldCameraParams):
         assert f"| `{field.name}` |" in paper

@@ -13,7 +13,7 @@ from gazerig.features.world.room import ROOMS
 from gazerig.features.world.script import Act, Do, PersonScript, PlaceScript, WorldScript
 from gazerig.features.world.timeline import LASTS_S
 
-PAGE = (Path(__file__).parents[2] / "docs" / "world-scripts.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs" / "world" / "world-scripts.md").read_text()
 
 HEAD = "room: living-room\nround_s: 20.0\npeople:\n  anna:\n    start: {start}\n    acts:\n"
 

@@ -53,12 +53,14 @@ class HeadPictures:
         p_viewer_m: from where it is seen, world frame of the rig.
 
     Raises:
-        SetupError: MuJoCo is not installed, or nothing here can render.
+        SetupError: the feature world or MuJoCo is not there, or nothing here can render.
     """
 
     def __init__(self, rig: Rig, p_viewer_m: Vec3) -> None:
-        from gazerig.features.world.gl_context import import_mujoco
-
+        try:
+            from gazerig.features.world.gl_context import import_mujoco
+        except ModuleNotFoundError as error:
+            raise SetupError(f"films are rendered by the feature world: {error}") from error
         mujoco: Any = import_mujoco()
         from gazerig.features.world.renderer import Renderer, RendererParams
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from os.path import isfile
 
 from gazerig.config.export import suggestion
-from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.film_writer import film_seconds
@@ -12,8 +12,8 @@ from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.rules import objective_rules
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.study_run import WHOLE_SHARE
-from gazerig.features.world.shipped import HOME
 from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.app.surroundings import surroundings_names
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.sim_mock.scenes.registry import scenes
 
@@ -39,10 +39,11 @@ def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
     if scene is not None and scene not in known:
         near = suggestion(scene, known) or ";"
         yield "presentation.scene", f"no scene {scene!r}{near} there is {', '.join(sorted(known))}"
-    worlds = shipped_names("worlds", HOME)
+    worlds = surroundings_names()
     if world is not None and "/" not in world and "." not in world and world not in worlds:
         near = suggestion(world, worlds) or ";"
-        yield "presentation.world", f"no world {world!r}{near} there is {', '.join(worlds)}"
+        there = ", ".join(worlds) or "none"
+        yield "presentation.world", f"no world {world!r}{near} there is {there}"
 
 
 def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.features.world.heads_scene import HeadsScene, RigFrame
+from gazerig.features.world.run.kept_time import fell_behind
 from gazerig.features.world.run.run_world import world_of, world_scene
 from gazerig.features.world.run.shared_world import (
     FaceNow,
@@ -18,7 +19,6 @@ from gazerig.features.world.run.shared_world import (
     SharedWorld,
     SimulatedWorld,
 )
-from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig

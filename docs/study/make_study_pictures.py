@@ -1,11 +1,11 @@
-"""Photograph the pages of a study: python docs/make_study_pictures.py (9 s, with Chromium)."""
+"""Photograph a study's pages: python docs/study/make_study_pictures.py (9 s, with Chromium)."""
 
 import sys
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-TESTS = Path(__file__).parents[1] / "tests"
+TESTS = Path(__file__).parents[2] / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "study")]
 
 from browser import browsing  # noqa: E402
@@ -17,7 +17,7 @@ from study_at_the_page import CODE, Pages, Tab, serving  # noqa: E402
 from gazerig.features.study.pages.head_link import HeadReport, NoHead  # noqa: E402
 from gazerig.features.study.run.study_file import load_study  # noqa: E402
 
-OUT = Path(__file__).parent / "figures"
+OUT = Path(__file__).parent
 DESK, PHONE = (1000, 560), (390, 560)
 GAP_PX = 20
 

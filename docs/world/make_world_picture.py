@@ -1,10 +1,11 @@
-"""Draw docs/world-people.webp, a moment of four worlds: python docs/make_world_picture.py."""
+"""Draw world-people.webp, a moment of four worlds: python docs/world/make_world_picture.py."""
 
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "world"))
 
 import cv2
 import numpy as np
