@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import GAZE_JOINTS
 from mcap.reader import make_reader
 from recorded_rigs import Run, recorded
 from recorded_run import handed_over
@@ -27,10 +26,7 @@ from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
-from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.run_format import HEALTH, PERCEPT, TICK, Message
-from gazerig.robot.recording.run_info import RunEnd, as_text
-from gazerig.robot.recording.run_writer import RunWriter
+from gazerig.robot.recording.run_format import HEALTH
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
 from gazerig.robot.recording.tick_record import as_json, from_json
 from gazerig.robot.remote.request_handler import Pulse
@@ -38,11 +34,6 @@ from gazerig.robot.remote.request_handler import Pulse
 pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 
 STARTED = "2026-01-31T12:00:00+00:00"
-NO_MORE = {
-    "joints": ("measured",), "pose": ("lower_left", "lower_right"),
-    "gaze": ("lower_left", "lower_right"), "verdict": ("joints",),
-}  # fmt: skip
-"""Fields of a tick that recordings once did not have."""
 
 
 @pytest.fixture(scope="module")
@@ -83,43 +74,6 @@ def test_viewers_are_given_the_joints_that_are_there(maker: Run) -> None:
     assert {tuple(j["name"] for j in data["joints"]) for data in shown} == {SIX}
     health = [data for _, data in messages(path, HEALTH)]
     assert {tuple(data["temperature_c"]) for data in health} == {(None,) * 6}
-
-
-def aged(run: Run, path: Path) -> RunRecording:
-    """Write a recording as it was before ticks named their joints."""
-    info = run.recording.info
-    fd = path.open("wb")
-    writer = RunWriter(fd.fileno(), as_text(info), 0)
-    for topic, data in messages(run.recording.path, TICK, PERCEPT):
-        if topic == TICK:
-            readings = [data["joints"]]
-            readings += [b["joints"] for b in data.get("before", ()) if b["what"] == "measured"]
-            for reading in readings:
-                reading.pop("measured")
-            for part, names in NO_MORE.items():
-                for name in names:
-                    data[part].pop(name, None)
-        writer.add(Message(topic, 0.0, data))
-    end = run.recording.end
-    writer.close(RunEnd(end.stopped_by, end.lost, end.ran_s, end.tx_sha256))
-    return RunRecording(path)
-
-
-def test_a_recording_without_names_is_of_the_joints_that_all_rigs_had(
-    desk: Run, tmp_path: Path
-) -> None:
-    old = aged(desk, tmp_path / "old.mcap")
-    ticks = list(old.ticks())
-    assert len(ticks) == len(desk.ticks)
-    for tick, was in zip(ticks, desk.ticks, strict=True):
-        assert tick.guard_result.joints == GAZE_JOINTS and tick.joints.measured == ()
-        assert tick.pose.lower_left == tick.gaze.lower_right == 1.0
-        assert (
-            tick.guard_result == was.guard_result
-            and tick.joints.position_rad == was.joints.position_rad
-        )
-    again = rerun(old)
-    assert again.same and again.tx_same, again.differs
 
 
 def test_words_for_numbers_come_back_for_any_number_of_joints(maker: Run) -> None:

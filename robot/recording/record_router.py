@@ -51,7 +51,7 @@ class RecordRouter:
         self._add(fmt.TICK, data)
         for event in data["events"]:
             self._add(fmt.LOG, viewers.line(event, self._now_ns))
-        for order in data["orders"]:
+        for order in data["commands"]:
             self._add(fmt.ORDER, order)
         self._newest = row
         if self._at_s - self._viewed_s >= _VIEWED_EVERY_S or self._viewed_s < 0.0:

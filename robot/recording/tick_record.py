@@ -22,6 +22,7 @@ from gazerig.gaze.types import (
     Target,
 )
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_stream import TickRow
 from gazerig.robot.model.command_json import from_recording as command_from_json
 from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
@@ -70,91 +71,70 @@ _BODY_RECORDS: dict[str, type[BodyRecord]] = {
     "refused": TorqueRefused,
 }
 _BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
-_NO_LEAD, _NO_GESTURE = list(NOBODY_LEADS), list(NO_GESTURE)
+_NESTED: dict[str, Any] = {
+    "joints": JointState, "pose": GazeState, "target": Target, "gaze": GazeCommand,
+    "guard_result": GuardResult, "lead": LeadState, "gesture": GestureState,
+}  # fmt: skip
+_NOTHING = {"lead": list(NOBODY_LEADS), "gesture": list(NO_GESTURE)}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
 
 
 def as_json(row: Sequence[Any], finite: bool = False) -> Json:
-    """Name the fields of a tick as ``tick_stream.decode_plain`` gives them.
+    """Name the fields of a tick as ``tick_stream.decode_plain`` returns them.
 
-    finite: it is known that all numbers in it are
+    A field that holds nothing new is left out: ``guard_result.desired_rad`` if it equals the
+    tick's (null), ``lead`` and ``gesture`` before the first, ``target.plan`` without a planner.
+
+    Args:
+        row: the fields of a ``TickRow``.
+        finite: all numbers in it are known to be finite.
     """
     finite = finite or _finite(row)
-    if not finite:
-        row = _worded(row)
-    (t_s, dt_s, percept, joints, pose, target, gaze, desired, guard_result, as_desired, events,
-     commands, stopped, led, lead, gesture, _, before) = row  # fmt: skip
-    guard = _named(GuardResult, guard_result)
-    if as_desired:  # nearly always: written once
-        guard["desired_rad"] = None
-    data: Json = {
-        "t_s": t_s,
-        "dt_s": dt_s,
-        "joints": _named(JointState, joints),
-        "pose": _named(GazeState, pose),
-        "percept": percept,
-        "target": {
-            **_named(Target, target),
-            "saliences": [_named(Salience, salience) for salience in target[-1]],
-        },
-        "gaze": {
-            **_named(GazeCommand, gaze),
-            "limited": [_named(Limited, one) for one in gaze[-1]],
-        },
-        "wish_rad": desired,
-        "verdict": _as_filed(guard),
-        "events": events,
-        "orders": commands,
-        "stopped": stopped,
-        "led": led,
-    }
-    if not data["target"]["plan"]:
-        del data["target"]["plan"]
-    if lead != _NO_LEAD:
-        data["lead"] = _named(LeadState, lead)
-    if gesture != _NO_GESTURE:
-        data["gesture"] = _named(GestureState, gesture)
+    data: Json = dict(zip(TickRow._fields, row if finite else _worded(row), strict=True))
+    for name, kind in _NESTED.items():
+        data[name] = _named(kind, data[name])
+    target, gaze = data["target"], data["gaze"]
+    target["saliences"] = [_named(Salience, one) for one in target["saliences"]]
+    gaze["limited"] = [_named(Limited, one) for one in gaze["limited"]]
+    if data.pop("as_desired"):  # nearly always: written once
+        data["guard_result"]["desired_rad"] = None
+    if not target["plan"]:
+        del target["plan"]
+    for name, nothing in _NOTHING.items():
+        if list(data[name].values()) == nothing:
+            del data[name]
+    del data["parking"]
+    before = [{"what": what, **_named(_BODY_RECORDS[what], one)} for what, one in data["before"]]
     if before:
-        data["before"] = [
-            {"what": what, **_named(_BODY_RECORDS[what], one)} for what, one in before
-        ]
+        data["before"] = before
+    else:
+        del data["before"]
     if not finite:
         data[_ODD] = True
     return data
 
 
-_FILED = {"desired_rad": "wish_rad", "critical_reasons": "gravest"}
-"""Fields that recordings know by an older name: what was recorded before stays readable."""
-
-
-def _as_filed(fields: Json) -> Json:
-    return {_FILED.get(name, name): value for name, value in fields.items()}
-
-
-def _from_file(data: Json) -> Json:
-    now = {filed: name for name, filed in _FILED.items()}
-    return {now.get(name, name): value for name, value in data.items()}
-
-
 def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
-    """Return the moment that ``as_json`` named.
+    """Return the tick that ``as_json`` named.
 
-    percepts: those read so far, by number
+    Args:
+        data: what ``as_json`` returned.
+        percepts: those read so far, by number.
 
     Raises:
         KeyError, TypeError, ValueError: the data is none.
     """
     if data.get(_ODD):
         data = _unworded(data)
-    number = data["percept"]
-    desired = tuple(data["wish_rad"])
-    guard_result = _from_file(data["verdict"])
+    number, guard_result = data["percept"], data["guard_result"]
     if guard_result["desired_rad"] is None:
-        guard_result["desired_rad"] = desired
-    target = dict(data["target"])
-    target["saliences"] = tuple([Salience(**one) for one in target["saliences"]])
+        guard_result = {**guard_result, "desired_rad": data["desired_rad"]}
+    target = {
+        **data["target"], "saliences": tuple([Salience(**s) for s in data["target"]["saliences"]])
+    }  # fmt: skip
+    gaze = {**data["gaze"], "limited": tuple([Limited(**one) for one in data["gaze"]["limited"]])}
     tick = Tick(
         data["t_s"],
         _made(JointState, data["joints"]),
@@ -162,13 +142,13 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         None,
         percepts[number] if number is not None else None,
         _made(Target, target),
-        _made(GazeCommand, {**data["gaze"], "limited": _limited(data["gaze"])}),
-        desired,
+        _made(GazeCommand, gaze),
+        tuple(data["desired_rad"]),
         _made(GuardResult, guard_result),
         tuple(data["events"]),
-        tuple([command_from_json(command) for command in data["orders"]]),
+        tuple([command_from_json(command) for command in data["commands"]]),
         data["stopped"],
-        data.get("led", ""),
+        data["led"],
         _made(LeadState, data["lead"]) if "lead" in data else NOBODY_LEADS,
         _made(GestureState, data["gesture"]) if "gesture" in data else NO_GESTURE,
     )
@@ -239,11 +219,6 @@ def _made(kind: Any, data: Json) -> Any:
     """Return a named tuple made of JSON; fields unknown to this version are left out."""
     known = kind._fields
     return kind(**{k: _tupled(v) if type(v) is list else v for k, v in data.items() if k in known})
-
-
-def _limited(gaze: Json) -> list[Limited]:
-    """Read what kept the eyes from their point; recordings of before do not tell."""
-    return [Limited(**one) for one in gaze.get("limited", ())]
 
 
 def _tupled(value: Any) -> Any:
