@@ -1,8 +1,7 @@
 """Least squares of hand-eye calibration: camera on the head and board in the world. Pure.
 
-Two rotations and two places are moved by Levenberg-Marquardt steps until
-the corners are reprojected best. Corners far off count less (Huber). Joints are never
-quite where they say (steps of 0.088 deg, play of the gears), and a head that is 0.1 deg
+Two rotations and two places are moved until the corners are reprojected best. Corners far off
+count less (Huber). Joints are never quite where they say (steps of 0.088 deg, play of the gears), and a head that is 0.1 deg
 off shifts a board 0.7 m away by more than all errors of its corners; so each view has a
 small turn of the head as well, held near zero by how far joints are usually off. Nor is
 the lens known exactly: 1 % of its focal length is 7 mm of the camera's place, but a head
@@ -11,7 +10,7 @@ far as a calibration is usually off. How sure the result is comes from leaving o
 at a time (jackknife), and from how the place follows the lens.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,6 +28,8 @@ Floats = NDArray[np.float64]
 # Steps for slopes by differences: radians, metres.
 _SMALL = 1e-6
 _MOST_STEPS = 60
+# The bound of Huber follows the errors of the round before.
+_ROUNDS = 4
 # A last step of 1 um, or 0.00006 deg.
 _SETTLED = 1e-6
 # Numbers that all views share: camera, board, and focal length and centre of the lens.
@@ -148,40 +149,26 @@ class Sights(NamedTuple):
             columns.append((more - less) / (2.0 * _SMALL))
         return np.stack(columns[:_SHARED], axis=1), np.stack(columns[_SHARED:], axis=1)
 
-    def system(self, guess: Guess, errors: Floats) -> tuple[Floats, Floats]:
-        """Return the normal equations (m, m) and (m,) of all m = 15 + 3 views numbers."""
+    def residuals(self, guess: Guess) -> Floats:
+        """Return the errors over a corner's usual one, then lens and turns over theirs."""
+        usual = np.concatenate(
+            (self.lens_error, np.full(guess.turns_rad.size, self.joint_error_rad))
+        )
+        off = np.concatenate((guess.lens_off, guess.turns_rad.ravel())) / usual
+        return np.concatenate((self.errors(guess) / _CORNER_PX, off))
+
+    def jacobian(self, guess: Guess) -> Floats:
+        """Return the slopes of ``residuals``: (2 n + 3 + 3 views, 15 + 3 views)."""
         shared, own = self.slopes(guess)
-        weight = _weights(errors)[:, None]
-        inner = np.zeros((_SHARED + 3 * self.views,) * 2)
-        inner[:_SHARED, :_SHARED] = shared.T @ (shared * weight)
-        pull = np.concatenate((shared.T @ (errors * weight[:, 0]), np.zeros(3 * self.views)))
-        of_row = np.repeat(self.view, 2)
-        for k in range(self.views):
-            mine, at = of_row == k, slice(_SHARED + 3 * k, _SHARED + 3 * k + 3)
-            heavy = own[mine] * weight[mine]
-            inner[:_SHARED, at] = shared[mine].T @ heavy
-            inner[at, :_SHARED] = inner[:_SHARED, at].T
-            inner[at, at] = own[mine].T @ heavy
-            pull[at] = errors[mine] @ heavy
-        held = np.arange(12, len(pull))
-        trust = 1.0 / self._usual(guess) ** 2
-        inner[held, held] += trust
-        pull[held] += np.concatenate((guess.lens_off, guess.turns_rad.ravel())) * trust
-        return inner, pull
-
-    def cost(self, guess: Guess, errors: Floats, bound: float) -> float:
-        """Return Huber's cost of the errors and that of the turns."""
-        if not np.isfinite(errors).all():
-            return float("inf")
-        size = np.abs(errors)
-        costs = np.where(size <= bound, 0.5 * size * size, bound * (size - 0.5 * bound))
-        off = np.concatenate((guess.lens_off, guess.turns_rad.ravel())) / self._usual(guess)
-        return float(costs.sum()) / _CORNER_PX**2 + 0.5 * float((off * off).sum())
-
-    def _usual(self, guess: Guess) -> Floats:
-        """Return how far lens and joints are usually off: (3 + 3 views,)."""
-        turns = np.full(guess.turns_rad.size, self.joint_error_rad)
-        return np.concatenate((self.lens_error, turns))
+        rows, columns = len(shared), _SHARED + 3 * self.views
+        slopes = np.zeros((rows + columns - 12, columns))
+        slopes[:rows, :_SHARED] = shared / _CORNER_PX
+        at = _SHARED + 3 * np.repeat(self.view, 2)
+        for k in range(3):
+            slopes[np.arange(rows), at + k] = own[:, k] / _CORNER_PX
+        usual = np.concatenate((self.lens_error, np.full(columns - _SHARED, self.joint_error_rad)))
+        slopes[rows:, 12:] = np.diag(1.0 / usual)
+        return slopes
 
 
 @dataclass(frozen=True)
@@ -238,50 +225,59 @@ def start(sights: Sights, camera: Pose, board: Pose) -> Guess:
 
 def refined(sights: Sights, guess: Guess) -> Fit:
     """Move camera and board until the corners fit best."""
-    errors, damping, system = sights.errors(guess), 1e-3, None
-    for _ in range(_MOST_STEPS):
+    from scipy.optimize import least_squares  # takes a moment to load
+
+    cost = float("inf")
+    for _ in range(_ROUNDS):
+        errors = sights.errors(guess)
         if not np.isfinite(errors).all():
             break
-        bound = _bound(errors)
-        system = system or sights.system(guess, errors)
-        step = _solved(*system, damping)
-        if step is None or damping > 1e9:
+        first, huber = guess, _huber(_bound(errors) / _CORNER_PX, len(errors))
+        found = least_squares(
+            lambda step, first=first: sights.residuals(first.moved(step)),
+            np.zeros(_SHARED + 3 * sights.views),
+            lambda step, first=first: sights.jacobian(first.moved(step)),
+            x_scale="jac",
+            loss=huber,
+            max_nfev=_MOST_STEPS,
+        )
+        guess, cost = guess.moved(found.x), float(found.cost)
+        if float(np.abs(found.x[:12]).max()) < _SETTLED:
             break
-        moved = guess.moved(step)
-        found = sights.errors(moved)
-        if not sights.cost(moved, found, bound) < sights.cost(guess, errors, bound):
-            damping *= 10.0
-            continue
-        guess, errors, damping, system = moved, found, max(damping / 10.0, 1e-12), None
-        if float(np.abs(step[:12]).max()) < _SETTLED:
-            break
-    return _ended(sights, guess, errors)
+    return _ended(sights, guess, cost)
 
 
-def _ended(sights: Sights, guess: Guess, errors: Floats) -> Fit:
+def _huber(bound: float, corners: int) -> Callable[[Floats], Floats]:
+    """Return Huber's loss of the first residuals, those of corners, and squares of the others.
+
+    It has the form that scipy.optimize.least_squares takes: of squares, with two derivatives.
+    """
+
+    def loss(squares: Floats) -> Floats:
+        rho = np.stack((squares, np.ones_like(squares), np.zeros_like(squares)))
+        far = np.flatnonzero(squares[:corners] > bound * bound)
+        size = np.sqrt(squares[far])
+        rho[:, far] = 2.0 * bound * size - bound**2, bound / size, -0.5 * bound / size**3
+        return rho
+
+    return loss
+
+
+def _ended(sights: Sights, guess: Guess, cost: float) -> Fit:
     """Sum up how well it fits."""
+    errors = sights.errors(guess)
     plain = sights.errors(guess._replace(turns_rad=np.zeros_like(guess.turns_rad)))
     squares = (plain * plain).reshape(-1, 2).sum(axis=1)
     by_view = [np.sqrt(squares[sights.view == k].mean()) for k in range(sights.views)]
-    bound = _bound(errors) if np.isfinite(errors).all() else 1.0
     return Fit(
         sights,
         guess,
-        sights.cost(guess, errors, bound),
+        cost,
         float(np.sqrt(squares.mean())),
         np.array(by_view),
         float(np.sqrt((errors * errors).reshape(-1, 2).sum(axis=1).mean())),
         float(np.degrees(np.sqrt((guess.turns_rad**2).mean()))),
     )
-
-
-def _solved(inner: Floats, pull: Floats, damping: float) -> Floats | None:
-    """Return the damped step, None where there is none."""
-    try:
-        step = np.linalg.solve(inner + damping * np.diag(np.diag(inner)), -pull)
-    except np.linalg.LinAlgError:
-        return None
-    return np.asarray(step, dtype=np.float64) if np.isfinite(step).all() else None
 
 
 def _bound(errors: Floats) -> float:
