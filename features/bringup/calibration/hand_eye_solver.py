@@ -1,13 +1,13 @@
 """Least squares of hand-eye calibration: camera on the head and board in the world. Pure.
 
 Two rotations and two places are moved until the corners are reprojected best. Corners far off
-count less (Huber). Joints are never quite where they say (steps of 0.088 deg, play of the gears), and a head that is 0.1 deg
-off shifts a board 0.7 m away by more than all errors of its corners; so each view has a
-small turn of the head as well, held near zero by how far joints are usually off. Nor is
-the lens known exactly: 1 % of its focal length is 7 mm of the camera's place, but a head
-that turns by known angles measures the lens too, so focal length and centre may move as
-far as a calibration is usually off. How sure the result is comes from leaving out one view
-at a time (jackknife), and from how the place follows the lens.
+count less (Huber). Joints are never quite where they say (steps of 0.088 deg, play of the gears),
+and a head that is 0.1 deg off shifts a board 0.7 m away by more than all errors of its corners; so
+each view has a small turn of the head as well, held near zero by how far joints are usually off.
+Nor is the lens known exactly: 1 % of its focal length is 7 mm of the camera's place, but a head
+that turns by known angles measures the lens too, so focal length and centre may move as far as a
+calibration is usually off. How sure the result is comes from leaving out one view at a time
+(jackknife), and from how the place follows the lens.
 """
 
 from collections.abc import Callable, Sequence
