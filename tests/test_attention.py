@@ -144,6 +144,17 @@ def test_a_lost_target_is_waited_for_and_then_left() -> None:
     assert (left.kind, left.id) == ("rest", -1)
 
 
+def test_a_target_that_has_left_the_picture_is_waited_for_where_it_was_in_it() -> None:
+    model = attention()
+    moving = percept(0.0, body(2, "hand", (1.0, 0.3, 0.0), (0.0, 2.0, 0.0)))
+    seen = model.choose(moving, looking(), 0.0)
+    waited = model.choose(percept(0.1), looking(), 0.1)
+    assert (waited.id, waited.p_world_m, waited.why) == (2, seen.p_world_m, "lost, waiting")
+    assert model.choose(moving, looking(), 0.2).id == 2
+    blind = model.choose(None, looking(), 1.0)
+    assert blind.p_world_m == pytest.approx((1.0, 0.7, 0.0)) and blind.why == "lost, waiting"
+
+
 def test_stale_pictures_tell_nothing() -> None:
     model = attention(stale_ms=400.0)
     model.choose(percept(0.0, FACE), looking(), 0.0)

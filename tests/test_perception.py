@@ -288,10 +288,21 @@ def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered() -> None
         found = seen(perception, k, people=(body,) if inside else ())
         ids |= set(found.bodies.ids)
         places = found.bodies.p_world_m
-        outside += sum(abs(y / x) > 1.03 * WIDTH / 2.0 / LENS.fx_px for x, y, _ in places)
+        outside += sum(abs(y / x) > WIDTH / 2.0 / LENS.fx_px for x, y, _ in places)
         assert bool(len(places)) or not inside
     assert outside == 0 and len(ids) == 1
     assert set(seen(perception, 91, people=(body_at(1.3),)).bodies.ids) == ids
+
+
+def test_who_has_the_head_above_the_picture_is_where_the_body_is_seen() -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()))
+    body = body_at(0.4)
+    above = replace(body, head_px=(body.head_px[0], -60.0))
+    for k in range(1, 12):
+        found = seen(perception, k, people=(above,) if k < 6 else ())
+        ((x, y, z),) = found.bodies.p_world_m
+        (pixel,) = project([(-y, -z, x)], LENS)
+        assert pixel == pytest.approx((body.head_px[0], 0.02 * WIDTH), abs=0.5)
 
 
 def body_at(x: float) -> DetectedPerson:

@@ -135,7 +135,7 @@ class Attention:
             self._target = None
             self._reaction.drop()
         if self._target is None:
-            return self._settle(self._idle.step(t_s), t_s)
+            return self._settle(self._idle.step(t_s, not fresh), t_s)
         if self._target.id >= 0:
             self._idle.remember(self._target)
         self._target = self._settle(self._target, t_s)

@@ -49,7 +49,8 @@ class IdleParams:
     rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
     rest_salience: Annotated[float, Bounds(0, 10), "salience of the resting point"] = 0.2
     explores: Annotated[bool, "glance around while nothing is there; without it the gaze rests straight ahead"] = True
-    coast_ms: Annotated[float, Bounds(0, 2000), "longest time for which a lost target is assumed to move on with its last velocity"] = 200.0
+    coast_ms: Annotated[float, Bounds(0, 2000),
+        "longest time for which a target is assumed to move on with its last velocity when no pictures come"] = 200.0
     search_ms: Annotated[float, Bounds(0, 60000), "duration of the search for a lost target after that; 0: no search"] = 3000.0
     search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean duration of one fixation of the search"] = 600.0
     search_aside_deg: Annotated[float, Bounds(0, 90), "how far the search looks towards the side to which the target left"] = 18.0
@@ -145,17 +146,21 @@ class Idle:
         if len(self._seen) > _PLACES:
             del self._seen[next(iter(self._seen))]
 
-    def step(self, t_s: float) -> Target:
-        """Return where to look with nothing in sight: wait, search, rest, glance."""
+    def step(self, t_s: float, blind: bool = True) -> Target:
+        """Return where to look with nothing in sight: wait, search, rest, glance.
+
+        blind: no pictures come, and a lost target may have gone on; else it has left the picture
+            or has hidden, about where it was seen last
+        """
         self._t_s = t_s
         if not self._lost:
-            self._lose(t_s)
+            self._lose(t_s, blind)
         while t_s >= self._until_s:
             self._next(self._until_s)
         return self._now
 
-    def _lose(self, t_s: float) -> None:
-        """Start to wait for a lost target, at its extrapolated position."""
+    def _lose(self, t_s: float, blind: bool) -> None:
+        """Start to wait for a lost target, where it was seen last or has got to since."""
         self._lost = True
         gone, par = self._last, self._params
         self._gone, self._last = gone, None
@@ -163,7 +168,7 @@ class Idle:
         if gone is None or gone.id in self._in_view:  # what lies still in view is not lost
             self._rest_now(t_s)
             return
-        coast_s = min(max(0.0, t_s - gone.at_s), par.coast_ms / 1e3)
+        coast_s = min(max(0.0, t_s - gone.at_s), par.coast_ms / 1e3) if blind else 0.0
         there = add(gone.p_world_m, scale(gone.v_world_m_s, coast_s))
         self._now = gone._replace(
             p_world_m=there,

@@ -49,6 +49,8 @@ _TRUNK_M, _TRUNK_SPREAD, _HEAD_SD_M = 0.83, 0.15, 0.05
 # From the wrist of an adult to the root of the middle finger, how much people and postures differ
 # in it, and how well its middle is known; a hand.
 _PALM_M, _PALM_SPREAD, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.15, 0.03, 0.07
+# A head beyond the picture is taken to be this part of its width inside: what is seen of the body.
+_EDGE = 0.02
 # A face so near to the middle of a person's head, in trunks, is theirs.
 _OWN_FACE = 0.25
 # Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
@@ -185,14 +187,17 @@ class FrameLocator:
     def _person(
         self, person: DetectedPerson, found: Detections, lens: Intrinsics
     ) -> DetectionInCamera:
-        """Locate the head of a person whose face is not seen."""
-        z, sd = sqrt(lens.fx_px * lens.fy_px) * _TRUNK_M / person.trunk_px, _TRUNK_SPREAD
-        depth = self._depth_about(
-            found, person.head_px, person.trunk_px * _FACE_RADIUS_M / _TRUNK_M
+        """Locate the head of a person whose face is not seen, or what is seen nearest to it."""
+        (x, y), edge = person.head_px, _EDGE * found.width_px
+        at_px = (
+            min(max(x, edge), found.width_px - edge),
+            min(max(y, edge), found.height_px - edge),
         )
+        z, sd = sqrt(lens.fx_px * lens.fy_px) * _TRUNK_M / person.trunk_px, _TRUNK_SPREAD
+        depth = self._depth_about(found, at_px, person.trunk_px * _FACE_RADIUS_M / _TRUNK_M)
         if depth is not None:
             z, sd = depth[0] + _FACE_RADIUS_M, hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
-        p_m = _on_ray(person.head_px, z, lens)
+        p_m = _on_ray(at_px, z, lens)
         return DetectionInCamera(
             "face", p_m, None, _FACE_RADIUS_M, 0.0, person.confidence, 1.0, depth is not None,
             _HEAD_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None, clothing=person.clothing,

@@ -43,8 +43,6 @@ from gazerig.robot.perception.tracker import Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
-# Places are known to this part of a picture's width, beyond its edges too.
-_EDGE = 0.01
 # A camera that turned farther between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
 
@@ -278,9 +276,7 @@ def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) ->
     if not p_camera_m[2] > 0.0:
         return False
     x, y = project([p_camera_m], lens)[0].tolist()
-    width, height = size_px
-    edge = _EDGE * width
-    return bool(-edge < x < width + edge and -edge < y < height + edge)
+    return bool(0.0 <= x < size_px[0] and 0.0 <= y < size_px[1])
 
 
 def _at_head(thing: LocalisedDetection) -> LocalisedDetection:
