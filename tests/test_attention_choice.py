@@ -220,6 +220,27 @@ def test_a_lowered_hand_that_moves_counts_for_the_person() -> None:
     assert hand.translation > 1.0 and hand.total < 0.15
 
 
+@pytest.mark.parametrize(("from_s", "looked"), [(0.5, False), (2.8, True)])
+def test_a_sign_that_reaches_the_face_is_no_wave(from_s: float, looked: bool) -> None:
+    """The hand of one who has signed for long is not looked at, that of one who begins is."""
+
+    def signs(t: float) -> list[Row]:
+        up = 0.1 * sin(2 * pi * 1.5 * t) - 0.1 if t >= from_s else -0.1
+        raised = 0.25 * sin(pi * (t - 3.0) / 0.7) if 3.0 <= t < 3.7 else 0.0
+        return moved(boxer(t), 2, (0.0, 0.0, up + raised))
+
+    looks = lived(signs, 4.0)
+    assert any(look.kind == "hand" for t, look in looks if t >= 3.0) is looked
+
+
+def test_who_waves_after_signing_is_looked_at() -> None:
+    def waves(t: float) -> list[Row]:
+        low = 0.15 * sin(2 * pi * 1.5 * t)
+        return moved(boxer(t), 2, (0.0, low, -0.1 if t < 3.0 else 0.1))
+
+    assert first(lived(waves, 6.0), "hand", 3.0) <= 0.8
+
+
 def test_something_that_keeps_moving_behind_a_person_gets_a_glance() -> None:
     def moving(t: float) -> list[Row]:
         swing = 0.6 * sin(2 * pi * 0.5 * (t - 2.0)) if t >= 2.0 else 0.0

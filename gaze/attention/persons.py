@@ -9,7 +9,7 @@ the one with the face nearest to it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import dist, inf
+from math import dist, hypot, inf
 
 from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.types import Percept, Vec3
@@ -26,7 +26,9 @@ _HELD_OUT = 0.65
 """A hand nearer than this share of the face's distance is held out; signs and gestures are not."""
 _RAISED_M = 0.08
 """A hand is raised at the height of the face, at most so far below its centre; signs are lower."""
-_OWN = "own"
+_GESTURES_M_S, _GESTURES_S, _GESTURES = 0.25, 2.0, 0.5
+"""Somebody whose lower hands were faster than this for this share of about this time gestures."""
+_HAND, _OWN = "hand", "own"
 """The robot's own body waves to nobody."""
 _TOGETHER_S = 0.5
 """Who comes within this time of another has come together with them."""
@@ -49,7 +51,8 @@ class Persons:
     Attributes:
         parts: of what moves within a person's reach, the id of that person's face; without what is
             held out towards the head or raised to the face.
-        raised: ids of what moves within a person's reach at the height of the face.
+        raised: ids of what moves within a person's reach at the height of the face; without the
+            hands of somebody who gestures and does not wave: signs reach the face, too.
     """
 
     def __init__(self) -> None:
@@ -61,6 +64,7 @@ class Persons:
         self._seen_s: dict[int, float] = {}
         self._waved_s: dict[int, float] = {}
         self._hands: dict[int, _Hand] = {}
+        self._gestures: dict[int, float] = {}
         self.parts: dict[int, int] = {}
         self.raised: set[int] = set()
         self._looking: frozenset[int] = frozenset()
@@ -74,7 +78,7 @@ class Persons:
             percept: what it showed.
             p_world_eye_m: from where.
         """
-        bodies, self._at_s = percept.bodies, percept.captured_s
+        bodies, before_s, self._at_s = percept.bodies, self._at_s, percept.captured_s
         rows = bodies.p_world_m.tolist()
         faces = {
             id: (x, y, z)
@@ -87,12 +91,19 @@ class Persons:
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self._update_nearest(faces, p_world_eye_m)
         self.parts, self.raised = {}, set()
+        moving: set[int] = set()
         for row, id in enumerate(bodies.ids):
             if faces and id not in faces and bodies.kinds[row] != _OWN:
                 x, y, z = rows[row]
-                vx, vy, _ = bodies.v_world_m_s[row].tolist()
+                vx, vy, vz = bodies.v_world_m_s[row].tolist()
                 self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
-                self._update_part(id, (x, y, z), faces, p_world_eye_m)
+                low_of = self._update_part(id, (x, y, z), faces, p_world_eye_m)
+                if bodies.kinds[row] == _HAND and hypot(vx, vy, vz) > _GESTURES_M_S:
+                    moving.add(low_of)
+        share = min(1.0, (self._at_s - before_s) / _GESTURES_S)
+        for id in faces:
+            now = self._gestures.get(id, 0.0)
+            self._gestures[id] = now + share * ((id in moving) - now)
         self._drop_old()
 
     def named(self, trait: str) -> frozenset[int]:
@@ -137,10 +148,13 @@ class Persons:
             if _is_raised(place, faces[owner]) and dist(faces[owner], place) < _ARM_M:
                 self._waved_s[owner] = self._at_s
 
-    def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
+    def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> int:
         """Update whose body something is part of: who is nearest to its line of sight.
 
         The distance of what moves is often only assumed, so it is compared as far away as the face.
+
+        Returns:
+            The id of that person if it is lower than the face and not held out, else -1.
         """
         away, towards = dist(place, p_eye), sub(place, p_eye)
         beside = {
@@ -149,11 +163,15 @@ class Persons:
         }
         owner = min(beside, key=lambda face: beside[face])
         if beside[owner] >= _ARM_M:
-            return
-        if _is_raised(place, faces[owner]):
+            return -1
+        high = _is_raised(place, faces[owner])
+        gestures = self._gestures.get(owner, 0.0) > _GESTURES and owner not in self.named(WAVING)
+        if high and not gestures:
             self.raised.add(id)
         elif away > _HELD_OUT * dist(faces[owner], p_eye):
             self.parts[id] = owner
+            return -1 if high else owner
+        return -1
 
     def _turns(self, id: int, across_m_s: float) -> bool:
         """Return whether a hand has just changed sides in a wave."""
@@ -177,6 +195,7 @@ class Persons:
         for id in gone:
             del self._seen_s[id], self._came_s[id]
             self._waved_s.pop(id, None)
+            self._gestures.pop(id, None)
         if len(self._hands) > len(self._seen_s):
             self._hands = {
                 id: hand for id, hand in self._hands.items() if self._at_s - hand.seen_s < _WAVED_S
