@@ -1,4 +1,4 @@
-"""Errors of the drivers, by what the caller can do about them."""
+"""Errors of the drivers, grouped by what the caller can do about them."""
 
 from gazerig.errors import Error
 
@@ -8,7 +8,7 @@ class DriverError(Error):
 
 
 class SetupError(DriverError):
-    """Something must be changed by a person before a start can succeed."""
+    """A person must change something before a start can succeed."""
 
 
 class PortError(SetupError):
@@ -16,7 +16,7 @@ class PortError(SetupError):
 
 
 class ServoMissing(SetupError):
-    """Servos do not answer, or are not what the configuration says."""
+    """Servos do not answer or do not match the configuration."""
 
 
 class CameraError(SetupError):
@@ -24,16 +24,16 @@ class CameraError(SetupError):
 
 
 class ModelFileError(SetupError):
-    """A detector's model file is missing or not what it should be."""
+    """A detector's model file is missing or damaged."""
 
 
 class PluginError(SetupError):
-    """A part of a package cannot be used; the message names part, package and version."""
+    """A plug-in cannot be used; the message names the part, the package and its version."""
 
 
 class BusLost(DriverError):
-    """The port went away while in use: nothing may move until it is back and re-read."""
+    """The port was lost in use: nothing may move until it is reopened and the servos are read."""
 
 
 class ServoFault(DriverError):
-    """A servo has latched a hardware error: stop, park what still moves, report it."""
+    """A servo has latched a hardware error: stop, park the servos that still move, report it."""

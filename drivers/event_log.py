@@ -4,13 +4,13 @@ from collections import deque
 from math import inf
 
 MOST = 200
-"""Most lines kept until they are drained."""
+"""Largest number of lines kept; the oldest are dropped."""
 
 
 class EventLog:
     """Events as lines of text, drained by the status line, the page and the recorder.
 
-    lines: those since they were drained last
+    lines: lines added since the last drain
     """
 
     def __init__(self) -> None:
@@ -42,14 +42,14 @@ class RateLimitedLog:
         self._since: dict[str, int] = {}
 
     def add(self, text: str, now_s: float, kind: str = "") -> None:
-        """Add a line unless one of its kind is recent; the next one counts those left out."""
+        """Add a line unless one of its kind is recent; the next line counts the omitted ones."""
         if now_s - self._said_s.get(kind, -inf) < SELDOM_S:
             self._since[kind] = self._since.get(kind, 0) + 1
             return
         self._said_s[kind] = now_s
         often = self._since.pop(kind, 0)
         times = "once more" if often == 1 else f"{often} more times"
-        self._log.add(f"{text} ({times} since it was said last)" if often else text)
+        self._log.add(f"{text} ({times} since it was last reported)" if often else text)
 
 
 def register_label(register: str) -> str:

@@ -1,13 +1,13 @@
-"""Packages that are installed only when asked for, as extras of this one."""
+"""Optional packages, installed as extras of this one."""
 
 
 def extra_hint(package: str, extra: str, error: ImportError) -> str:
-    """Return one line that says why a package cannot be used, and the command that installs it.
+    """Return in one line why a package cannot be used, and the command that installs it.
 
     Args:
-        package: What could not be imported, e.g. "depthai".
-        extra: The extra of gazerig that brings it, e.g. "oak".
-        error: What its import raised.
+        package: Package that could not be imported, e.g. "depthai".
+        extra: Extra of gazerig that includes it, e.g. "oak".
+        error: Error that the import raised.
     """
     absent = isinstance(error, ModuleNotFoundError) and error.name == package.replace("-", "_")
     reason = "is not installed" if absent else f"cannot be loaded ({' '.join(str(error).split())})"

@@ -1,8 +1,8 @@
-"""Parts that packages bring: found by group and name, loaded when they are used.
+"""Plug-ins: parts of packages, found by group and name, and loaded when they are used.
 
-A package registers a part by an entry point; ours stand in ``SHIPPED`` in the same form and are
-found by the same code. Ours are found without a look at installed packages, which takes some
-milliseconds; nothing is imported before its name is used or listed with its abilities.
+A package registers a part by an entry point. Our own parts are listed in ``SHIPPED`` in the same
+form and are found by the same code, but without a search of the installed packages, which takes
+some milliseconds. Nothing is imported before its name is used or listed with its abilities.
 """
 
 import sys
@@ -37,7 +37,7 @@ GROUPS: Mapping[str, str] = {
     SURROUNDINGS: "surroundings",
     PAGE_PANEL: "page panel",
 }
-"""Group of entry points -> what people call a part of it."""
+"""Group of entry points -> its name in messages."""
 
 SHIPPED: Mapping[str, Mapping[str, str]] = {
     BUS: {
@@ -85,9 +85,9 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
-Gestures and rigs are folders of YAML files: a module of that folder, or its path. A command is
-a ``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a YAML file fills;
-surroundings are a subclass of ``gazerig.robot.app.surroundings.Surroundings``.
+Gestures and rigs are folders of YAML files: a module of that folder, or its path. A command is a
+``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a YAML file fills;
+surroundings a subclass of ``gazerig.robot.app.surroundings.Surroundings``.
 """
 
 OUR_PACKAGE = "gazerig"
@@ -100,13 +100,13 @@ class NoParams:
 
 @dataclass(frozen=True)
 class Evidence:
-    """How far a part is proven.
+    """Test status of a part.
 
     Attributes:
-        emulated: it was tested with an emulated device.
-        tested: with what else it was tested, e.g. "photographs".
-        judge: an independent client or program that agreed with the emulated device, "" for none.
-        hardware: on which real device it was run, "" where it was not.
+        emulated: Whether it was tested with an emulated device.
+        tested: Other material that it was tested with, e.g. "photographs".
+        judge: Independent client or program that agreed with the emulated device, "" for none.
+        hardware: Real device on which it was run, "" for none.
     """
 
     emulated: bool = False
@@ -115,7 +115,7 @@ class Evidence:
     hardware: str = ""
 
     def describe(self) -> str:
-        """Return it as text: "emulated; judged by rustypot; not run on hardware"."""
+        """Return the evidence as text: "emulated; judged by rustypot; not run on hardware"."""
         parts = [
             *(["emulated"] if self.emulated else []),
             *([f"tested with {self.tested}"] if self.tested else []),
@@ -132,13 +132,13 @@ NOTHING_PROVEN = Evidence()
 
 @dataclass(frozen=True)
 class Plugin:
-    """A part that can be made by name.
+    """A part that can be created by its name.
 
     Attributes:
-        make: makes it of its parameters.
-        params: dataclass of its section in the rig file, which has the part's name.
-        abilities: what it can do, in words for ``gazerig kinds``.
-        evidence: how far it is proven.
+        make: Creates it from its parameters.
+        params: Dataclass of its section in the rig file; the section has the part's name.
+        abilities: Its capabilities as text, for ``gazerig kinds``.
+        evidence: Its test status.
     """
 
     make: Callable[..., Any]
@@ -151,8 +151,8 @@ class Plugin:
 class CameraPlugin(Plugin):
     """A kind of camera; its section is at the top of the rig file.
 
-    ``make`` returns a ``gazerig.drivers.camera.source.FrameSource`` (frames, in which the rig's
-    own detectors look) or a ``gazerig.drivers.types.Camera`` (detections).
+    ``make`` returns a ``gazerig.drivers.camera.source.FrameSource`` (frames, which the rig's own
+    detectors search) or a ``gazerig.drivers.types.Camera`` (detections).
     """
 
 
@@ -166,7 +166,7 @@ class DetectorPlugin(Plugin):
 
 @dataclass(frozen=True)
 class AttentionPlugin(Plugin):
-    """A rule of who is looked at; its section is below ``gaze``.
+    """A rule that selects the person to look at; its section is below ``gaze``.
 
     ``make`` returns a ``gazerig.robot.control.chooser.Chooser``.
     """
@@ -176,17 +176,17 @@ class AttentionPlugin(Plugin):
 class BusPlugin(Plugin):
     """A kind of servo bus; its section is below ``bus``, and has a field ``baud``.
 
-    ``make`` returns, of a ``gazerig.drivers.serial.port.BusPort``, the servos' ``ServoConfig`` and
-    the parameters, a ``gazerig.drivers.types.ServoBus``.
+    ``make`` is given a ``gazerig.drivers.serial.port.BusPort``, the servos' ``ServoConfig`` and the
+    parameters. It returns a ``gazerig.drivers.types.ServoBus``.
 
     Attributes:
-        models: its servo models by the name that a joint gives them.
-        moves: models of others that it moves too, as a board moves any "hobby" servo.
-        device: of the parameters, the servos, a clock and a seed the emulated device
-            (``gazerig.sim_mock.device.Device``) for --mock; None: it has none.
-        release: switches the torque of servos off through a port, for the guardian that does so
-            when the program dies, and returns the ids that did not confirm; of the port, the
-            parameters and the ids. None: the servos stop by themselves.
+        models: Its servo models, by the name used in a joint.
+        moves: Models of other kinds that it moves too, as a board moves any "hobby" servo.
+        device: Creates the emulated device (``gazerig.sim_mock.device.Device``) for --mock from the
+            parameters, the servos, a clock and a seed; None if there is none.
+        release: Switches the torque of servos off, given the port, the parameters and the ids.
+            Returns the ids that did not confirm. The guardian calls it when the program dies. None:
+            the servos stop without it.
     """
 
     models: "Mapping[str, ServoModelInfo]" = field(default_factory=dict)
@@ -202,10 +202,10 @@ class EmulatedJoint:
     """One servo of an emulated bus.
 
     Attributes:
-        id: of the servo.
-        model: as in the rig file.
-        start_steps: where its shaft is at first.
-        stop_low_steps, stop_high_steps: ends that its mechanics allow.
+        id: Servo id.
+        model: Model name, as in the rig file.
+        start_steps: Position of its shaft at the start.
+        stop_low_steps, stop_high_steps: Mechanical end stops.
     """
 
     id: int
@@ -220,10 +220,10 @@ class Registration:
     """A part as registered, not loaded yet.
 
     Attributes:
-        group: of ``GROUPS``.
-        name: by which it is used.
-        value: "module:attribute", as of an entry point.
-        package, version: who brings it.
+        group: One of ``GROUPS``.
+        name: Name by which it is used.
+        value: "module:attribute", as in an entry point.
+        package, version: Package that includes it.
     """
 
     group: str
@@ -248,16 +248,16 @@ class Registration:
         return f"{GROUPS[self.group]} {self.name!r} of {self.maker}"
 
     def load(self) -> object:
-        """Return what the entry point names.
+        """Return the object that the entry point names.
 
         Raises:
-            PluginError: it cannot be imported, or is not there.
+            PluginError: it cannot be imported or does not exist.
         """
         module, _, attribute = self.value.partition("[")[0].partition(":")
         try:  # importlib.metadata, which does the same, takes 15 ms to import
             part = import_module(module.strip())
             return attrgetter(attribute.strip())(part) if attribute else part
-        except (Exception, SystemExit) as error:  # a package may do anything while imported
+        except (Exception, SystemExit) as error:  # an import may raise anything
             raise PluginError(f"{self.label} cannot be loaded: {failure(error)}") from error
 
 
@@ -273,7 +273,7 @@ def registered(group: str) -> tuple[Registration, ...]:
 
 
 def taken_names(group: str) -> tuple[str, ...]:
-    """Return one line about every part whose name another one has."""
+    """Return one line for each part whose name is already taken."""
     owner: dict[str, Registration] = {}
     lines = []
     for one in registered(group):
@@ -284,15 +284,15 @@ def taken_names(group: str) -> tuple[str, ...]:
 
 
 def is_ours(group: str, name: str) -> bool:
-    """Return whether gazerig brings a part of this name."""
+    """Return whether gazerig includes a part of this name."""
     return name in SHIPPED[group]
 
 
 def find(group: str, name: str) -> Registration:
-    """Return the part of a name; ours before others'.
+    """Return the part of a name; our own parts come first.
 
     Raises:
-        PluginError: there is none, or several packages bring one; the message lists them.
+        PluginError: no package, or more than one, has such a part; the message lists them.
     """
     if is_ours(group, name):
         return Registration(group, name, SHIPPED[group][name], OUR_PACKAGE)
@@ -314,10 +314,10 @@ P = TypeVar("P", bound=Plugin)
 
 
 def load(group: str, name: str, kind: type[P]) -> P:
-    """Return the part of a name, imported; a plain class or function is one without parameters.
+    """Import and return the part of a name; a plain class or function is a part without parameters.
 
     Raises:
-        PluginError: there is none, it cannot be imported, or it is something else.
+        PluginError: it does not exist, cannot be imported, or is of another type.
     """
     found = find(group, name)
     part = _loaded(found)
@@ -335,12 +335,12 @@ def _loaded(found: Registration) -> object:
 
 
 def yaml_files(group: str) -> dict[str, tuple[Path, Registration]]:
-    """Return the YAML files of packages, ours not among them: name -> file and who brings it.
+    """Return the YAML files of other packages: name -> file and the part that includes it.
 
-    Of two files with one name the first counts; ``taken_names`` does not know of it.
+    Of two files with one name the first is used; ``taken_names`` does not report the other.
 
     Raises:
-        PluginError: a package cannot be imported, or does not name a folder.
+        PluginError: a package cannot be imported or does not name a folder.
     """
     files: dict[str, tuple[Path, Registration]] = {}
     for one in _outside(group, tuple(sys.path)):
@@ -353,7 +353,7 @@ def folder_of(found: Registration) -> Path:
     """Return the folder of YAML files that a part of gestures or rigs names.
 
     Raises:
-        PluginError: it cannot be imported, or is none.
+        PluginError: it cannot be imported or is no folder.
     """
     part = found.load()
     places = list(getattr(part, "__path__", ())) or [part]
@@ -363,11 +363,11 @@ def folder_of(found: Registration) -> Path:
 
 
 def made(group: str, name: str, part: Plugin, params: Any) -> Any:
-    """Return what a part makes of its parameters.
+    """Create a part from its parameters.
 
     Raises:
-        SetupError: it says itself why it cannot.
-        PluginError: it fails.
+        SetupError: raised by the part itself.
+        PluginError: the part raises any other error.
     """
     try:
         return part.make(params)
@@ -396,7 +396,7 @@ def _version() -> str:
 
 @cache
 def _outside(group: str, path: tuple[str, ...]) -> tuple[Registration, ...]:
-    """Return the parts of installed packages; path: where modules are looked for."""
+    """Return the parts of installed packages; path: search path of modules."""
     from importlib.metadata import entry_points
 
     found = []

@@ -1,8 +1,8 @@
 """Values and protocols of the drivers.
 
-A servo bus speaks its servos' own steps (Dynamixel, Feetech STS: 4096 a turn, 0.088 deg;
-a hobby servo on a Maestro: a quarter of a microsecond of pulse width); what a step means
-at a joint is known by gazerig.robot.control.body alone. Times are host monotonic seconds.
+A servo bus uses its servos' own steps (Dynamixel, Feetech STS: 4096 per turn, 0.088 deg; a hobby
+servo on a Maestro: a quarter of a microsecond of pulse width). Only gazerig.robot.control.body
+converts steps to joint angles. Times are host monotonic seconds.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,28 +25,28 @@ _Row = tuple[float, float, float]
 
 
 class Feedback(NamedTuple):
-    """Feedback of all servos of a bus in one exchange: a column a quantity, a value a servo.
+    """Feedback of all servos of a bus in one exchange: a column per quantity, a value per servo.
 
-    All columns are in the order of the setups. A servo without a fresh answer has NaN for
-    position, velocity and load, and -inf for time: none of it is new.
+    All columns are in the order of the setups. A servo without a fresh answer has NaN for position,
+    velocity and load, and -inf for time.
 
     position_steps: present position, a whole number of steps
     velocity_steps_s: present velocity
-    load: share of the stall torque that it gives, signed, -1..1
+    load: torque as a share of the stall torque, signed, -1..1
     at_s: host time at which the answer arrived
 
-    What follows may be some cycles old, as it is read in turn:
+    The following columns may be some cycles old, as the servos take turns:
 
-    temperature_c, voltage_v: None before they were read first
+    temperature_c, voltage_v: None before the first reading
     torque: whether the torque is on
-    fault: latched hardware errors as text, "overload and input voltage"; "" where none
+    fault: latched hardware errors as text, "overload and input voltage"; "" for none
 
-    measured: False if the servo has no feedback and position and velocity are its goal moved
-        at its known speed
-    rearmed: True in the first answer after the torque came on again with the present
-        position as goal (a restarted servo, a port that was unplugged), and in every answer
-        of a servo on its slow way into its limits: new plans must begin there
-    missing: indices of the servos without a fresh answer, rising
+    measured: False if the servo has no feedback; position and velocity then follow its goal at its
+        known speed
+    rearmed: True in the first answer after the torque was switched on again with the present
+        position as goal (a restarted servo, a port that was unplugged), and in every answer of a
+        servo that moves slowly into its limits: new plans must begin there
+    missing: indices of the servos without a fresh answer, ascending
     """
 
     position_steps: tuple[float, ...]
@@ -71,7 +71,7 @@ class Feedback(NamedTuple):
         )  # fmt: skip
 
     def filled(self, last: "Feedback") -> "Feedback":
-        """Return the same with last values, of their own age, for servos without a fresh answer."""
+        """Return a copy in which missing servos have their last values and times."""
         gone = frozenset(self.missing)
         columns = (
             tuple([old if i in gone else new for i, (old, new) in enumerate(both)])
@@ -81,7 +81,7 @@ class Feedback(NamedTuple):
 
 
 class BusHealth(NamedTuple):
-    """Counts since open: bytes sent and received, and errors by kind."""
+    """Counts since the bus was opened: bytes sent and received, and errors by kind."""
 
     tx_bytes: int
     rx_bytes: int
@@ -92,22 +92,21 @@ class ServoConfig(NamedTuple):
     """Configuration of one servo on a bus.
 
     model: name as in the control table, e.g. "xl330-m077"
-    min_steps, max_steps: no goal outside is ever sent
-    max_speed_steps_s: armed in the servo's own profile
-    name: its joint, e.g. "neck_yaw", for messages; "" where it has no name
-    firmware_min: oldest firmware that will do
-    gains: the servo's P, I and D of position (Dynamixel: registers 84, 82, 80; STS: 21, 23,
-        22), None where they stay as they are
-    strength: share of full drive that it may use (Dynamixel: PWM Limit (36); STS: Torque
-        Limit (48)), None where it stays as it is
-    max_accel_steps_s2: armed in the servo's own profile where its kind has one beside goals
-        that are planned already (Maestro); None: unlimited
-    rest_steps: where a servo that cannot tell its position is taken to be when its pulses
-        begin: its place before torque went off; None where it is not needed
-    own_speed_steps_s: how fast such a servo itself moves, from its data sheet; None: as fast
-        as max_speed_steps_s
-    entry_speed_steps_s: how fast it is led into its limits from outside; None: 30 deg/s of
-        its own shaft
+    min_steps, max_steps: limits; no goal outside is ever sent
+    max_speed_steps_s: top speed, written to the servo's own profile
+    name: its joint, e.g. "neck_yaw", for messages; "" for none
+    firmware_min: oldest supported firmware
+    gains: the servo's P, I and D of position (Dynamixel: registers 84, 82, 80; STS: 21, 23, 22);
+        None leaves them unchanged
+    strength: largest share of full drive (Dynamixel: PWM Limit (36); STS: Torque Limit (48)); None
+        leaves it unchanged
+    max_accel_steps_s2: acceleration written to the servo's own profile, for kinds that have one in
+        addition to planned goals (Maestro); None: unlimited
+    rest_steps: assumed position of a servo without feedback when its pulses begin: its position
+        before torque was switched off; None if it is not needed
+    own_speed_steps_s: speed of such a servo, from its data sheet; None: max_speed_steps_s
+    entry_speed_steps_s: speed at which it moves into its limits from outside; None: 30 deg/s at its
+        own shaft
     """
 
     id: int
@@ -130,10 +129,10 @@ class ServoConfig(NamedTuple):
 
 
 class ServoBus(Protocol):
-    """A chain of servos; all sequences are in the order of the setups it was made with."""
+    """A chain of servos; all sequences are in the order of its setups."""
 
     def open(self) -> None:
-        """Open the port, find every servo, check and prepare it; torque stays off.
+        """Open the port, and find, check and prepare every servo; torque stays off.
 
         Raises:
             PortError: the port cannot be opened.
@@ -144,8 +143,8 @@ class ServoBus(Protocol):
     def read(self, now_s: float) -> Feedback:
         """Read all servos in one exchange.
 
-        While the port is gone all servos are missing and the port is tried again now and then;
-        when it is back the servos hold where they are, marked ``rearmed``.
+        While the port is lost, all servos are missing and the port is tried again at intervals.
+        After it reconnects, the servos hold their positions and are marked ``rearmed``.
 
         Raises:
             BusLost: no servo has answered for longer than ``give_up_s``.
@@ -153,9 +152,10 @@ class ServoBus(Protocol):
         ...
 
     def enable_torque(self) -> tuple[int, ...]:
-        """Set every goal to the present position (clipped to its limits), then torque on.
+        """Set every goal to the present position (clipped to its limits), then switch torque on.
 
-        Returns the goals that are now in force, in steps.
+        Returns:
+            The goals that are now active, in steps.
         """
         ...
 
@@ -164,19 +164,19 @@ class ServoBus(Protocol):
         ...
 
     def faults(self) -> tuple[str, ...]:
-        """Name every latched servo fault found so far, e.g. "servo 7: overload"."""
+        """Return the latched servo faults, one line each, e.g. "servo 7: overload"."""
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, e.g. "servo 3 restarted: set up again"."""
+        """Return the events since the last call, e.g. "servo 3 restarted: set up again"."""
         ...
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the servos up so when the torque comes on the next time; the same ids and models."""
+        """Store setups, with the same ids and models, for the next time torque is switched on."""
         ...
 
     def disable_torque(self) -> None:
-        """Torque off on every servo; never raises for a servo that does not answer."""
+        """Switch torque off on every servo; never raises for a servo that does not answer."""
         ...
 
     def health(self) -> BusHealth:
@@ -291,11 +291,11 @@ class FaceMesh(NamedTuple):
 
     points: (468, 3) points of MediaPipe's face mesh: x and y in pixels, and z in the same scale,
         smaller towards the camera
-    irises_px: (2, 5, 2) of the right and the left iris (the owner's): its middle, then four of its
-        edge; None where the eyes are too small
+    irises_px: (2, 5, 2) the person's right and left iris: centre, then four points on the edge;
+        None if the eyes are too small
     lids_px: (2, 16, 2) contours of the same eyes: nine points along the lower lid, from corner to
         corner, and seven along the upper one; None with irises_px
-    certainty: that there is a face, 0..1
+    certainty: confidence that this is a face, 0..1
     """
 
     points: NDArray[np.float32]
@@ -306,16 +306,16 @@ class FaceMesh(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DetectedFace:
-    """A face in a image.
+    """A face in an image.
 
     box_px: x, y, width, height
-    landmarks_px: (5, 2): right eye, left eye, nose tip, right and left mouth corner;
-        left and right are the owner's (the right eye lies left in the image)
+    landmarks_px: (5, 2): right eye, left eye, nose tip, right and left mouth corner; left and right
+        are the person's (the right eye is left in the image)
     confidence: 0..1
-    gaze_camera: unit vector along which the eyes look, in the camera frame (x right, y down,
-        z forward); None where the detector does not find it
-    mesh: its dense mesh, None where none was made
-    clothing: colours of the clothes below it, None where they were not looked at or are not seen
+    gaze_camera: unit vector along which the eyes look, in the camera frame (x right, y down, z
+        forward); None if the detector does not find it
+    mesh: its dense mesh, None if none was computed
+    clothing: colours of the clothes below it, None if they were not analysed or are not visible
     """
 
     box_px: tuple[float, float, float, float]
@@ -335,7 +335,7 @@ class DetectedPerson:
     head_px: middle of the head
     trunk_px: distance from the hips to the top of the head
     confidence: 0..1
-    clothing: as of a face
+    clothing: as for a face
     """
 
     box_px: tuple[float, float, float, float]
@@ -368,18 +368,18 @@ class MovingBlob:
     spin_rad_s: rotation about the line of view, clockwise in the image above 0
     loom_1_s: growth of its image in parts of its size; above 0 it comes nearer
 
-    What follows is at its default where the detector does not measure it:
+    The following fields keep their defaults if the detector does not measure them:
 
-    v_camera_m_s: velocity over ground (the camera's own motion is out), along the camera's
-        axes at the capture; None where only the places are known
-    depth_known: the distance was measured; else it is assumed and depth_sd_m is large
+    v_camera_m_s: velocity over ground (the camera's own motion is removed), along the camera's axes
+        at the capture; None if only positions are known
+    depth_known: whether the distance was measured; otherwise it is assumed and depth_sd_m is large
     depth_sd_m, spin_sd_rad_s, loom_sd_1_s: standard deviations
-    box_px: x, y, width, height; centre_px: a point on it; area_px: how much of the image
-        it covers; flow_px_s: its mean motion, the camera's own taken out
+    box_px: x, y, width, height; centre_px: a point on it; area_px: image area that it covers;
+        flow_px_s: its mean motion, without the camera's own
     fastest_m, fastest_m_s: place and velocity of the quarter of it that moves fastest, as
         ``p_camera_m`` and ``v_camera_m_s``: of an arm, the hand
-    thickness_m: diameter of the largest disc within it, as far away as ``p_camera_m``: of an arm,
-        about the width of its hand; from_side: it goes on beyond the left or right edge
+    thickness_m: diameter of the largest disc within it, at the distance of ``p_camera_m``: of an
+        arm, about the width of its hand; from_side: it extends beyond the left or right edge
     """
 
     id: int
@@ -404,11 +404,11 @@ class MovingBlob:
 
 
 class CameraTurn(NamedTuple):
-    """How a camera was turned when an image was exposed, by its own gyro.
+    """Orientation of a camera when an image was exposed, from its own gyro.
 
-    epoch: orientations of one epoch can be compared; a gap in the readings begins another
-    R_start_camera: takes directions from the camera's axes (x right, y down, z forward) to those
-        it had as the epoch began; drifts slowly
+    epoch: only orientations of one epoch can be compared; a gap in the readings begins another
+    R_start_camera: takes directions from the camera's axes (x right, y down, z forward) to its axes
+    at the start of the epoch; drifts slowly
     """
 
     epoch: int
@@ -416,38 +416,37 @@ class CameraTurn(NamedTuple):
 
     @property
     def is_rotation(self) -> bool:
-        """Return whether its rows are those of a rotation; False of NaN too."""
+        """Return whether its rows form a rotation; False for NaN."""
         R = np.array(self.R_start_camera, dtype=np.float64)
         return R.shape == (3, 3) and bool(np.abs(R @ R.T - np.eye(3)).max() < 1e-3)
 
     def since(self, before: "CameraTurn | None") -> NDArray[np.float64] | None:
-        """Return R_now_before (3, 3), which turns directions in camera axes; None where unknown."""
+        """Return R_now_before (3, 3), which turns directions in camera axes; None if unknown."""
         if before is None or before.epoch != self.epoch:
             return None
         return np.asarray(np.array(self.R_start_camera).T @ np.array(before.R_start_camera))
 
 
 SCENES_OF_A_PROCESS: Final = 1_000_000
-"""Scenes that a camera's process counts; those of the one started after it are numbered from so
-many on."""
+"""Scene numbers reserved for each process of a camera; the next process starts above them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """What was found in one image.
+    """Detections in one image.
 
     captured_s: host time of the exposure; number: counts images from 1
-    image: the BGR image itself where there is one (never written to after this)
-    depth_m: distances seen from where the image was taken, where the camera measures
-        them: (height_px, width_px), NaN where unknown
+    image: the BGR image itself, if any (never written to after this)
+    depth_m: distances from the position of the image's camera, if it measures them: (height_px,
+        width_px), NaN where unknown
     lens: the lens if the camera reports it
-    located: faces and things in the camera's axes; None: whoever needs them computes them
-    turn: how the camera was turned by its own gyro, None where it has none
-    scene: counts the scenes that were shown: another one than before, and there was a cut
-    people: with and without a visible face; only some frames are searched for them, and of each
-        only a part
-    palms: of the nearest person, None in a frame that was not searched for them
-    conditions: under which the camera sees badly, each with its remedy
+    located: faces and things in the camera's axes; None: the consumer computes them
+    turn: orientation of the camera from its own gyro, None if it has none
+    scene: number of the scene shown; it changes at a cut
+    people: people with and without a visible face; only some frames are searched for them, each
+        only in part
+    palms: palms of the nearest person, None in a frame that was not searched
+    conditions: conditions that impair the picture, each with its remedy
     """
 
     captured_s: float
@@ -467,7 +466,7 @@ class Detections:
     conditions: tuple[str, ...] = ()
 
     def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
-        """Return the same with what it shows located in the camera's axes; None: as it is."""
+        """Return a copy with its contents located in the camera's axes; unchanged for None."""
         if locate is None:
             return self
         return Detections(
@@ -490,13 +489,13 @@ class Detections:
 
 
 class Camera(Protocol):
-    """A source of detections. The newest is a value in a slot: nothing queues, nothing blocks."""
+    """A source of detections. Only the newest is stored: nothing queues, nothing blocks."""
 
     def open(self) -> None:
-        """Start looking.
+        """Start the source.
 
         Raises:
-            CameraError: it cannot; the message names the device and the remedy.
+            CameraError: it cannot be opened; the message names the device and the remedy.
         """
         ...
 
@@ -504,12 +503,12 @@ class Camera(Protocol):
         """Return the newest detections available at ``now_s``, or None before the first.
 
         Raises:
-            CameraError: the source has failed for good.
+            CameraError: the source has failed permanently.
         """
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, e.g. "camera lost: trying it again"."""
+        """Return the events since the last call, e.g. "camera lost: trying it again"."""
         ...
 
     def close(self) -> None:
@@ -518,8 +517,8 @@ class Camera(Protocol):
 
 
 class FaceDetector(Protocol):
-    """Finds faces in one image; pure but for the network's own memory."""
+    """A detector of faces in one image; pure except for the network's own memory."""
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
+        """Return faces, the largest first, in pixels of the image."""
         ...

@@ -155,7 +155,7 @@ def test_open_names_servos_that_nobody_expects_beside_the_missing_ones(twin):
         twin.bus([ServoConfig(i, "xl330-m288", 0, 4095, SPEED) for i in (50, 51)]).open()
     bus = twin.bus(SETUPS[:3])
     bus.open()
-    assert "servo 7 (xc330-m288) belongs to no joint: left alone" in bus.events()
+    assert "servo 7 (xc330-m288) belongs to no joint: not used" in bus.events()
 
 
 @pytest.mark.parametrize("kind", TWINS)

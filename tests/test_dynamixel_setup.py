@@ -113,7 +113,7 @@ def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint():
     assert "eye_left (servo 2) has firmware 53, older than 99" in message
     assert "jaw (servo 9) does not answer" in message
     assert "unexpected: servo 3 (xl330-m077)" in message
-    assert "is one of them the one that is missing?" in message
+    assert "is one of them the missing one?" in message
 
 
 def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told():

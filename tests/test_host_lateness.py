@@ -52,10 +52,10 @@ def test_the_same_is_said_seldom_and_counted():
     for k in range(30):
         seldom.add("late", 7.0 + 0.1 * k)
     seldom.add("late", 7.0 + SELDOM_S)
-    assert journal.drain() == ("late", "late (29 more times since it was said last)")
+    assert journal.drain() == ("late", "late (29 more times since it was last reported)")
     seldom.add("late", 8.0 + SELDOM_S)
     seldom.add("late", 8.0 + 2.0 * SELDOM_S)
-    assert journal.drain() == ("late (once more since it was said last)",)
+    assert journal.drain() == ("late (once more since it was last reported)",)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -141,7 +141,7 @@ def test_a_port_that_stays_away_is_given_up(make):
         for _ in range(1000):
             rig.tick()
     assert 2.0 <= rig.now_s - began_s <= 2.1
-    with pytest.raises(BusLost, match="they hold their place: cut|no bus watchdog: cut"):
+    with pytest.raises(BusLost, match="they hold their position: cut|no bus watchdog: cut"):
         rig.bus.disable_torque()
     rig.command("plug")
     rig.bus.disable_torque()

@@ -1,1 +1,1 @@
-"""What every kind of servo bus shares: models, ports, checks of goals and readings."""
+"""Parts shared by all kinds of servo buses: models, ports, checks of goals and readings."""

@@ -1,4 +1,4 @@
-"""A servo bus of another package: what it returns is checked, what it raises is one named line."""
+"""A servo bus of another package: its results are checked, its errors become one named line."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
@@ -14,10 +14,10 @@ from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 T = TypeVar("T")
 
 _COLUMNS = 10  # of Feedback, all but the indices of the missing
-_NUMBERS = 4  # of them the first are numbers that must be finite
+_NUMBERS = 4  # the first of them are numbers that must be finite
 
 _USUAL_S, _BLOCKED_S = 2.0, 0.2
-"""A call is waited for so long, real seconds; the second while one before has not returned."""
+"""Longest wait for a call, real seconds; the second while an earlier call has not returned."""
 _LONGEST_S: Mapping[str, float] = {"open": 60.0, "enable_torque": 20.0, "disable_torque": 10.0}
 """Calls that may take longer."""
 
@@ -25,15 +25,15 @@ _LONGEST_S: Mapping[str, float] = {"open": 60.0, "enable_torque": 20.0, "disable
 class CheckedBus:
     """Implements ``ServoBus`` over the bus of a package.
 
-    A servo whose position, speed, load or time is not finite counts as missing. What is no
-    feedback of all servos ends the run, with torque off, as a lost port does; so does a call that
-    does not return. Torque is then off by the guardian or the servos' watchdog.
+    A servo whose position, speed, load or time is not finite counts as missing. A result that is
+    not the feedback of all servos ends the run with torque off, as a lost port does. So does a call
+    that does not return; the guardian or the servos' watchdog then switches torque off.
 
     Args:
-        bus: of the package.
-        label: the bus as messages name it.
-        setups: its servos.
-        now_s: monotonic seconds, to find reads that take longer than a tick.
+        bus: The package's bus.
+        label: Name of the bus in messages.
+        setups: Its servos.
+        now_s: Returns monotonic seconds, to find reads that take longer than a tick.
     """
 
     def __init__(
@@ -54,8 +54,8 @@ class CheckedBus:
         """Open the bus.
 
         Raises:
-            SetupError: it says itself why it cannot.
-            PluginError: it fails.
+            SetupError: raised by the bus itself.
+            PluginError: the bus raises any other error.
         """
         outcome = self._made(self._bus.open, "open")
         if outcome is None:
@@ -85,7 +85,7 @@ class CheckedBus:
             raise BusLost(f"{self._label}: read returned no feedback: {failure(error)}") from error
 
     def _time(self, took_s: float, now_s: float) -> None:
-        """Report a read that left no time for the rest of the tick."""
+        """Report a read that leaves no time for the rest of the tick."""
         period_s = now_s - self._last_s if self._last_s is not None else None
         self._last_s = now_s
         if period_s is not None and took_s > 0.9 * period_s:
@@ -122,10 +122,10 @@ class CheckedBus:
         return Feedback._make((*columns, tuple(sorted(missing | wrong))))
 
     def enable_torque(self) -> tuple[int, ...]:
-        """Switch torque on where the servos are.
+        """Switch torque on at the present positions.
 
         Raises:
-            BusLost: the package fails, or returns no goal for every servo.
+            BusLost: the package fails or does not return a goal for every servo.
         """
         goals: Any = self._tried(self._bus.enable_torque, "enable_torque")
         if isinstance(goals, Sequence) and len(goals) == self._count:
@@ -138,10 +138,10 @@ class CheckedBus:
         )
 
     def write(self, goals_steps: Sequence[int]) -> None:
-        """Send one goal to every servo; goals are clipped here, whatever the package does.
+        """Send one goal to every servo; goals are always clipped here.
 
         Raises:
-            ValueError: a goal is not a number, or there are not as many as servos.
+            ValueError: a goal is not a number, or their number is wrong.
             BusLost: the package fails.
         """
         if len(goals_steps) != self._count:
@@ -155,19 +155,19 @@ class CheckedBus:
         self._tried(lambda: self._bus.write(clipped), "write")
 
     def faults(self) -> tuple[str, ...]:
-        """Name every latched servo fault found so far."""
+        """Return the latched servo faults, one line each."""
         return self._tried(lambda: tuple(map(str, self._bus.faults())), "faults")
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call."""
+        """Return the events since the last call."""
         events = self._tried(lambda: tuple(map(str, self._bus.events())), "events")
         return (*self._log.drain(), *events)
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the servos up so when the torque comes on the next time.
+        """Store setups for the next time torque is switched on.
 
         Raises:
-            ValueError: these are other servos.
+            ValueError: the servos are not the same.
         """
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
@@ -177,7 +177,7 @@ class CheckedBus:
             raise outcome.error
 
     def disable_torque(self) -> None:
-        """Torque off on every servo.
+        """Switch torque off on every servo.
 
         Raises:
             BusLost: the port is gone, or the package fails.
@@ -193,9 +193,9 @@ class CheckedBus:
         """Close the port; safe to call twice."""
         outcome = self._made(self._bus.close, "close")
         if outcome is None:
-            self._log.add(f"{self._label} does not end: it is left behind")
+            self._log.add(f"{self._label} does not close: it is abandoned")
         elif outcome.error is not None:
-            self._log.add(f"{self._label} failed as it was closed ({outcome.why})")
+            self._log.add(f"{self._label} failed while it was closed ({outcome.why})")
         self._call.close()
         self._call, self._blocked = BoundedCall(self._label, _USUAL_S), False
 
@@ -212,7 +212,7 @@ class CheckedBus:
         return value
 
     def _made(self, call: Callable[[], object], name: str) -> CallResult | None:
-        """Make a call after all before; return None where one of them does not return."""
+        """Make a call after all earlier ones; return None if any of them does not return."""
         longest_s = _BLOCKED_S if self._blocked else _LONGEST_S.get(name, _USUAL_S)
         outcome = self._call.in_turn(call, longest_s)
         self._blocked = outcome is None

@@ -8,7 +8,7 @@ def clipped(steps: Sequence[int], lowest: Sequence[int], highest: Sequence[int])
     """Return goals inside their ranges.
 
     Raises:
-        ValueError: a goal is not a number, or there are not as many as servos.
+        ValueError: a goal is not a number, or their number is wrong.
     """
     as_many = len(steps) == len(lowest)
     if as_many and all(map(le, lowest, steps)) and all(map(le, steps, highest)):

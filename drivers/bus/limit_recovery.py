@@ -1,9 +1,9 @@
-"""Servos that stand outside their limits and are led inside slowly.
+"""Slow return of servos that are outside their limits.
 
-A goal outside is never sent, so such a servo gets the nearest end and a low speed of its own.
-It has arrived when it is at that end, or stands still short of it under its load. Until then
-plans must not run on, or the servo leaps after them as soon as its full speed comes back: each of
-its answers is marked ``rearmed``, which makes plans begin where it is.
+A goal outside is never sent, so such a servo gets the nearest limit as its goal and a low speed. It
+has arrived when it is at that limit, or stops short of it under its load. Until then plans must not
+advance, or the servo would jump to them as soon as its full speed is restored. So each of its
+answers is marked ``rearmed``, which makes plans begin at its position.
 """
 
 from collections.abc import Iterable, Mapping
@@ -12,29 +12,29 @@ from typing import NamedTuple
 from gazerig.drivers.types import ServoConfig
 
 ENTRY_DEG_S = 30.0
-"""Speed at a joint that is brought inside its limits."""
+"""Speed of a joint that returns into its limits."""
 
 NEAR_STEPS = 6
-"""Friction stops a servo so near its goal."""
+"""Distance from its goal at which friction may stop a servo."""
 
 STILL_STEPS, STILL_S = 2, 0.3
-"""A servo that moves no farther in such a time stands still."""
+"""A servo that moves no farther than this in this time has stopped."""
 
 
 class _Place(NamedTuple):
-    """Where a servo was, and since when it has not gone farther."""
+    """Last position of a servo, and the time since which it has not moved."""
 
     steps: float
     since_s: float
 
 
 class SlowEntry:
-    """Knows which servos are on their slow way into their limits.
+    """Servos that move slowly into their limits.
 
     Args:
-        setups: the servos by id.
+        setups: The servos by id.
 
-    places: those on their way by id, and where each was, None before it was looked
+    places: last position of each such servo by id, None before it was read
     """
 
     def __init__(self, setups: Mapping[int, ServoConfig]) -> None:
@@ -46,24 +46,24 @@ class SlowEntry:
 
     @property
     def ids(self) -> tuple[int, ...]:
-        """Return those on their way."""
+        """Return the ids of these servos."""
         return tuple(self.places)
 
     def begin(self, ids: Iterable[int]) -> None:
-        """Lead these inside, and no others any more."""
+        """Move these servos inside, and no others."""
         self.places = dict.fromkeys(ids)
 
     def add_outside(self, servo_id: int, steps: int) -> None:
-        """Lead one inside if it stands outside."""
+        """Move a servo inside if it is outside."""
         if self._outside(servo_id, steps):
             self.places[servo_id] = None
 
     def clear(self) -> None:
-        """Forget all of them."""
+        """Remove all servos."""
         self.places.clear()
 
     def arrived(self, servo_id: int, steps: float, now_s: float) -> bool:
-        """Return whether one on its way, which is here now, has come to its limits."""
+        """Return whether such a servo, now at ``steps``, has reached its limits."""
         if not self._outside(servo_id, steps, NEAR_STEPS):
             return True
         before = self.places[servo_id]
@@ -73,7 +73,7 @@ class SlowEntry:
         return now_s - before.since_s >= STILL_S
 
     def end(self, servo_id: int) -> None:
-        """Let one go at its full speed again."""
+        """Remove a servo, which then moves at full speed again."""
         self.places.pop(servo_id, None)
 
     def _outside(self, servo_id: int, steps: float, room_steps: int = 0) -> bool:
@@ -82,7 +82,7 @@ class SlowEntry:
 
 
 def entry_speed_steps_s(setup: ServoConfig, steps_per_turn: float) -> float:
-    """Return the speed of a servo that is led inside: never above its own top speed."""
+    """Return the speed of a servo that returns into its limits: never above its top speed."""
     wanted = setup.entry_speed_steps_s
     slow = ENTRY_DEG_S / 360.0 * steps_per_turn if wanted is None else wanted
     return min(slow, setup.max_speed_steps_s)

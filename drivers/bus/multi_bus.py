@@ -11,17 +11,17 @@ from gazerig.drivers.errors import BusLost
 from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 
 IN_A_ROW = 3
-"""So many reads may stay without any answer before a bus is asked less often."""
+"""Consecutive reads without any answer after which a bus is read less often."""
 
 AGAIN_S = 0.2
-"""Time between questions to a bus of which no servo answers. Each costs its whole time-out, 20 ms
-as a rule, and while it lasts the servos of the other buses wait for their goals."""
+"""Time between reads of a bus of which no servo answers. Each costs its whole time-out, usually 20
+ms, and the servos of the other buses wait for their goals meanwhile."""
 
 
 class BusShare(NamedTuple):
     """One of the buses: its name and its servos.
 
-    places: for each of its servos the index in the whole rig
+    places: index of each of its servos in the whole rig
     """
 
     name: str
@@ -30,17 +30,17 @@ class BusShare(NamedTuple):
 
 
 class _PollTimer:
-    """Decides when a bus is read: every tick, but rarely while no servo on it answers."""
+    """Schedule of the reads of a bus: every tick, but rarely while no servo on it answers."""
 
     def __init__(self) -> None:
         self._in_vain, self._due_s = 0, -inf
 
     def due(self, now_s: float) -> bool:
-        """Return whether to read it now."""
+        """Return whether it must be read now."""
         return now_s >= self._due_s
 
     def update(self, feedback: Feedback, now_s: float) -> None:
-        """Record the feedback that it returned."""
+        """Record the feedback of a read."""
         if len(feedback.missing) < len(feedback.at_s):
             self._in_vain = 0
             return
@@ -52,15 +52,15 @@ class _PollTimer:
 class MultiBus:
     """Buses that are opened, read, written and released together; implements ServoBus.
 
-    Events and faults of one bus do not affect the others: while one port is gone, the servos of the
-    others are read and moved as ever. A bus that gives up ends the run for all, as a head
-    of which a part no longer obeys must not go on.
+    Events and faults of one bus do not affect the others: while one port is lost, the servos of the
+    others are read and moved as usual. A bus that gives up ends the run for all buses, as a head
+    must not continue to move when part of it no longer responds.
 
     Args:
-        shares: together they hold every index from 0 on, once.
+        shares: Together they contain every index from 0 on exactly once.
 
     Raises:
-        ValueError: they do not.
+        ValueError: an index is absent or occurs twice.
     """
 
     def __init__(self, shares: Sequence[BusShare]) -> None:
@@ -72,12 +72,12 @@ class MultiBus:
         self._count = len(places)
         given = [place for share in shares for place in share.places]
         order = sorted(range(len(given)), key=given.__getitem__)
-        # None where the buses' servos follow each other as they do in the rig.
+        # None if the buses' servos are already in the order of the rig.
         self._pick: Any = itemgetter(*order) if order != sorted(order) else None
         self._nothing = [Feedback.of_none(len(share.places)) for share in shares]
 
     def open(self) -> None:
-        """Open every bus; where one cannot be opened, those before it are closed again.
+        """Open every bus; if one cannot be opened, close those opened before it.
 
         Raises:
             PortError: a port cannot be opened.
@@ -97,8 +97,8 @@ class MultiBus:
     def read(self, now_s: float) -> Feedback:
         """Read all servos of all buses.
 
-        A bus without any answer is read only five times a second until a servo answers, so that
-        the servos of the others do not wait for it.
+        A bus without any answer is read only five times a second until a servo answers, so that the
+        servos of the other buses do not wait for it.
 
         Raises:
             BusLost: no servo of a bus has answered for longer than its ``give_up_s``.
@@ -110,7 +110,7 @@ class MultiBus:
                 continue
             try:
                 feedbacks[i] = share.bus.read(now_s)
-            except BusLost as error:  # the others are read all the same, and may come back
+            except BusLost as error:  # the others are still read, so that they may reconnect
                 lost.append(error)
                 continue
             timer.update(feedbacks[i], now_s)
@@ -129,12 +129,13 @@ class MultiBus:
         return Feedback._make((*ordered, tuple(sorted(missing))))
 
     def enable_torque(self) -> tuple[int, ...]:
-        """Switch torque on, bus by bus; where one refuses, all are released again.
+        """Switch torque on, bus by bus; if one refuses, release all again.
 
-        Returns the goals that are now in force, in steps.
+        Returns:
+            The goals that are now active, in steps.
 
         Raises:
-            DriverError: as the bus at fault raises it.
+            DriverError: raised by the bus at fault.
         """
         goals = [0] * self._count
         try:
@@ -150,7 +151,7 @@ class MultiBus:
         """Send one goal to every servo; goals are clipped to the limits.
 
         Raises:
-            ValueError: a goal is not a number, or there are not as many as servos.
+            ValueError: a goal is not a number, or their number is wrong.
         """
         if len(goals_steps) != self._count:
             raise ValueError(f"{len(goals_steps)} goals for {self._count} servos")
@@ -163,18 +164,18 @@ class MultiBus:
             bus.write([goals_steps[place] for place in places])
 
     def faults(self) -> tuple[str, ...]:
-        """Name every servo fault found so far."""
+        """Return the latched servo faults, one line each."""
         return tuple(fault for share in self._shares for fault in share.bus.faults())
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return tuple([event for share in self._shares for event in share.bus.events()])
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the setups that apply when the torque comes on the next time.
+        """Store setups for the next time torque is switched on.
 
         Raises:
-            ValueError: these are other servos.
+            ValueError: the servos are not the same.
         """
         if len(setups) != self._count:
             raise ValueError("other servos need another bus: ids and models must stay")
@@ -182,10 +183,10 @@ class MultiBus:
             bus.retune([setups[place] for place in places])
 
     def disable_torque(self) -> None:
-        """Torque off on every bus, whatever befalls the others.
+        """Switch torque off on every bus, even if another bus fails.
 
         Raises:
-            BusLost: ports are gone; the message names each.
+            BusLost: ports are lost; the message names each.
         """
         lost = []
         for share in self._shares:
@@ -197,14 +198,14 @@ class MultiBus:
             raise BusLost("; ".join(lost))
 
     def _release_quietly(self) -> None:
-        """Release what can be: another error is on its way already."""
+        """Release every servo that answers, without raising: another error is raised already."""
         try:
             self.disable_torque()
         except BusLost:
             return
 
     def health(self) -> BusHealth:
-        """Return byte and error counts of all buses together."""
+        """Return the sums of byte and error counts."""
         each = [share.bus.health() for share in self._shares]
         errors: Counter[str] = Counter()
         for health in each:

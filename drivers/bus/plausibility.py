@@ -1,10 +1,9 @@
-"""Positions that a joint can have, and those that noise has made. Numbers in, masks out.
+"""Plausibility check of positions: what a joint can have reached, and what noise has produced.
 
-A check over the bytes of an answer lets some damaged ones pass: a sum of one byte one in
-256, a CRC of two bytes one in 65,536. Between two answers a joint moves no farther than its
-motor can turn it, so a position farther away is not given as fresh. A joint that really is
-elsewhere - pushed by hand, restarted, counted again by a turn - says so again and again, and
-is believed then.
+The checksum of an answer misses some damage: a sum of one byte misses one in 256 damaged answers, a
+CRC of two bytes one in 65,536. Between two answers a joint moves no farther than its motor can turn
+it, so a position farther away is not returned as fresh. A joint that really is elsewhere - pushed
+by hand, restarted, off by a turn - reports that position repeatedly and is then believed.
 """
 
 from collections.abc import Sequence
@@ -13,34 +12,34 @@ from operator import sub
 from typing import Any
 
 SLACK_STEPS = 64
-"""So far apart two answers may be whatever the time between them: play, and jitter."""
+"""Distance that two answers may always have, whatever the time between them: play and jitter."""
 
 LATE_S = 0.01
-"""An answer may have been given so long before it was taken."""
+"""Longest time between the moment a servo answers and the moment the answer is read."""
 
 MARGIN = 1.5
-"""A joint may move so much faster than its motor without load: it is pushed, or it falls."""
+"""Ratio by which a joint may exceed the no-load speed of its motor: it is pushed, or it falls."""
 
 AGREEING = 3
-"""So many answers in a row that agree with each other are believed wherever they are."""
+"""Number of consecutive answers that agree and are then believed wherever they are."""
 
 DISTURBED_S = 5.0
-"""So long after a damaged answer the line counts as disturbed."""
+"""Time after a damaged answer during which the line counts as disturbed."""
 
 PAIR_STEPS = 4
-"""Two answers right after one another may be so far apart, beyond what the motor can do."""
+"""Distance allowed between two consecutive answers in addition to the motion of the motor."""
 
 PAIR_LATE_S = 0.005
-"""The first of two answers may have waited so much longer than the second."""
+"""Longest additional delay of the first of two consecutive answers."""
 
 
 class Plausibility:
-    """Knows where each servo was last, and how far it can have come since.
+    """Last position of each servo, and the distance that it can have moved since.
 
     Args:
-        fastest_steps_s: speed of each servo's motor without load.
+        fastest_steps_s: No-load speed of each servo's motor.
 
-    damaged_s: when an answer arrived damaged last
+    damaged_s: time of the last damaged answer
     """
 
     def __init__(self, fastest_steps_s: Sequence[float]) -> None:
@@ -52,7 +51,7 @@ class Plausibility:
         self.forget()
 
     def forget(self) -> None:
-        """Believe the next positions whatever they are, as after a port that was gone."""
+        """Believe the next positions whatever they are, as after a lost port."""
         count = len(self._fastest)
         self._last: Sequence[Any] = [None] * count
         self._at_s = [0.0] * count
@@ -60,7 +59,7 @@ class Plausibility:
         self._whole_s = float("nan")
 
     def place(self, slot: int, position: int, at_s: float) -> None:
-        """Record where a servo was found by other means than its cyclic answer."""
+        """Record a position of a servo that comes from another source than its cyclic answer."""
         last = self._last = list(self._last)
         if not isnan(self._whole_s):
             self._at_s = [self._whole_s] * len(last)
@@ -69,10 +68,10 @@ class Plausibility:
         self._whole_s = float("nan")
 
     def whole(self, positions: Sequence[int], at_s: float) -> bool:
-        """Return whether all positions of one answer can be true; they are noted only then."""
-        # Every tick: where all were last heard together there is one time for all of them.
+        """Return whether all positions of one answer are plausible; only then are they recorded."""
+        # Fast path of every tick: servos last read together have one common time.
         since_s = at_s - self._whole_s
-        if not since_s >= 0.0:  # nor where they were not
+        if not since_s >= 0.0:  # also if they were not
             return False
         ways = tuple(map(sub, positions, self._last))
         if max(ways) > self._nearest or min(ways) < -self._nearest:
@@ -83,7 +82,7 @@ class Plausibility:
         return True
 
     def one(self, slot: int, position: int, at_s: float) -> bool:
-        """Return whether one servo's position can be true; to be asked once for every answer."""
+        """Return whether one servo's position is plausible; call it once for every answer."""
         last, odd = self._last[slot], self._odd[slot]
         last_s = self._at_s[slot] if isnan(self._whole_s) else self._whole_s
         if last is not None and not self._near(slot, last, last_s, position, at_s):
@@ -99,30 +98,30 @@ class Plausibility:
 
     def _near(self, slot: int, before: int, before_s: float, now: int, now_s: float) -> bool:
         since_s = max(0.0, now_s - before_s)
-        if self.disturbed(now_s):  # two servos with one id say the same wrong thing twice
+        if self.disturbed(now_s):  # two servos with one id report the same wrong position twice
             reach = PAIR_STEPS + self._fastest[slot] * (LATE_S + since_s)
         else:
             reach = self._free[slot] + self._pace[slot] * since_s
         return abs(now - before) <= reach
 
-    # --- a line on which answers have been damaged of late
+    # --- a line with recently damaged answers
 
     def damaged(self, at_s: float) -> None:
-        """Record that an answer arrived damaged, or was not plausible."""
+        """Record that an answer was damaged or not plausible."""
         self.damaged_s = at_s
 
     def disturbed(self, now_s: float) -> bool:
-        """Return whether answers have been damaged of late."""
+        """Return whether an answer was damaged recently."""
         return now_s - self.damaged_s <= DISTURBED_S
 
     def pair(self, slot: int, way: int, since_s: float, speeds_steps_s: Sequence[float]) -> bool:
-        """Return whether two answers right after one another can both be true.
+        """Return whether two consecutive answers are plausible together.
 
         Args:
-            slot: the servo.
-            way: steps from the first to the second.
-            since_s: time from the first to the second.
-            speeds_steps_s: what both say of its speed.
+            slot: Index of the servo.
+            way: Steps from the first to the second.
+            since_s: Time from the first to the second.
+            speeds_steps_s: Speeds that both report.
         """
         fastest, room_s = self._fastest[slot], PAIR_LATE_S + max(0.0, since_s)
         low = max(-fastest, min(0.0, *speeds_steps_s)) * room_s

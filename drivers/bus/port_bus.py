@@ -1,4 +1,4 @@
-"""What every servo bus shares: torque off, a port that is unplugged, byte and error counts."""
+"""Base of servo buses: torque off, reconnection of an unplugged port, byte and error counts."""
 
 from abc import ABC, abstractmethod
 from collections import Counter
@@ -16,35 +16,35 @@ CUT = "cut the servo power"
 
 
 class Exchange(Protocol):
-    """What carries bytes: their counts, and errors by kind."""
+    """Byte and error counts of the exchanges on a line."""
 
     tx_bytes: int
     rx_bytes: int
 
     @property
     def errors(self) -> Counter[str]:
-        """Return the errors by kind; other parts of the bus may add to them."""
+        """Return the error counts by kind; other parts of the bus may add to them."""
         ...
 
 
 class BusSupervisor(Protocol):
-    """The supervisor of a bus, as far as ``PortBus`` needs it.
+    """The part of a bus supervisor that ``PortBus`` needs.
 
-    engaged: goals are followed
+    engaged: whether goals are followed
     """
 
     engaged: bool
 
     def torque_disabled(self) -> None:
-        """Stop the supervision of servos without torque."""
+        """Stop supervision, as the servos have no torque."""
 
 
 class PortBus(ABC):
-    """The servos behind one port; part of an implementation of gazerig.drivers.types.ServoBus.
+    """The servos on one port; base of implementations of gazerig.drivers.types.ServoBus.
 
     A bus creates its parts before any of these methods is called, and may replace them.
 
-    holding, unconfirmed: texts about a servo whose torque is not off, or that does not confirm it
+    holding, unconfirmed: messages for a servo whose torque is not off, or that does not confirm it
     """
 
     holding: ClassVar[str] = "torque still on"
@@ -62,10 +62,10 @@ class PortBus(ABC):
 
     @abstractmethod
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
-        """Check that servos can have these setups.
+        """Check that the servos accept these setups.
 
         Raises:
-            ValueError: one cannot.
+            ValueError: a setup is not possible.
         """
 
     @abstractmethod
@@ -73,7 +73,7 @@ class PortBus(ABC):
         """Switch the torque of all servos off and verify that it is off.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
 
     @abstractmethod
@@ -82,15 +82,15 @@ class PortBus(ABC):
 
     @abstractmethod
     def _cannot_release(self) -> str:
-        """Return what the servos do when their torque cannot be switched off."""
+        """Return the text about servos whose torque cannot be switched off."""
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the setups that apply when the torque comes on the next time; same ids and models.
+        """Store setups, with the same ids and models, for the next time torque is switched on.
 
-        Under torque everything stays as it is.
+        While torque is on nothing changes.
 
         Raises:
-            ValueError: these are other servos, or they cannot be set up so.
+            ValueError: the servos are not the same, or a setup is not possible.
         """
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
@@ -99,7 +99,7 @@ class PortBus(ABC):
         self._wanted = tuple(setups)
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return self._log.drain() if self._log.lines else ()
 
     def health(self) -> BusHealth:
@@ -108,11 +108,11 @@ class PortBus(ABC):
         return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
 
     def disable_torque(self) -> None:
-        """Torque off on every servo, confirmed; never raises for a servo that does not answer.
+        """Switch torque off on every servo and confirm it; never raises for a silent servo.
 
         Raises:
-            BusLost: the port is gone, and stays so when tried once more; the
-                torque is taken off by the first read after it is back.
+            BusLost: the port is lost and cannot be reopened; the first read after it reconnects
+                switches torque off.
         """
         self._supervisor.torque_disabled()
         if not self._opened:
@@ -129,10 +129,10 @@ class PortBus(ABC):
         self._port.closePort()
 
     def _reachable(self, now_s: float) -> bool:
-        """Return whether the port is open, reopened if needed, and no release of torque is pending.
+        """Reopen the port if needed; return whether it is open and no torque release is pending.
 
         Raises:
-            BusLost: it has been gone for longer than ``give_up_s``.
+            BusLost: it has been lost for longer than ``give_up_s``.
         """
         self._now_s = now_s
         if self._link.down and not self._link.returned(now_s):
@@ -148,7 +148,7 @@ class PortBus(ABC):
         """Switch all torque off, verify it, and report the servos that keep it.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         try:
             released = self._switch_off()

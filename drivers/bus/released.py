@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class ReleaseResult(NamedTuple):
-    """Ids that still report torque or pulses, and those that did not answer."""
+    """Ids of servos that still report torque or pulses, and of those that did not answer."""
 
     holding: tuple[int, ...]
     unconfirmed: tuple[int, ...]

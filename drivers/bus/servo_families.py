@@ -1,4 +1,4 @@
-"""Every family of smart servos, by its name and by the models in it."""
+"""Families of smart servos, by name and by model."""
 
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel.family import DYNAMIXEL

@@ -1,4 +1,4 @@
-"""Every servo model that a joint can have: on which kind of bus, and in which steps it counts."""
+"""Servo models that a joint can have, with their kind of bus and their steps."""
 
 from collections.abc import Mapping, Sequence
 from math import inf
@@ -16,27 +16,26 @@ if TYPE_CHECKING:
     from gazerig.drivers.types import ServoConfig
 
 BusKind = str
-"""Name of a kind of bus: one of ``BUS_KINDS``, or one that a package brings."""
+"""Name of a kind of bus: one of ``BUS_KINDS``, or one of a package."""
 BUS_KINDS: tuple[BusKind, ...] = ("dynamixel", "feetech", "maestro", "pca9685")
 HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
-"""Our boards that send pulses to hobby servos: any of them moves any."""
+"""Our boards that send pulses to hobby servos; each moves every hobby servo."""
 
 
 SmartModel = DynamixelModel | FeetechModel
 
 
 class ServoModelInfo(NamedTuple):
-    """What is known of a servo model.
+    """Properties of a servo model.
 
-    bus: kind of bus it is on; of a hobby servo one of the boards that move it
-    steps_per_turn: of its shaft; lowest, highest: first and last step it can be sent to
-    unit, unit_steps: unit in which its position is shown, "steps" or "us", and how many
-        steps that is
-    middle: of its travel, in that unit
-    family: of a smart servo of ours, by its name; "" for hobby servos and those of packages
-    measured: whether it measures its position; without that it has no other feedback either
-    hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it does
-    stall_torque_nm: at its rated voltage; 0.2 of a small hobby servo with metal gears
+    bus: its kind of bus; for a hobby servo one of the boards that move it
+    steps_per_turn: steps per turn of its shaft; lowest, highest: first and last step of its range
+    unit, unit_steps: unit in which its position is shown, "steps" or "us", and its size in steps
+    middle: centre of its travel, in that unit
+    family: family name of our smart servos; "" for hobby servos and those of packages
+    measured: whether it measures its position; if not, it has no other feedback either
+    hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it has any
+    stall_torque_nm: stall torque at its rated voltage; 0.2 for a small hobby servo with metal gears
     """
 
     bus: BusKind
@@ -54,14 +53,14 @@ class ServoModelInfo(NamedTuple):
     stall_torque_nm: float = 0.2
 
     def fits(self, kind: str) -> bool:
-        """Return whether it can be on a bus of this kind: any board moves a hobby servo."""
+        """Return whether it can be on a bus of this kind; any board moves a hobby servo."""
         if kind == self.bus or self.bus in _ALSO_MOVED.get(kind, ()):
             return True
         return self.bus in HOBBY_KINDS and kind in HOBBY_KINDS
 
 
 def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoModelInfo:
-    """Return the model information of a smart servo with so many steps."""
+    """Return the model information of a smart servo."""
     return ServoModelInfo(
         bus,
         model.steps_per_turn,
@@ -94,34 +93,34 @@ SERVOS: dict[str, ServoModelInfo] = {
         for name, model in HOBBY.items()
     },
 }
-"""By the model name in a rig's YAML; those of a package are added as its bus is used."""
+"""By the model name in a rig's YAML; models of a package are added when its bus is used."""
 
 _ALSO_MOVED: dict[BusKind, tuple[BusKind, ...]] = {}
-"""Kind of a package -> kinds of which it moves the servos too."""
+"""Kind of a package -> other kinds whose servos it moves too."""
 
 
 def add_models(
     kind: BusKind, models: Mapping[str, ServoModelInfo], moves: Sequence[str], label: str
 ) -> None:
-    """Make the servo models of a package's bus known.
+    """Add the servo models of a package's bus to ``SERVOS``.
 
     Args:
-        kind: of the bus.
-        models: by name.
-        moves: names of models of others that it moves too.
-        label: of the package in messages.
+        kind: Kind of bus.
+        models: Models by name.
+        moves: Models of other kinds that it moves too.
+        label: Name of the package in messages.
 
     Raises:
-        PluginError: a model has a name that is taken, or is no model.
+        PluginError: a model's name is taken, or a model is not a ``ServoModelInfo``.
     """
     for name, model in models.items():
         if not isinstance(model, ServoModelInfo):
             raise PluginError(f"{label}: its servo model {name!r} is no ServoModelInfo")
         if SERVOS.get(name, model._replace(bus=kind)) != model._replace(bus=kind):
-            raise PluginError(f"{label}: there is another servo model {name!r} already")
+            raise PluginError(f"{label}: another servo model is already named {name!r}")
     for name in moves:
         if name not in SERVOS:
-            raise PluginError(f"{label}: there is no servo model {name!r} that it could move too")
+            raise PluginError(f"{label}: no servo model {name!r} exists that it could move too")
     SERVOS.update({name: m._replace(bus=kind) for name, m in models.items()})
     _ALSO_MOVED[kind] = tuple(SERVOS[name].bus for name in moves)
 

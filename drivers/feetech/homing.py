@@ -22,7 +22,7 @@ def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
     Raises:
         ServoMissing: it does not answer.
         ServoFault: its torque is on, or it rejects the instruction.
-        BusLost: the port is gone.
+        BusLost: the port is lost.
     """
     registers = Registers(port, family)
     where = f"{port.port_name}: servo {servo_id}"

@@ -156,7 +156,7 @@ class HobbyBoardBus(PortBus):
         inside at 30 deg/s. Returns the goals that are now in force, in steps.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
             ServoMissing: the board does not answer, or a channel does not take
                 its goal.
         """

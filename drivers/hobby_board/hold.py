@@ -26,7 +26,7 @@ def take(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
     after. A joint outside its limits comes inside at 30 deg/s.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port is lost.
     """
     goal = channel.start(pulse_steps, board.line.port.now_s())
     if not board.send_limits([channel], confirmed=True):

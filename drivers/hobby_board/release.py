@@ -27,7 +27,7 @@ def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:
     """Stop the pulses and verify that they are gone.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port is lost.
     """
     left = tuple(channels)
     heard: set[int] = set()

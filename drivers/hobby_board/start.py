@@ -16,7 +16,7 @@ def every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
     """Ask for every pulse.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port is lost.
         ServoMissing: a channel does not answer.
     """
     ids = tuple(setup.id for setup in setups)
@@ -37,7 +37,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
     """Enable every channel, those without pulses one after another.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port is lost.
         ServoMissing: the board does not answer, or a channel does not take
             its goal.
     """

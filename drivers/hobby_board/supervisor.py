@@ -97,7 +97,7 @@ class BoardSupervisor:
             Whether the board answered.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         self._asked = (self._asked + 1) % len(self._channels)
         channel = self._channels[self._asked]

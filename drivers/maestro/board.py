@@ -49,7 +49,7 @@ class MaestroBoard:
         """Greet the board and return the pulses of these servos; nothing moves.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
             ServoMissing: it does not answer, or a channel is no servo's.
         """
         where = self.line.port.port_name

@@ -33,7 +33,7 @@ class MaestroBus(HobbyBoardBus):
         Home may be a place, to which servos go at the armed speed, or no pulses at all.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         self._supervisor.torque_disabled()
         self._maestro.line.send(self._maestro.line.speech.go_home())
@@ -44,7 +44,7 @@ class MaestroBus(HobbyBoardBus):
         The Micro Maestro has no such request.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         if self._maestro.params.channels <= MICRO:
             return None

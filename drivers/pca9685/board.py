@@ -110,7 +110,7 @@ class Pca9685Board:
         """Check that the boards are there and return the pulses of these servos; nothing changes.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
             ServoMissing: a board does not answer, or another chip does.
         """
         self._sent.clear()

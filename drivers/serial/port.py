@@ -60,7 +60,7 @@ class BusPort(Protocol):
         """Send bytes.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         ...
 
@@ -68,7 +68,7 @@ class BusPort(Protocol):
         """Return ``length`` bytes, or those that came before the deadline.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         ...
 
@@ -79,7 +79,7 @@ class BusPort(Protocol):
             What ``read_until`` returns, and when the request had been handed over.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         ...
 
@@ -87,7 +87,7 @@ class BusPort(Protocol):
         """Count the bytes that have arrived.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         ...
 
@@ -95,7 +95,7 @@ class BusPort(Protocol):
         """Throw away what has arrived, without waiting.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         ...
 
@@ -103,7 +103,7 @@ class BusPort(Protocol):
         """Throw away what arrives until the line is quiet; return the number of bytes.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         ...
 
@@ -147,7 +147,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Send bytes; waits at most 50 ms for room in the adapter's buffer.
 
         Raises:
-            BusLost: the port is gone or takes nothing.
+            BusLost: the port is lost or takes nothing.
         """
         if self._on_traffic is not None:
             self._on_traffic()
@@ -169,7 +169,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Return ``length`` bytes, or those that came before the deadline.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         if self._on_traffic is not None:
             self._on_traffic()
@@ -179,7 +179,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Read on until there are ``length`` bytes, or the deadline.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         while len(got) < length and self._wait(deadline_s):
             more = self._take(length - len(got))
@@ -197,7 +197,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             ``length`` bytes, or those that came; when the request had been handed over.
 
         Raises:
-            BusLost: the port is gone or takes nothing.
+            BusLost: the port is lost or takes nothing.
         """
         if self._on_traffic is not None:
             self._on_traffic()
@@ -232,7 +232,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Throw away what arrives until nothing came for 3 ms; return the number of bytes.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         end_s = time.monotonic() + BABBLE_S
         dropped = 0

@@ -1,1 +1,1 @@
-"""The engine that all smart servos share."""
+"""Bus engine shared by all families of smart servos."""

@@ -1,4 +1,4 @@
-"""Smart servos of one family on one serial bus: one read and one write a tick."""
+"""Smart servos of one family on one serial bus: one read and one write per tick."""
 
 import struct
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -30,22 +30,22 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import Feedback, ServoConfig
 
 RESTART_S = 0.1
-"""Servos that were silent for so long may have restarted: their power was cut."""
+"""Silence after which servos may have restarted because their power was cut."""
 
 
 class SmartServoBus(PortBus):
     """A chain of smart servos in position mode; implements gazerig.drivers.types.ServoBus.
 
-    Latched faults are requested by the supervisor; other faults are in every answer.
+    The supervisor requests latched faults; other faults are in every answer.
 
     Args:
-        family: the make of the servos.
+        family: Family of the servos.
         port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
-        setups: the servos, in the order of every sequence given and taken.
-        params: how to speak with them.
+        setups: The servos; all sequences of arguments and results have their order.
+        params: Communication parameters.
 
     Raises:
-        ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
+        ValueError: too many servos for one packet of goals, or a range beyond one turn.
     """
 
     _line: Transactions
@@ -85,9 +85,9 @@ class SmartServoBus(PortBus):
         self._assemble(None)
 
     def _assemble(self, firmware: Mapping[int, int] | None) -> None:
-        """Create the parts in their initial state, for the capabilities of the servos.
+        """Create the parts in their initial state, for the features of the servos' firmware.
 
-        firmware: of each servo, None before it is known
+        firmware: firmware version by id, None before it is known
         """
         line, log = self._line, self._log
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
@@ -114,7 +114,7 @@ class SmartServoBus(PortBus):
     # --- one reading
 
     def _in_doubt(self, now_s: float) -> bool:
-        """Return whether even a right answer must be checked servo by servo."""
+        """Return whether even an intact answer must be checked servo by servo."""
         if self._family.weak_check:
             corrupt = self._line.errors.get("corrupt", 0)
             if corrupt != self._damaged or now_s - self._feedback.places.damaged_s <= DISTURBED_S:
@@ -143,8 +143,9 @@ class SmartServoBus(PortBus):
                 supervisor.check_status(servo_id, one.sample, now_s)
                 self._line.errors["refused"] += 1
             elif was_out and (dark or garbled):
-                # The first after long silence may be an old one. Answers of two servos at once are
-                # the AND of both, checks too: far more than one in 65,536 pass.
+                # The first answer after a long silence may be an old one. Two servos that answer
+                # together produce the AND of their bytes, checksums included, so far more than one
+                # in 65,536 pass.
                 continue
             elif one.sample.blank:
                 supervisor.check_status(servo_id, one.sample, now_s)
@@ -159,7 +160,7 @@ class SmartServoBus(PortBus):
         )
 
     def _disturbed(self, now_s: float) -> bool:
-        """Return whether answers have been damaged of late."""
+        """Return whether answers were damaged recently."""
         places = self._feedback.places
         damaged = self._line.errors.get("corrupt", 0)
         if damaged != self._damaged or self._reader.stray_s == now_s:
@@ -170,10 +171,10 @@ class SmartServoBus(PortBus):
     def _confirm_doubtful(
         self, replies: dict[int, ServoReply], now_s: float
     ) -> dict[int, ServoReply]:
-        """Ask servos with a doubtful answer once more; keep values that both answers agree on.
+        """Read servos with a doubtful answer once more; keep values on which both answers agree.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         disturbed = self._disturbed(now_s)
         doubtful = [i for i in replies if disturbed or self._reader.answer_owed(i, now_s)]
@@ -191,10 +192,10 @@ class SmartServoBus(PortBus):
         return kept
 
     def _send_to_others(self, withheld: Collection[int], goals: Sequence[int]) -> None:
-        """Send goals to all servos but those that must get none now.
+        """Send goals to all servos except the withheld ones.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         speeds = self._goal_speeds()
         kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
@@ -203,20 +204,20 @@ class SmartServoBus(PortBus):
             self._line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
 
     def _goal_speeds(self) -> Sequence[int]:
-        """Return the speeds that may be used for goals, where they go with them."""
+        """Return the speeds that are sent with goals, if the family has them."""
         entering = self._supervisor.entering
         if entering.places and self._family.goal_speed:
             return self._recovery.speeds(self._ids, entering.ids)
         return self._speeds
 
-    # --- the bus as others see it
+    # --- public interface
 
     def open(self) -> None:
-        """Open the port, find every servo, check and prepare it; torque stays off.
+        """Open the port, and find, check and prepare every servo; torque stays off.
 
         Raises:
             PortError: the port cannot be opened.
-            ServoMissing: servos are absent, of another model or refuse.
+            ServoMissing: servos are absent, of another model or refuse a setting.
         """
         self._apply_wanted()
         where, baud = self._port.port_name, self._params.baud
@@ -242,12 +243,12 @@ class SmartServoBus(PortBus):
     def read(self, now_s: float) -> Feedback:
         """Read all servos in one exchange.
 
-        A servo that keeps silent is left out of the exchange and asked alone now and
-        then, so whatever is wrong, a read takes a bounded time. While the port is gone all
-        are missing, and the port is tried again now and then.
+        A silent servo is removed from the exchange and read alone at intervals, so a read always
+        takes a bounded time. While the port is lost all servos are missing, and the port is tried
+        again at intervals.
 
         Raises:
-            BusLost: port or servos have been gone for longer than ``give_up_s``.
+            BusLost: port or servos have been lost for longer than ``give_up_s``.
         """
         self._now_s = now_s
         link = self._link
@@ -278,16 +279,18 @@ class SmartServoBus(PortBus):
         return feedback.now
 
     def enable_torque(self) -> tuple[int, ...]:
-        """Set every goal to the present position (clipped to its limits), then torque on.
+        """Set every goal to the present position (clipped to its limits), then switch torque on.
 
-        A joint outside its limits is brought inside at 30 deg/s. Returns the goals that
-        are now in force, in steps.
+        A joint outside its limits moves inside at 30 deg/s.
+
+        Returns:
+            The goals that are now active, in steps.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
             ServoMissing: a servo does not answer or does not take its goal.
-            ServoFault: a servo has latched an error, refuses its torque, or
-                stands beyond its encoder's zero, from where it would go the wrong way.
+            ServoFault: a servo has latched an error, refuses its torque, or is beyond its encoder's
+                zero, so that it would move in the wrong direction.
         """
         try:
             self._apply_wanted()
@@ -298,7 +301,7 @@ class SmartServoBus(PortBus):
             self.disable_torque()
             raise
         except BusLost:
-            self._link.refused_release()  # some may have their torque already
+            self._link.refused_release()  # some servos may already have torque
             raise
         self._link.release_due = False
         self._supervisor.torque_enabled(outside)
@@ -308,11 +311,11 @@ class SmartServoBus(PortBus):
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo in one packet; goals are clipped to the limits.
 
-        Sends nothing while the torque is off or the port is gone, and nothing to servos that
-        stopped by themselves or may have restarted: the next reads set those up first.
+        Nothing is sent while torque is off or the port is lost, nor to servos that stopped on their
+        own or may have restarted: the next reads set those up first.
 
         Raises:
-            ValueError: a goal is not a number, or there are not as many as servos.
+            ValueError: a goal is not a number, or their number is wrong.
         """
         goals = clipped(goals_steps, self._lowest, self._highest)
         supervisor, line = self._supervisor, self._line
@@ -322,7 +325,7 @@ class SmartServoBus(PortBus):
         speeds = self._goal_speeds() if supervisor.entering.places else self._speeds
         try:
             packet = self._goals.packet(goals, speeds)
-        except struct.error:  # whole numbers are the rule
+        except struct.error:  # goals are usually whole numbers
             goals = [round(goal) for goal in goals]
             packet = self._goals.packet(goals, speeds)
         try:
@@ -334,7 +337,7 @@ class SmartServoBus(PortBus):
             self._lose(lost)
 
     def _apply_wanted(self) -> None:
-        """Apply the setups requested since the torque was on last."""
+        """Apply the setups stored since torque was last on."""
         if self._wanted == self._setups:
             return
         self._setups = self._wanted
@@ -345,7 +348,7 @@ class SmartServoBus(PortBus):
         self._feedback.set_limits(self._setups)
 
     def faults(self) -> tuple[str, ...]:
-        """Return every present fault, e.g. "neck_yaw (servo 7): overload"."""
+        """Return the present faults, one line each, e.g. "neck_yaw (servo 7): overload"."""
         return tuple(
             f"{self._line.label(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
         )
@@ -358,10 +361,12 @@ class SmartServoBus(PortBus):
 
     def _cannot_release(self) -> str:
         unit_s = self._family.watchdog_unit_s
-        rest = "they go on to their last goal and hold it"
+        rest = "they continue to their last goal and hold it"
         if self._watchdog and unit_s:
             stops_s = self._watchdog * unit_s
-            rest = f"their bus watchdog stops them within {stops_s:.2f} s and they hold their place"
+            rest = (
+                f"their bus watchdog stops them within {stops_s:.2f} s and they hold their position"
+            )
         elif not unit_s:
             rest += ", as this kind has no bus watchdog"
         return (
@@ -383,16 +388,16 @@ class SmartServoBus(PortBus):
             )
 
     def _reset_after_reconnect(self) -> None:
-        """Reset after the port has come back."""
+        """Reset the state after the port reconnects."""
         self._poll_list = self._reader.poll_list = PollList(self._ids)
         self._line.starved = False
         self._supervisor.mark_all_for_recovery()
 
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
-        """Check that ranges lie within one turn: beyond it positions are void after a restart.
+        """Check that ranges are within one turn: a servo forgets whole turns when it restarts.
 
         Raises:
-            ValueError: one does not.
+            ValueError: a range is not.
         """
         turn = self._family.steps_per_turn
         for setup in setups if self._family.single_turn else ():

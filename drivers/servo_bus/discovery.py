@@ -1,8 +1,8 @@
 """Search for servos at every baud rate, and comparison of found and expected servos.
 
-Where a ping to all servos is answered by one after the other that is what is asked. Elsewhere all
-would answer at once, over each other, so every id is asked for what it is; an answer names its id,
-so one that an adapter hands over late is counted all the same.
+If the servos answer a broadcast ping one after another, a broadcast ping is sent. Otherwise all
+would answer together and corrupt each other, so the identity of every id is read. An answer
+contains its id, so an answer that an adapter delivers late is still counted.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,27 +17,27 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoConfig
 
 FIND_QUIET_S = 0.04
-"""All servos of a rig have answered a ping to all when nothing came for so long."""
+"""Silence after which all servos of a rig have answered a broadcast ping."""
 
 BABBLE_S = 2.0
-"""Longest listening to a line that never falls silent."""
+"""Longest time to listen to a line that never falls silent."""
 
 SHARED, ANSWERS = 2, 6
-"""So many of so many answers in pieces are no accident."""
+"""If ``SHARED`` of ``ANSWERS`` answers are incomplete, that is no accident."""
 
 _ROOM = 1 << 12
 _MOST = 1 << 13
-"""More bytes than the answers of all ids."""
+"""Largest number of bytes read; more than the answers of all ids."""
 
 Progress = Callable[[int, int], None]
-"""Called with the baud rate and the id that is asked."""
+"""Called with the baud rate and the id that is pinged."""
 
 
 class FoundServo(NamedTuple):
-    """One servo that answered.
+    """A servo that answered.
 
-    number: its model number; firmware: as its make counts it
-    baud: at which it answered; model: the name of its model
+    number: its model number; firmware: version number of its family
+    baud: baud rate at which it answered; model: name of its model
     """
 
     id: int
@@ -50,9 +50,9 @@ class FoundServo(NamedTuple):
 class BaudScan(NamedTuple):
     """Result of the search at one baud rate.
 
-    possible: whether the adaptor can run at it; junk: bytes outside any packet
-    shared: ids that two servos seem to have, as their longer answers come in pieces
-    protocol_1: ids that answer to Protocol 1.0 only
+    possible: whether the adaptor supports the rate; junk: number of bytes outside any packet
+    shared: ids that two servos seem to share, as their longer answers are incomplete
+    protocol_1: ids that answer only to Protocol 1.0
     """
 
     baud: int
@@ -72,20 +72,20 @@ def scan(
     ids: Sequence[int] | None = None,
     family_of: Mapping[str, Family] | None = None,
 ) -> Iterator[BaudScan]:
-    """Search at one baud rate after another; the port is left open at the last.
+    """Search at one baud rate after another; the port stays open at the last.
 
     Args:
-        port: it is opened.
-        family: the make of servo to look for.
-        bauds: all of the make's where None.
-        thorough: wait long; ask every id even where no servo answers a ping to all.
-        progress: called for every id that is asked alone.
-        ids: those that are asked where ids are asked alone; all where None.
-        family_of: families of models whose packets are the same and whose table is another.
+        port: Port to open.
+        family: Family of the servos.
+        bauds: Baud rates; None for all of the family.
+        thorough: Wait longer, and read every id even if no servo answers a broadcast ping.
+        progress: Called for every id that is read alone.
+        ids: Ids to read if ids are read alone; None for all.
+        family_of: Families of models with the same packets but another table.
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it has gone away.
+        BusLost: the port is lost.
     """
     for baud in family.usual_rates if bauds is None else bauds:
         if not port.setBaudRate(baud):
@@ -112,10 +112,10 @@ def scan_ids(
 ) -> tuple[tuple[FoundServo, ...], int]:
     """Search for servos at one baud rate; return them and the number of bytes outside any packet.
 
-    Two servos with one id answer over each other; whole answers that differ are two servos.
+    Two servos with one id corrupt each other's answers; different intact answers are two servos.
 
     Raises:
-        BusLost: the port is gone.
+        BusLost: the port is lost.
     """
     codec, quiet_s = family.codec, family.quiet_s if quiet_s is None else quiet_s
     port.drain()
@@ -135,15 +135,15 @@ def scan_ids(
     whole = [status for status in codec.statuses(raw) if status.intact]
     used = sum(codec.STATUS_OVERHEAD + len(status.params) for status in whole)
     found = [one for status in whole if (one := _found(family, status, baud)) is not None]
-    # A ping to all is answered once; a servo asked alone may be heard again, late.
+    # A broadcast ping is answered once; a servo read alone may answer again, late.
     each = found if family.broadcast_ping else dict.fromkeys(found)
     return tuple(each), max(0, len(raw) - used)
 
 
 def any_reply(port: BusPort, family: Family) -> bool:
-    """Return whether any servo answers a ping to all, whose answers may spoil each other.
+    """Return whether any servo answers a broadcast ping, even if the answers corrupt each other.
 
-    True where ``scan_ids`` asks nothing else.
+    True if ``scan_ids`` sends only a broadcast ping.
     """
     if family.broadcast_ping:
         return True
@@ -151,14 +151,14 @@ def any_reply(port: BusPort, family: Family) -> bool:
     port.drain()
     port.write(question)
     received = port.read_until(_ROOM, port.now_s() + REPLY_S)
-    # An adapter that echoes puts the question before the answers.
+    # An adapter with an echo returns the request before the answers.
     return bool(received.replace(question, b"", 1))
 
 
 def ping(
     port: BusPort, family: Family, servo_id: int, baud: int, tries: int = 2
 ) -> FoundServo | None:
-    """Return model and firmware of one servo, None if no whole answer came."""
+    """Return model and firmware of one servo, None without an intact answer."""
     codec = family.codec
     for _ in range(tries):
         port.drain()
@@ -171,10 +171,10 @@ def ping(
 
 
 def corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) -> int:
-    """Count the answers of one id that were corrupt or disagreed about its position.
+    """Return how many answers of one id were corrupt or disagreed about its position.
 
-    Two servos with one id speak at the same time: where their bytes differ they spoil
-    each other. Their pings are often equal, their positions hardly ever.
+    Two servos with one id answer at the same time and corrupt bytes that differ. Their answers to
+    pings are often equal, their positions hardly ever.
     """
     first, last = (family.registers[name] for name in family.duplicate_id_registers)
     length = last.address + last.size - first.address
@@ -189,20 +189,20 @@ def corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) 
             bad += bool(raw)
         elif len(status.params) == length:
             places.append(position.decode(status.params[at : at + position.size]))
-    # A check of one byte over two answers is right now and then by chance, but not the place.
+    # A checksum of one byte over two mixed answers may match by chance, but not the position.
     wide = bool(places) and max(places) - min(places) > family.steps_per_turn // 8
     return max(bad, SHARED if wide else 0)
 
 
 def reboot(port: BusPort, family: Family, servo_id: int) -> None:
-    """Send a reboot instruction; only a later ping shows whether it was obeyed."""
+    """Send a reboot instruction; only a later ping shows whether it was executed."""
     port.drain()
     port.write(family.codec.reboot(servo_id))
     port.drain()  # some firmware confirms it
 
 
 def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
-    """Return all that comes until the line has been quiet for a while."""
+    """Return all bytes that arrive until the line has been quiet for ``quiet_s``."""
     end_s = port.now_s() + BABBLE_S
     raw = port.read_until(1, port.now_s() + quiet_s)
     while raw and port.now_s() < end_s and len(raw) <= _MOST:
@@ -214,7 +214,7 @@ def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
 
 
 def _found(family: Family, status: Status, baud: int) -> FoundServo | None:
-    """Return the servo that an answer identifies, None if it identifies none."""
+    """Return the servo that an answer identifies, or None."""
     identity = family.codec.identity(status)
     if identity is None:
         return None
@@ -233,22 +233,22 @@ def find(
 ) -> dict[int, int]:
     """Find every servo and check its model and firmware; return the firmware of each.
 
-    Servos without a setup are left alone, and logged if a ping to all finds them.
+    Servos without a setup are not changed, and logged if a broadcast ping finds them.
 
     Raises:
-        ServoMissing: some are absent, of another model or too old; all are
-            named at once, with those that are there and not expected.
+        ServoMissing: some are absent, of another model or too old; the message names all of them,
+            and the unexpected servos.
     """
     family = line.family
     identified = identities(line) if family.broadcast_ping else {}
     found = {
-        # Two with one id, or a noisy line, spoil an answer to a broadcast: asked alone as well.
+        # Two servos with one id, or a noisy line, corrupt a broadcast answer: also read alone.
         setup.id: identified.get(setup.id) or registers.identify(setup.id)
         for setup in setups
     }
     problems = [text for setup in setups if (text := _problem(family, setup, found[setup.id]))]
     if problems and not family.broadcast_ping:
-        # Another one may be the one that is missing; only now is it worth asking every id.
+        # An unexpected servo may be the missing one; only now is it worth reading every id.
         identified = identities(line)
     strangers = {i: identity for i, identity in identified.items() if i not in found}
     where = line.port.port_name
@@ -258,12 +258,12 @@ def find(
         raise ServoMissing(_message(family, where, problems, strangers, found))
     for servo_id, identity in sorted(strangers.items()):
         model = family.model_name(identity.model_number)
-        log.add(f"servo {servo_id} ({model}) belongs to no joint: left alone")
+        log.add(f"servo {servo_id} ({model}) belongs to no joint: not used")
     return {servo_id: identity.firmware for servo_id, identity in found.items() if identity}
 
 
 def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
-    """Return what is wrong with one servo, "" where nothing is."""
+    """Return the problem of one servo, "" for none."""
     who = setup.label()
     if found is None:
         return f"{who} does not answer"
@@ -284,7 +284,7 @@ def _message(
     strangers: Mapping[int, Identity],
     found: Mapping[int, Identity | None],
 ) -> str:
-    """Return everything in one line, with the remedy."""
+    """Return all problems in one line, with the remedy."""
     there = "; ".join(problems)
     if strangers:
         named = ", ".join(
@@ -292,5 +292,5 @@ def _message(
         )
         there += f"; unexpected: servo {named}"
     if strangers and None in found.values():
-        return f"{where}: {there}: check cables and ids; is one of them the one that is missing?"
+        return f"{where}: {there}: check cables and ids; is one of them the missing one?"
     return f"{where}: {there}: check cables and ids"

@@ -1,8 +1,8 @@
-"""The interface between the bus engine and a make of servo: all differences in one value.
+"""Interface between the bus engine and a servo family: all differences in one value.
 
-The engine (gazerig.drivers.servo_bus) knows no make by name. A make is a protocol file (the
-codec), a table file and one ``Family`` made of both; docs/servo-families.md explains it field by
-field.
+The engine (gazerig.drivers.servo_bus) does not know any family by name. A family consists of a
+protocol file (the codec), a table file and one ``Family`` built from both; docs/servo-families.md
+explains it field by field.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,10 +17,10 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 
 
 class Status(NamedTuple):
-    """One answer of a servo as it arrived.
+    """One status packet of a servo as it arrived.
 
-    intact: its check sum is right
-    at: byte of what was received at which it begins
+    intact: whether its checksum is correct
+    at: index of its first byte in the received bytes
     """
 
     id: int
@@ -31,15 +31,15 @@ class Status(NamedTuple):
 
 
 class Register(Protocol):
-    """One entry of a servo's table."""
+    """An entry of a servo's control table."""
 
     @property
     def name(self) -> str:
-        """Name as the table has it."""
+        """Name in the table."""
 
     @property
     def address(self) -> int:
-        """First byte."""
+        """Address of the first byte."""
 
     @property
     def size(self) -> int:
@@ -47,41 +47,41 @@ class Register(Protocol):
 
     @property
     def area(self) -> str:
-        """Memory it lives in: "eeprom" or "ram"."""
+        """Its memory: "eeprom" or "ram"."""
 
     def encode(self, value: int) -> bytes:
-        """Return a value as it is written."""
+        """Return a value as bytes."""
 
     def decode(self, data: bytes) -> int:
-        """Return the value that bytes stand for."""
+        """Return the value of bytes."""
 
 
 class Model(Protocol):
-    """One model of a family."""
+    """A servo model of a family."""
 
     @property
     def name(self) -> str:
-        """Name as in a rig file."""
+        """Name in a rig file."""
 
     @property
     def number(self) -> int:
-        """Number in the servo's own register."""
+        """Number in the servo's model register."""
 
     @property
     def no_load_steps_s(self) -> float:
-        """Speed of its shaft without load."""
+        """No-load speed of its shaft."""
 
     @property
     def load_unit(self) -> float:
-        """Share of the stall torque that one unit of its present effort is."""
+        """Share of the stall torque per unit of its present effort."""
 
     @property
     def max_voltage(self) -> int:
-        """Upper voltage limit from the factory, 0.1 V."""
+        """Factory setting of the upper voltage limit, 0.1 V."""
 
     @property
     def rated_v(self) -> float:
-        """Voltage that it is made for."""
+        """Rated voltage."""
 
 
 class Identity(NamedTuple):
@@ -92,7 +92,7 @@ class Identity(NamedTuple):
 
 
 class Codec(Protocol):
-    """Packets as bytes; a module of functions."""
+    """Encoder and decoder of packets; a module of functions."""
 
     @property
     def HEADER(self) -> bytes:
@@ -100,59 +100,59 @@ class Codec(Protocol):
 
     @property
     def STATUS_OVERHEAD(self) -> int:
-        """Bytes of an answer without params."""
+        """Bytes of an answer in addition to its params."""
 
     @property
     def BROADCAST(self) -> int:
-        """Id that stands for all servos."""
+        """Id that addresses all servos."""
 
     @property
     def REFUSAL(self) -> int:
-        """Bits of an answer's error byte that mean a rejected instruction."""
+        """Bits of an answer's error byte that report a rejected instruction."""
 
     @property
     def ALERT(self) -> int:
-        """Bits of an answer's error byte that mean a fault of the servo."""
+        """Bits of an answer's error byte that report a fault of the servo."""
 
     @property
     def ECHO_LENGTH(self) -> int | None:
-        """Params of a read whose echo looks like an answer, None where none does."""
+        """Number of params of a read whose echo looks like an answer, None if none does."""
 
     @property
     def CHECK(self) -> str:
-        """Struct code of the check behind an answer's params."""
+        """Struct code of the checksum after an answer's params."""
 
     def status_head(self, servo_id: int, length: int) -> bytes:
-        """Return an answer's bytes before its error byte; ``length``: of its params."""
+        """Return an answer's bytes before its error byte; ``length``: number of params."""
 
     @property
     def CHECKED(self) -> tuple[int, int]:
-        """So many bytes at the beginning and at the end of an answer are not under its check."""
+        """Bytes at the beginning and at the end of an answer that its checksum does not cover."""
 
     def all_intact(self, parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
-        """Return whether the checks of answers are right, from what is under each."""
+        """Return whether the checksums of answers match the parts that they cover."""
 
     @property
     def IDENTITY_LENGTH(self) -> int:
-        """Params of an answer about what a servo is."""
+        """Number of params of an identity answer."""
 
     def identify(self, servo_id: int) -> bytes:
-        """Build a question about what a servo is."""
+        """Build a request for a servo's identity."""
 
     def identity(self, status: Status) -> Identity | None:
-        """Return model and firmware from an answer, None if it does not hold them."""
+        """Return model and firmware from an answer, None if it does not contain them."""
 
     def ping(self, servo_id: int) -> bytes:
         """Build a ping."""
 
     def reboot(self, servo_id: int) -> bytes:
-        """Build an order to restart."""
+        """Build a reboot instruction."""
 
     def read(self, servo_id: int, address: int, length: int) -> bytes:
         """Build a request for registers of one servo."""
 
     def write(self, servo_id: int, address: int, data: bytes) -> bytes:
-        """Build an order to write registers of one servo."""
+        """Build an instruction to write registers of one servo."""
 
     def sync_read(self, ids: Sequence[int], address: int, length: int) -> bytes:
         """Build a request for the same registers of several servos."""
@@ -160,24 +160,24 @@ class Codec(Protocol):
     def sync_write(
         self, ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]
     ) -> bytes:
-        """Build an order to write the same registers of several servos."""
+        """Build an instruction to write the same registers of several servos."""
 
     def statuses(self, raw: bytes) -> list[Status]:
-        """Return every complete answer in received bytes; noise is passed over."""
+        """Return every complete answer in received bytes; noise is skipped."""
 
     def bytes_missing(self, raw: bytes, count: int, length: int) -> int:
-        """Return how many bytes are still to come of ``count`` answers."""
+        """Return how many bytes of ``count`` answers have not arrived yet."""
 
 
 class GoalPackets(Protocol):
-    """Packets of goals for a fixed set of servos."""
+    """Builder of goal packets for a fixed set of servos."""
 
     def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:
-        """Build the packet for one goal and one speed a servo."""
+        """Build the packet with one goal and one speed per servo."""
 
 
 class Arming(NamedTuple):
-    """A register written before the torque comes on; ``speed``: it bounds the speed of goals."""
+    """A register written before torque is switched on; ``speed``: whether it limits goal speeds."""
 
     register: str
     speed: bool
@@ -185,57 +185,59 @@ class Arming(NamedTuple):
 
 @dataclass(frozen=True)
 class Family:
-    """One make of servo.
+    """A family of smart servos.
 
     Codec and table:
-        codec: packets as bytes
-        registers, models: by name
-        steps_per_turn: of the shaft
+        codec: encoder and decoder of packets
+        registers, models: registers and models by name
+        steps_per_turn: steps per turn of the shaft
         name_errors: texts for the bits of ``error_register``
-        velocity_unit_steps_s: of the present velocity
-        sign_bits: fields of a ``Sample`` whose sign is a bit of its own, and that bit
-        speed_units: from steps/s to the register of speed limits; at least 1
-        acceleration_units: likewise from steps/s^2, None for no limit
-        goals: packets of goals for some servos
-        sync_read: one request asks several servos; else each is asked by itself
-        baud_rates: bit/s by the value of the servo's register
-        usual_rates: all of them, the usual ones first
-        factory_baud: of a new servo
-        highest_id: of a servo
-        version: writes a firmware number as the maker does
+        velocity_unit_steps_s: unit of the present velocity
+        sign_bits: fields of a ``Sample`` with a separate sign bit, and that bit
+        speed_units: converts steps/s to the unit of speed limits; at least 1
+        acceleration_units: converts steps/s^2 to the unit of acceleration limits; None for no limit
+        goals: builds goal packets for some servos
+        sync_read: whether one request reads several servos; otherwise each is read alone
+        baud_rates: bit/s, indexed by the value of the servo's register
+        usual_rates: all baud rates, the usual ones first
+        factory_baud: baud rate of a new servo
+        highest_id: highest id of a servo
+        version: formats a firmware number as the manufacturer does
 
     Reading:
-        read_plan: windows and packets for some servos, a rig's choice (params) and the servos'
-            firmware by id, None before it is known
-        effort_register: the one that holds load or current
-        armed: fields of a ``Sample`` that show whether a servo is still armed, and what
-            they should be; None where anything will do
-        weak_check: the check over an answer lets some damage pass
+        read_plan: returns windows and packets for some servos, the rig's params and the firmware by
+            id, None before it is known
+        effort_register: register of load or current
+        armed: fields of a ``Sample`` that show whether a servo is still armed, and their expected
+            values; None accepts any value
+        weak_check: whether the checksum of an answer misses some damage
 
     Settings:
-        spans: first and last of registers that are read together
-        wanted: registers a servo must have; written in this order within a span
-        target: what a register must be where it was found so and wanted so
-        passes: a first correction may put other settings back, which takes a second
-        answer_level: Status Return Level with which every order is answered
-        lock: register that must be 0 while EEPROM is written, None where the torque is the lock
+        spans: first and last register of ranges that are read together
+        wanted: required register values; written in this order within a span
+        target: value to write to a register, given the found and the wanted value
+        passes: number of correction passes; a first correction may reset other settings
+        answer_level: Status Return Level at which every instruction is answered
+        lock: register that must be 0 while EEPROM is written, None if torque is the lock
 
     Traits:
-        error_register: holds a servo's faults
-        faults_latch: a fault stays until the servo is restarted; else its bit comes and goes
-        torque_faults: bits of faults that switch the torque off, where they come and go
-        watchdog_unit_s: of Bus Watchdog; None where there is no watchdog
-        goal_speed: a goal carries the speed that may be used for it
-        single_turn: beyond its encoder's zero a servo would go the long way round
-        broadcast_ping: a ping to all is answered one after the other; else each id is asked
-        quiet_s, thorough_s: time-outs of a search: silence after a ping to all, or for each id
-        duplicate_id_registers: first and last of registers in which two servos with the same
-            id differ
-        protocol_1: ids that answer to Protocol 1.0 only, where they may have been set to it
-        arming: what is written before the torque comes on
-        most_goals: so many servos' goals fit into one packet
-        usual_bauds: bit/s to choose where an adaptor cannot run at another
-        fault_cure, jump_cure: what helps where torque is refused, or a position jumps
+        error_register: register of a servo's faults
+        faults_latch: whether a fault stays until the servo is restarted; otherwise its bit comes
+            and goes
+        torque_faults: bits of transient faults that switch torque off
+        watchdog_unit_s: unit of Bus Watchdog; None without a watchdog
+        goal_speed: whether a goal includes its speed
+        single_turn: whether a servo beyond its encoder's zero would move in the wrong direction
+        broadcast_ping: whether servos answer a broadcast ping one after another; otherwise each id
+            is read
+        quiet_s, thorough_s: time-outs of a search: silence after a broadcast ping, or for each id
+        duplicate_id_registers: first and last of the registers in which two servos with the same id
+            differ
+        protocol_1: returns ids that answer only to Protocol 1.0, if the family has it
+        arming: register written before torque is switched on
+        most_goals: largest number of goals in one packet
+        usual_bauds: bit/s to recommend if an adaptor does not support another rate
+        fault_cure, jump_cure: remedies if torque is refused, or a position jumps
     """
 
     name: str
@@ -283,23 +285,23 @@ class Family:
     jump_cure: str
 
     def __deepcopy__(self, memo: object) -> "Family":
-        """Return itself: it never changes, and its codec is a module."""
+        """Return itself: it is immutable, and its codec is a module."""
         return self
 
     def request(self, ids: Sequence[int], address: int, length: int) -> bytes:
-        """Return a request for the same registers of servos; of one where each is asked alone."""
+        """Return a request for the same registers of some servos; of one if each is read alone."""
         if self.sync_read:
             return self.codec.sync_read(ids, address, length)
         (servo_id,) = ids
         return self.codec.read(servo_id, address, length)
 
     def asked_together(self, ids: Sequence[int]) -> Iterable[tuple[int, ...]]:
-        """Return which of some servos go into one request."""
+        """Return the groups of servos that are read with one request."""
         if not self.sync_read:
             return [(servo_id,) for servo_id in ids]
         return [tuple(ids)] if ids else []
 
     def model_name(self, number: int) -> str:
-        """Return the name of a model, "model number 350" where it is not known."""
+        """Return the name of a model, "model number 350" if it is unknown."""
         names = (model.name for model in self.models.values() if model.number == number)
         return next(names, f"model number {number}")

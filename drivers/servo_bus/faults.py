@@ -7,33 +7,34 @@ from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, STOOD_STIL
 from gazerig.drivers.types import ServoConfig
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
-"""A servo that restarts more often within such a time stays without torque."""
+"""A servo that restarts more often than this within this time stays without torque."""
 
 AGAIN_AND_AGAIN = "restarts again and again: supply too weak"
 
 GARBLES = "answers, but its bytes arrive damaged: a second servo with its id, or a bad cable"
 
 BUSY_S = 2.0
-"""Where answers come late a servo may be silent for so long before it is named."""
+"""Silence after which a servo is reported while answers arrive late."""
 
 NOT_SET_UP = "cannot be set up again: a second servo with its id, or a bad cable"
 
 FAILED_IN_A_ROW = 2
-"""A servo that fails so often alone is named: one lost answer is no news."""
+"""Consecutive failures after which a servo alone is reported: one lost answer is not an event."""
 
 OWED_S = 0.1
-"""So long after the first answer, those that were owed have come."""
+"""Time after the first answer by which the pending ones have arrived."""
 
 SAY_SILENT_S = 0.25
-"""Silence is spoken of from so long on: one lost answer is no news."""
+"""Silence after which servos are reported: one lost answer is not an event."""
 
 
 class ServoHealth:
-    """The present faults of every servo, as text.
+    """Present faults of all servos, as text.
 
     faults: present fault of a servo, by id
-    latches: those of them that the servo itself has latched
-    all_silent_since_s: since when no servo has answered; until the end of that is reported
+    latches: ids of servos that have latched their fault themselves
+    all_silent_since_s: time since which no servo has answered; kept until the end of the silence is
+        reported
     """
 
     def __init__(self, setups: Mapping[int, ServoConfig], log: EventLog) -> None:
@@ -60,19 +61,19 @@ class ServoHealth:
         return True
 
     def name(self, servo_id: int, fault: str) -> None:
-        """Record a fault that stays until the servo has been restarted."""
+        """Record a fault that stays until the servo is restarted."""
         self.faults[servo_id] = fault
         self._log.add(f"{self._setups[servo_id].label()}: {fault}")
 
     def cleared(self, servo_id: int) -> None:
-        """Record that a servo's latched error is gone."""
+        """Record that a servo's latched error has ended."""
         if servo_id in self.latches:
             self.latches.discard(servo_id)
             del self.faults[servo_id]
             self._log.add(f"{self._setups[servo_id].label()}: the fault is gone")
 
     def exhausted(self, servo_id: int, now_s: float) -> bool:
-        """Return whether a servo has restarted too often recently, which is then a fault."""
+        """Return whether a servo has restarted too often recently, and record that as a fault."""
         lately = [t_s for t_s in self._restarts.get(servo_id, []) if now_s - t_s < WITHIN_S]
         self._restarts[servo_id] = lately
         if len(lately) < MOST_RESTARTS:
@@ -81,12 +82,12 @@ class ServoHealth:
         return True
 
     def restarted(self, servo_id: int, now_s: float) -> None:
-        """Record that a servo had restarted and works again."""
+        """Record that a servo restarted and works again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
         self._log.add(f"{self._setups[servo_id].label()} restarted: set up again")
 
     def not_set_up(self, servo_id: int) -> None:
-        """Record that a servo could not be set up again, alone."""
+        """Record that a servo, alone, could not be set up again."""
         self._failed[servo_id] = failed = self._failed.get(servo_id, 0) + 1
         if failed == FAILED_IN_A_ROW:
             self._log.add(f"{self._setups[servo_id].label()} {NOT_SET_UP}")
@@ -103,10 +104,10 @@ class ServoHealth:
         lateness: HostLateness,
         answered: bool,
     ) -> None:
-        """Record the silent servos; report once those that have been silent for a while.
+        """Record the silent servos; report each once after a longer silence.
 
-        lateness: answers that came late, which at first blame this computer
-        heard: whether any servo has answered
+        lateness: late answers, which show first of all that this computer is busy
+        answered: whether any servo has answered
         """
         if not answered and out:
             self._back_s = None
@@ -114,7 +115,7 @@ class ServoHealth:
                 self.all_silent_since_s = now_s
         elif answered and self.all_silent_since_s is not None:
             self.answered_again(now_s, lateness)
-            # While no servo was heard, none in particular was silent.
+            # While no servo answered, none in particular was silent.
             self._silent_since = {i: max(t, now_s) for i, t in self._silent_since.items()}
         for servo_id in [i for i in self._silent_since if i not in out]:
             since_s = self._silent_since.pop(servo_id)
@@ -135,7 +136,7 @@ class ServoHealth:
             self._log.add("no servo answers: check servo power and cable")
 
     def answered_again(self, now_s: float, lateness: HostLateness) -> None:
-        """Report what a silence of all servos was, a moment later: late answers first."""
+        """Report the cause of a silence of all servos, after late answers have arrived."""
         if self.all_silent_since_s is None:
             return
         if self._back_s is None:
@@ -154,18 +155,18 @@ class ServoHealth:
         self._all_silent = False
 
     def stopped(self, count: int, late: str, now_s: float) -> None:
-        """Record that servos were stopped by their own watchdog and go on from where they are.
+        """Record that servos were stopped by their own watchdog and continue from their position.
 
-        late: how this computer was late a moment ago, "" where it was not
+        late: recent lateness of this computer as text, "" for none
         """
         servos = f"the watchdog of {count} servo{'s' if count > 1 else ''}"
         if late:
-            text = f"{late}, so {servos} stopped them; they go on from where they are"
+            text = f"{late}, so {servos} stopped them; they continue from their position"
             self._seldom.add(text, now_s, "late")
         else:
             self._seldom.add(
-                f"{servos} stopped them, as packets get lost: check cable and plugs; they go on "
-                "from where they are", now_s, "lost",
+                f"{servos} stopped them, as packets get lost: check cable and plugs; they continue "
+                "from their position", now_s, "lost",
             )  # fmt: skip
 
     def _tell(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
@@ -177,7 +178,7 @@ class ServoHealth:
                 self._log.add(f"{self._setups[servo_id].label()} {what}")
 
     def silent_for_s(self, now_s: float) -> float:
-        """Return how long no servo has answered."""
+        """Return the time for which no servo has answered, seconds."""
         if len(self._silent_since) < len(self._setups):
             return 0.0
         return now_s - max(self._silent_since.values())

@@ -1,9 +1,8 @@
-"""Feedback of all servos of a bus, column by column, from one exchange to the next.
+"""Feedback columns of all servos of a bus, updated by each exchange.
 
-Where the check over an answer is weak (a sum of one byte), bytes spoilt in two places pass it now
-and then. So a position that no joint can have reached since the last one is withheld
-(``gazerig.drivers.bus.plausibility``), and on a disturbed line every answer needs a second one that
-agrees with it.
+A weak checksum (a sum of one byte) sometimes misses damage in two places. So a position that no
+joint can have reached since the last one is rejected (``gazerig.drivers.bus.plausibility``), and on
+a disturbed line every answer must be confirmed by a second one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,13 +17,13 @@ from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import Feedback, ServoConfig
 
 ALIKE_C, ALIKE_TENTH_V = 3, 10
-"""So far apart temperatures and voltages of two answers right after one another may be."""
+"""Largest difference of temperature and voltage between two consecutive answers."""
 
 EQUAL_C, EQUAL_TENTH_V = 1, 1
-"""So far apart both are the same value; if they are farther apart, neither is taken."""
+"""Largest difference at which both count as equal; above it neither value is used."""
 
 MOST_CELSIUS = 125
-"""A temperature above is none."""
+"""Highest valid temperature."""
 
 _SIGNED = ("position", "velocity", "effort")
 
@@ -32,14 +31,14 @@ Value = TypeVar("Value")
 
 
 class FeedbackColumns:
-    """Columns of the exchange that is being taken; state that is read in turn is kept.
+    """Columns of the current exchange; values that are read in rotation are kept.
 
     Args:
-        family: the make of the servos.
-        setups: the servos.
+        family: Family of the servos.
+        setups: The servos.
 
-    places: which positions are plausible
-    now: all columns as they are now
+    places: plausibility check of positions
+    now: all columns at present
     """
 
     def __init__(self, family: Family, setups: Sequence[ServoConfig]) -> None:
@@ -83,7 +82,7 @@ class FeedbackColumns:
     def set_limits(self, setups: Sequence[ServoConfig]) -> None:
         """Set changed ranges and limits of the same servos."""
         self._ranges = [(setup.min_steps, setup.max_steps) for setup in setups]
-        # Less than half a turn away from every range, no other turn is nearer.
+        # Within half a turn of every range, no other turn is nearer.
         self._near_low = max((high for _, high in self._ranges), default=0) - self._turn // 2 + 1
         self._near_high = min((low for low, _ in self._ranges), default=0) + self._turn // 2 - 1
         armed = [self._family.armed(setup) for setup in setups]
@@ -91,7 +90,7 @@ class FeedbackColumns:
         self._expect()
 
     def _expect(self) -> None:
-        """Set what healthy servos answer: torque as it was switched, limits as they were armed."""
+        """Set the expected answers of healthy servos: torque as switched, limits as armed."""
         self._torque = (self._engaged,) * len(self._ids)
         armed = self._limits if self._engaged else {}
         self._expected: Expected = {"torque": tuple(map(int, self._torque)), **armed}
@@ -99,12 +98,12 @@ class FeedbackColumns:
     # --- an answer of all servos
 
     def apply_whole(self, group: GroupRead, raw: bytes, at_s: float) -> bool:
-        """Apply an answer of all servos in which none has any news but what it has measured.
+        """Apply an answer of all servos that contains only measurements and no errors.
 
         Args:
-            group: the read that it answers.
-            raw: the answer.
-            at_s: when it arrived.
+            group: Read that it answers.
+            raw: Bytes of the answer.
+            at_s: Time of its arrival, seconds.
 
         Returns:
             Whether it was applied; if not, it must be checked servo by servo.
@@ -123,7 +122,7 @@ class FeedbackColumns:
                 velocity = _signed(velocity, of_velocity)
             if max(effort) >= of_effort:
                 effort = _signed(effort, of_effort)
-        # Without torque a zero may be that of an indirect block without addresses.
+        # Without torque a zero may come from an indirect block without addresses.
         if not self._engaged and 0 in position and group.covers_torque:
             return False
         if self._turn and (min(position) < self._near_low or max(position) > self._near_high):
@@ -141,7 +140,7 @@ class FeedbackColumns:
         if max(load) > 1.0 or min(load) < -1.0:
             load = tuple([max(-1.0, min(1.0, share)) for share in load])
         torque = self._torque if group.covers_torque else now.torque
-        # Without the call of a function written in Python that the class itself would cost.
+        # Faster than a call of the class, whose __new__ is a Python function.
         self.now = tuple.__new__(
             Feedback,
             (
@@ -153,7 +152,7 @@ class FeedbackColumns:
         return True
 
     def _all_near(self, position: tuple[int, ...]) -> tuple[int, ...]:
-        """Return positions, whole turns added, nearest to their ranges."""
+        """Return positions with whole turns added, so that they are nearest to their ranges."""
         return tuple(
             [
                 nearest_turn(p, low, high, self._turn)
@@ -176,7 +175,7 @@ class FeedbackColumns:
         )
 
     def is_plausible(self, slot: int, reply: ServoReply) -> bool:
-        """Return whether one servo's answer is plausible; to be called once for every answer."""
+        """Return whether one servo's answer is plausible; call it once for every answer."""
         return self.places.one(slot, self._near(slot, reply.sample.position), reply.at_s)
 
     def confirmed(self, slot: int, first: ServoReply, second: ServoReply) -> ServoReply | None:
@@ -196,7 +195,7 @@ class FeedbackColumns:
         )
         if not alike:
             return None
-        # The middle of both, and the smaller of what nothing else can tell damage of.
+        # The mean of both; of values without another check, the smaller.
         return first._replace(
             sample=one._replace(
                 error=one.error & other.error,
@@ -210,7 +209,7 @@ class FeedbackColumns:
         )
 
     def take(self, slot: int, reply: ServoReply) -> None:
-        """Apply one servo's answer, which was accepted."""
+        """Apply one servo's accepted answer."""
         sample = reply.sample
         if sample.torque is not None:
             self.set_torque(slot, sample.torque == 1)
@@ -235,7 +234,7 @@ class FeedbackColumns:
         return None if slot in self.now.missing else self.now.position_steps[slot]
 
     def mark_rearmed(self, slot: int) -> None:
-        """Mark a servo's answer: plans begin where it is."""
+        """Mark a servo's answer: plans must begin at its position."""
         self.now = self.now._replace(rearmed=with_value(self.now.rearmed, slot, True))
 
     def name_fault(self, slot: int, fault: str) -> None:
@@ -247,7 +246,7 @@ class FeedbackColumns:
         self.now = self.now._replace(torque=with_value(self.now.torque, slot, on))
 
     def expect_torque(self, on: bool) -> None:
-        """Record that the torque has been switched for all."""
+        """Record that torque has been switched for all servos."""
         self._engaged = on
         self._expect()
         self.now = self.now._replace(torque=(on,) * len(self._ids))
@@ -267,7 +266,7 @@ class FeedbackColumns:
         self.now = self.now._replace(temperature_c=warm)
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
-        """Set the position of a servo that was just recovered and stands still."""
+        """Set the position of a servo that was just recovered and does not move."""
         near = self._near(slot, position)
         self.set_torque(slot, torque)
         self.places.place(slot, near, at_s)
@@ -275,10 +274,10 @@ class FeedbackColumns:
 
 
 def with_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Value, ...]:
-    """Return a column in which one servo has another value."""
+    """Return a column with a new value for one servo."""
     return (*column[:slot], value, *column[slot + 1 :])
 
 
 def _signed(column: tuple[int, ...], sign: int) -> tuple[int, ...]:
-    """Return a column whose sign is a bit of its own, of this value."""
+    """Return signed values of a column whose sign bit has the value ``sign``."""
     return tuple([value if value < sign else sign - value for value in column])

@@ -1,4 +1,4 @@
-"""Supervision of servos whose faults latch: an alert bit shows them, a restart ends them."""
+"""Supervision of servos with latched faults: an alert bit reports them, a restart clears them."""
 
 from collections.abc import Collection, Sequence
 from math import inf
@@ -9,14 +9,14 @@ from gazerig.drivers.servo_bus.supervisor import AGAIN_S, Supervisor
 from gazerig.drivers.servo_bus.torque import TRIPPED
 
 CHECK_S = 1.0
-"""So often one servo is asked whether it is still armed, each in turn."""
+"""Interval of the checks whether a servo is still armed; the servos take turns."""
 
 SLOW_S = 0.05
-"""So often one servo is asked for what a group reading does not cover, each in turn."""
+"""Interval of the reads of values that a group read does not cover; the servos take turns."""
 
 
 class LatchedFaultSupervisor(Supervisor):
-    """Supervisor of servos whose faults latch."""
+    """Supervisor of servos with latched faults."""
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -30,23 +30,23 @@ class LatchedFaultSupervisor(Supervisor):
         self.due_s = -inf
 
     def torque_enabled(self, entering: Collection[int]) -> None:
-        """Start the supervision under torque; ``entering``: servos outside their limits."""
+        """Start supervision under torque; ``entering``: servos outside their limits."""
         super().torque_enabled(entering)
-        self.due_s = -inf  # from now on one is checked in turn
+        self.due_s = -inf  # from now on the servos take turns
 
     def look_first(self) -> None:
         """Check servos that have just been prepared."""
         self._find_alerts(self._ids)
 
     def answers_again(self, servo_id: int) -> None:
-        """Check whether a servo that had been out of the group is still armed."""
+        """Check whether a servo that was out of the group is still armed."""
         if self.engaged:
             self._check(servo_id)
 
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
         """Check one servo's answer for faults and for lost torque or limits."""
         if sample.status:
-            # Damaged bytes may pass for a fault, which ends a run: the servo is asked once more.
+            # Damaged bytes may look like a fault, which ends a run: read the servo once more.
             if servo_id in self._health.latches:
                 self._latched(servo_id, sample.status)
             else:
@@ -82,10 +82,10 @@ class LatchedFaultSupervisor(Supervisor):
     # --- after every read
 
     def service(self, group: Collection[int], now_s: float) -> None:
-        """Do what is due after a read; servos that work again are recovered here.
+        """Do the tasks due after a read; servos that work again are recovered here.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         self._do_due(group, now_s)
         if self.entering.places:
@@ -101,7 +101,7 @@ class LatchedFaultSupervisor(Supervisor):
             self._name_at_s = now_s + AGAIN_S
             self._find_alerts(tuple(self._unnamed))
         if self.engaged and now_s >= self._check_at_s:
-            # A host that slept is noticed so.
+            # This also handles a host that slept.
             due = self._next_to_check(group, now_s + CHECK_S)
             if due is not None:
                 self._check(due)
@@ -116,7 +116,7 @@ class LatchedFaultSupervisor(Supervisor):
         )
 
     def _find_alerts(self, ids: Sequence[int]) -> None:
-        """Ask servos whether they have latched an error, and which."""
+        """Read the latched errors of servos."""
         found = self._line.ask(ids, self._family.error_register)
         self._unnamed.difference_update(found)
         latched = {servo_id: status for servo_id, status in found.items() if status}
@@ -126,20 +126,20 @@ class LatchedFaultSupervisor(Supervisor):
             for servo_id, torque in self._line.ask(tuple(latched), "torque_enable").items():
                 self._feedback.set_torque(self._slot[servo_id], bool(torque))
 
-    # --- asking in turn
+    # --- checks in rotation
 
     def _check(self, servo_id: int) -> None:
         """Check that a servo is still armed; a restart resets its RAM."""
         name, armed = ("bus_watchdog", self._watchdog) if self._watchdog else ("torque_enable", 1)
         state = self._line.ask((servo_id,), name).get(servo_id, armed)
         if state == TRIPPED:
-            # Where one has starved the others have too.
+            # If one servo has starved, the others have too.
             self._line.starved = True
         elif state != armed and servo_id not in self._health.faults:
             self._suspect(servo_id)
 
     def _ask_slow(self, group: Collection[int], now_s: float) -> None:
-        """Read torque, or voltage and temperature, of one servo; the next at the next time."""
+        """Read torque, or voltage and temperature, of one servo; the next call reads the next."""
         self._slow_at_s = now_s + SLOW_S
         self._slow = (self._slow + 1) % (2 * len(self._ids))
         slot, climate = divmod(self._slow, 2)

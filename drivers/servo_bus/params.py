@@ -1,10 +1,10 @@
-"""How to speak with the servos of one bus, whatever their make."""
+"""Communication parameters of a bus of any family."""
 
 from typing import Protocol
 
 
 class BusParams(Protocol):
-    """What a rig file chooses for a bus of any family."""
+    """Parameters that a rig file sets for a bus of any family."""
 
     @property
     def baud(self) -> int:
@@ -12,16 +12,16 @@ class BusParams(Protocol):
 
     @property
     def reply_timeout_ms(self) -> float:
-        """Longest time-out of an answer beyond its time on the wire."""
+        """Longest time-out of an answer beyond its time on the wire, ms."""
 
     @property
     def prompt_timeout_ms(self) -> float:
-        """Shortest time-out of an answer."""
+        """Shortest time-out of an answer, ms."""
 
     @property
     def give_up_s(self) -> float:
-        """How long port or servos may be gone."""
+        """Longest time without the port or any servo, seconds."""
 
     @property
     def watchdog_ms(self) -> int:
-        """Silence after which servos stop by themselves, 0 for never."""
+        """Silence after which the servos' own watchdog stops them, ms; 0 for never."""

@@ -1,4 +1,4 @@
-"""Supervision of servos whose faults come and go: every answer holds them, none latches."""
+"""Supervision of servos with transient faults: every answer contains them, none latches."""
 
 from collections.abc import Collection
 from typing import Any
@@ -9,17 +9,17 @@ from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 
 CHECK_S = 0.1
-"""On a disturbed line one servo's settings are compared so often, each in turn."""
+"""Interval of the comparisons of settings on a disturbed line; the servos take turns."""
 
 GONE_S = 1.0
-"""A fault is over when its bit has not been seen for so long: bits flicker at the threshold."""
+"""A fault has ended when its bit was absent for this time: bits flicker at the threshold."""
 
 RESTART_S = 0.1
-"""A servo that was silent for so long may have restarted: it gets no goals until it is set up."""
+"""Silence after which a servo may have restarted: it gets no goals until it is set up."""
 
 
 class PassingFaultSupervisor(Supervisor):
-    """Supervisor of servos whose faults come and go."""
+    """Supervisor of servos with transient faults."""
 
     withholds = True
 
@@ -33,34 +33,34 @@ class PassingFaultSupervisor(Supervisor):
 
     @property
     def at_ease(self) -> bool:
-        """Return whether nothing is known of any servo that an answer could change."""
+        """Return whether no servo has a condition that an answer could change."""
         doubts = self._torque_off or self._doubted or self._seen_s or self._health.faults
         return not (doubts or any(self._last_errors.values()))
 
     def torque_enabled(self, entering: Collection[int]) -> None:
-        """Begin to look after servos under torque; some of them are outside their limits."""
+        """Start supervision under torque; ``entering``: servos outside their limits."""
         super().torque_enabled(entering)
         self._torque_off.clear()
         self._doubted.clear()
-        # What was wrong of old is not: all have just taken their goals and their torque.
+        # Earlier faults have ended: all servos have just accepted goals and torque.
         for servo_id in [i for i in self._health.faults if i not in self._health.latches]:
             del self._health.faults[servo_id]
             self._name_fault(servo_id)
 
     def torque_disabled(self) -> None:
-        """Leave servos without torque alone."""
+        """Stop supervision, as the servos have no torque."""
         super().torque_disabled()
         self._torque_off.clear()
         self._doubted.clear()
 
     def look_first(self) -> None:
-        """Check servos that have just been prepared: every answer holds their faults."""
+        """Do nothing: every answer of servos that have just been prepared contains their faults."""
 
     def withheld(self, now_s: float) -> frozenset[int]:
         """Return the servos that must get no goals now.
 
-        Some firmware switches the torque on with a goal, so a servo that may have restarted, or is
-        without torque, is first given its present place.
+        Some firmware switches torque on with a goal, so a servo that may have restarted, or has no
+        torque, first gets its present position as goal.
         """
         out = self._out_since_s
         if not out and not self._suspects and not self._torque_off:
@@ -76,7 +76,7 @@ class PassingFaultSupervisor(Supervisor):
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
         """Check one servo's answer for faults and for lost torque or limits."""
         error = sample.error | (sample.status or 0)
-        # Damaged bytes may pass for a fault, which ends a run: it must be reported twice in a row.
+        # Damaged bytes may look like a fault, which ends a run: two consecutive reports are needed.
         confirmed = error & self._last_errors.get(servo_id, 0)
         self._last_errors[servo_id] = error
         if confirmed or servo_id in self._seen_s:
@@ -89,7 +89,7 @@ class PassingFaultSupervisor(Supervisor):
             self._check_torque(servo_id, sample)
 
     def record_out(self, out: Collection[int], now_s: float) -> None:
-        """Record who is out of the group now; who is back after long may have restarted."""
+        """Record the servos out of the group; one that returns after a while may have restarted."""
         for servo_id in [i for i in self._out_since_s if i not in out]:
             since_s = self._out_since_s.pop(servo_id)
             if self.engaged and now_s - since_s >= RESTART_S:
@@ -118,7 +118,7 @@ class PassingFaultSupervisor(Supervisor):
     def _name_bits(self, servo_id: int, bits: int) -> None:
         health = self._health
         if servo_id in health.faults and servo_id not in health.latches:
-            return  # something worse is known of it
+            return  # a worse fault is recorded
         if bits:
             health.name(servo_id, " and ".join(self._family.name_errors(bits)))
             health.latches.add(servo_id)
@@ -128,7 +128,7 @@ class PassingFaultSupervisor(Supervisor):
         self._name_fault(servo_id)
 
     def _check_far_side(self, servo_id: int, steps: int) -> None:
-        """See whether a joint has been turned back into its range by hand."""
+        """Check whether a joint was turned back into its range by hand."""
         if not self._recovery.is_lost(servo_id, steps):
             self._health.latches.add(servo_id)
             self._health.cleared(servo_id)
@@ -136,7 +136,7 @@ class PassingFaultSupervisor(Supervisor):
             self._suspects.add(servo_id)
 
     def _check_torque(self, servo_id: int, sample: Sample) -> None:
-        """Doubt a servo that does not seem armed as it was left: it is asked once more."""
+        """Mark a servo that seems no longer armed, to be read once more."""
         if sample.torque == 1 and self._is_armed(servo_id, sample):
             self._torque_off.discard(servo_id)
             self._doubted.discard(servo_id)
@@ -149,10 +149,10 @@ class PassingFaultSupervisor(Supervisor):
         return all(limit is None or getattr(sample, name) == limit for name, limit in wanted)
 
     def _look_again(self, group: Collection[int]) -> None:
-        """Ask those in doubt once more, and suspect who is not armed indeed.
+        """Read marked servos once more, and schedule recovery of those that are not armed.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         window = self._plan.armed
         if window is None:
@@ -166,29 +166,29 @@ class PassingFaultSupervisor(Supervisor):
                 if not self._known_reason(servo_id):
                     self._suspects.add(servo_id)
             elif not self._is_armed(servo_id, sample):
-                # A restart so short that it went unnoticed, and a goal that brought the torque.
+                # A restart too short to be noticed, after which a goal switched torque on.
                 self._suspects.add(servo_id)
 
     def _check_settings(self, group: Collection[int], now_s: float) -> None:
-        """On a disturbed line compare one servo's settings, the next at the next time.
+        """Compare one servo's settings on a disturbed line; the next servo at the next call.
 
-        An order that noise has changed may pass the sum of one byte and be written anywhere:
+        An instruction changed by noise may pass the one-byte checksum and overwrite any register:
         limits, gains, mode. A servo that differs is set up again at low speed.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         servo_id = self._next_to_check(group, now_s + CHECK_S)
         if servo_id is None:
             return
-        # The answers of a line that has just been in trouble do not tell the torque.
+        # Shortly after trouble on the line the answers do not contain torque.
         self._doubted.add(servo_id)
         if self._recovery.differs(servo_id):
             self._line.errors["setting changed"] += 1
             self._suspects.add(servo_id)
 
     def _known_reason(self, servo_id: int) -> bool:
-        """Return whether it is known why a servo has no torque."""
+        """Return whether the reason for a servo's lack of torque is known."""
         if servo_id not in self._health.faults:
             return False
         if servo_id not in self._health.latches:
@@ -198,10 +198,10 @@ class PassingFaultSupervisor(Supervisor):
     # --- after every read
 
     def service(self, group: Collection[int], now_s: float) -> None:
-        """Do what is due after a read; servos that are well again are taken here.
+        """Do the tasks due after a read; servos that work again are recovered here.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         disturbed = now_s - self._feedback.places.damaged_s <= DISTURBED_S
         if disturbed and self.engaged and now_s >= self._check_at_s:

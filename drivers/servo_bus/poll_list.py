@@ -1,24 +1,25 @@
-"""Who is asked in the group read, who is left out of it, and when to ask those again.
+"""Servos of the group read, servos removed from it, and times of the next attempts.
 
-Servos later in a group read wait for the ones before them, so one that keeps silent must
-leave the group at once; it is then asked alone, at once and after that ever more seldom.
+Later servos in a group read wait for the earlier ones, so a silent servo must leave the group
+immediately. It is then read alone, immediately and after that at increasing intervals.
 """
 
 from collections.abc import Collection, Sequence
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
-"""Time between attempts at a servo that stays silent: doubled from the first to the last."""
+"""Interval of attempts to read a silent servo: doubled from the first to the last value."""
 
 DAMAGED_IN_A_ROW = 3
-"""A servo whose answers arrive damaged so often costs every read its time limit: out."""
+"""Consecutive damaged answers after which a servo leaves the group, as it costs every read its time
+limit."""
 
 
 class PollList:
-    """The servos by id, in the order of the bus.
+    """List of the servos to read, by id, in the order of the bus.
 
-    group: those asked together
+    group: ids that are read together
     troubled: whether a servo is out of the group or has answered badly recently
-    garbling: those who are out because what they answer arrives damaged
+    garbling: ids of servos out of the group because their answers arrive damaged
     """
 
     def __init__(self, ids: Sequence[int]) -> None:
@@ -32,17 +33,17 @@ class PollList:
 
     @property
     def out(self) -> tuple[int, ...]:
-        """Name those who are out of the group."""
+        """Return the ids of servos out of the group."""
         return tuple(self._due_s)
 
     def due(self, now_s: float) -> int | None:
-        """Name one servo to be asked alone now; where all are out there is always one."""
+        """Return a servo to be read alone now; if all are out there is always one."""
         waiting = self._due_s
         ready = [i for i, due_s in waiting.items() if due_s <= now_s or not self.group]
         return min(ready, key=waiting.__getitem__, default=None)
 
     def silent(self, servo_id: int, now_s: float) -> None:
-        """Record that a servo did not answer; one that is new to that is due at once."""
+        """Record that a servo did not answer; it is due immediately the first time."""
         if servo_id in self._due_s:
             wait_s = self._wait_s.get(servo_id, AGAIN_FIRST_S)
             self._due_s[servo_id] = now_s + wait_s
@@ -68,7 +69,7 @@ class PollList:
             return False
         self._wait_s.pop(servo_id, None)
         if not self.group:
-            # The whole line was dead and is back: no reason to let the others wait.
+            # The whole line has recovered: the other servos need not wait.
             self._due_s.clear()
             self._wait_s.clear()
         self._regroup()
@@ -80,10 +81,10 @@ class PollList:
 
 
 def silent_servos(ids: Sequence[int], answered: Collection[int]) -> tuple[int, ...]:
-    """Name the servos that kept silent of their own accord.
+    """Return the servos that were silent without being blocked by another.
 
-    A servo waits for the one before it, so behind the last one heard only the first is
-    to blame; what is missing before the last one heard has no other cause.
+    A servo waits for the one before it. So after the last answer only the first missing servo is to
+    blame, while every servo missing before the last answer was silent itself.
     """
     missing = [i for i, servo_id in enumerate(ids) if servo_id not in answered]
     last_heard = max((i for i, servo_id in enumerate(ids) if servo_id in answered), default=-1)

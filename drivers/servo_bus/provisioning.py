@@ -1,7 +1,7 @@
-"""Bringing servos into the state the driver needs.
+"""Settings of servos: comparison with the required values, and correction.
 
-Registers are written only where they differ: the EEPROM wears out, and a write to it needs the
-torque off, or a lock opened and closed again. Every write is noted in the log.
+Only registers that differ are written: EEPROM wears out, and a write to it requires torque off, or
+a lock to be opened and closed. Every write is logged.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ from gazerig.drivers.types import ServoConfig
 
 
 class Difference(NamedTuple):
-    """A register of a servo that is not as it should be."""
+    """A register of a servo with a wrong value."""
 
     servo_id: int
     register: Register
@@ -26,14 +26,14 @@ class Difference(NamedTuple):
 
 
 class Provisioning:
-    """Compares servos with what they should be, and makes them so.
+    """Comparison and correction of servo settings.
 
     Args:
-        line: the bus, for groups of servos.
-        registers: the bus, for single servos.
-        setups: the servos.
-        log: notes every write.
-        block: what their indirect blocks hold, None where there are none.
+        line: Exchanges with groups of servos.
+        registers: Exchanges with single servos.
+        setups: The servos.
+        log: Records every write.
+        block: Addresses of their indirect blocks, None if there are none.
     """
 
     def __init__(
@@ -51,18 +51,18 @@ class Provisioning:
         self.set_target(setups)
 
     def set_target(self, setups: Sequence[ServoConfig]) -> None:
-        """Set what servos should be like from now on."""
+        """Set the required settings."""
         self._setups = {setup.id: setup for setup in setups}
         self._wanted = {setup.id: self._family.wanted(setup) for setup in setups}
 
     def apply(self, ids: Sequence[int]) -> None:
-        """Bring servos into position mode with their limits, speeds and gains.
+        """Set servos to position mode with their limits, speeds and gains.
 
-        Takes the torque away from those whose EEPROM differs.
+        Torque is switched off on servos whose EEPROM differs.
 
         Raises:
-            ServoMissing: a servo does not answer, or does not take a setting.
-            BusLost: the port is gone.
+            ServoMissing: a servo does not answer or rejects a setting.
+            BusLost: the port is lost.
         """
         differences = self.differences(ids)
         if differences:
@@ -74,12 +74,12 @@ class Provisioning:
             self._map(ids, self._block)
 
     def disable(self, ids: Sequence[int]) -> None:
-        """Make servos answer every order; torque and bus watchdog off, where they are not.
+        """Make servos answer every instruction, and switch torque and bus watchdog off.
 
         Raises:
             ServoMissing: a servo does not answer.
         """
-        # A servo may be set to answer questions alone; this takes no answer and ends that.
+        # A servo may be set to answer only reads; this write needs no answer and changes that.
         self._registers.write_all(ids, "status_return_level", self._family.answer_level)
         watchdog = () if self._family.watchdog_unit_s is None else ("bus_watchdog",)
         for name in ("torque_enable", *watchdog):
@@ -89,7 +89,7 @@ class Provisioning:
             self._correct([Difference(i, register, on, 0) for i, on in found.items() if on])
 
     def differences(self, ids: Sequence[int]) -> list[Difference]:
-        """Read servos and return what is not as it should be.
+        """Read servos and return the registers with wrong values.
 
         Raises:
             ServoMissing: a servo does not answer.
@@ -127,7 +127,7 @@ class Provisioning:
         return different
 
     def _correct(self, differences: Sequence[Difference]) -> None:
-        """Write what differs, EEPROM without torque and with the lock open."""
+        """Write the registers that differ; EEPROM without torque and with the lock open."""
         lock = self._family.lock
         kept = [d.servo_id for d in differences if lock is None or d.register.area == "eeprom"]
         for servo_id in dict.fromkeys(kept):
@@ -145,7 +145,7 @@ class Provisioning:
                 self._write(servo_id, str(lock), 1)
 
     def _write(self, servo_id: int, name: str, value: int) -> bool:
-        """Write a register; True if the servo has taken it.
+        """Write a register; return whether the servo accepted it.
 
         Raises:
             ServoMissing: it does not answer.
@@ -156,7 +156,7 @@ class Provisioning:
         return written
 
     def _map(self, ids: Sequence[int], block: AddressMap) -> None:
-        """Lay the indirect block out where it is not yet."""
+        """Write the indirect addresses that differ."""
         for servo_id, data in self._addresses(ids, block).items():
             if data != block.data:
                 self._registers.write_bytes(servo_id, block.address, block.data)
@@ -175,7 +175,7 @@ class Provisioning:
         return found
 
     def _refuse(self, differences: Sequence[Difference]) -> None:
-        """Raise what is still not as it should be."""
+        """Raise an error for registers that still have wrong values."""
         if not differences:
             return
         named = "; ".join(

@@ -1,4 +1,4 @@
-"""How all servos of a bus are read: made by the family once the servos' firmware is known."""
+"""Plan of the reads of a bus, created by the family once the servos' firmware is known."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -8,21 +8,21 @@ from gazerig.drivers.servo_bus.sync_packets import GroupRead
 
 
 class AddressMap(NamedTuple):
-    """Addresses that a servo's indirect block must hold, as bytes from ``address`` on."""
+    """Addresses that a servo's indirect block must contain, as bytes from ``address`` on."""
 
     address: int
     data: bytes
 
 
 class ReadPlan(NamedTuple):
-    """Windows and packets.
+    """Read windows and packets.
 
-    together, alone: of the reading of all servos, and of servos that are asked alone
-    second: of readings that confirm others, and have other lengths than they
-    packets: makes the read of some servos with a window, where it is not a plain sync read
+    together, alone: windows for reads of all servos, and of servos that are read alone
+    second: windows for confirming reads, of other lengths than the first reads
+    packets: creates the read of some servos with a window, if it is not a plain sync read
     armed: window with torque and limits, to check that a servo is still armed
-    covered: every reading holds torque and faults
-    block: what indirect blocks must hold, None where there are none
+    covered: whether every read contains torque and faults
+    block: required contents of indirect blocks, None if there are none
     """
 
     together: WindowSchedule

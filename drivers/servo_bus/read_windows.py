@@ -1,9 +1,9 @@
-"""Which registers one reading covers, byte by byte, and which reading comes next.
+"""Registers that a read covers, byte by byte, and the order of reads.
 
-An answer says neither which registers it is of nor when it was asked for; its length is all
-there is to tell it by. So two readings in a row never have the same length, and after trouble
-they have other lengths for a while, each its own: a line that says its last answer again, or
-one answer too late, is not taken at its word.
+An answer contains neither its registers nor the time of its request; only its length identifies it.
+So two consecutive reads never have the same length, and after trouble they have other, distinct
+lengths for a while. A line that repeats its last answer, or delivers it one read too late, is
+therefore not believed.
 """
 
 import re
@@ -12,20 +12,20 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 CALM_S = 0.25
-"""So long after the last trouble no answer is late any more."""
+"""Time after the last trouble beyond which no answer is late any more."""
 
 KNOWN = ("torque", "status", "acceleration", "torque_limit")
-"""Fields whose values are known of a healthy servo: no fault, the rest as it was written."""
+"""Fields with known values in a healthy servo: no fault, the others as written."""
 
 
 class Sample(NamedTuple):
-    """One servo's answer in register units; None where the reading did not cover it.
+    """One servo's answer in register units; None for fields that the read did not cover.
 
     error: error byte of the answer
-    effort: present load or current, whichever the servo measures
-    status: the register that has what ails the servo
-    acceleration, torque_limit: as they were written before the torque came on
-    blank: every byte is zero, as in an indirect block whose addresses are lost
+    effort: present load or current, depending on the servo
+    status: register of the servo's faults
+    acceleration, torque_limit: values written before torque was switched on
+    blank: whether every byte is zero, as in an indirect block whose addresses are lost
     """
 
     error: int
@@ -42,7 +42,7 @@ class Sample(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """Slices of a whole answer: one number a servo, in the order asked; None where not read."""
+    """Slices of a complete answer: one number per servo in request order; None if not read."""
 
     position: slice
     velocity: slice
@@ -52,11 +52,11 @@ class Columns(NamedTuple):
 
 
 class ReadWindow(NamedTuple):
-    """Bytes read from every servo: where they are, and what they mean.
+    """Bytes read from every servo: their address and meaning.
 
-    layout: struct codes of all ``length`` bytes; order: of the bytes of a number
+    layout: struct codes of all ``length`` bytes; order: byte order of a number
     fields: names of the numbers, as in ``Sample``
-    signs: fields whose sign is a bit of its own, and that bit
+    signs: fields with a separate sign bit, and that bit
     """
 
     address: int
@@ -74,28 +74,28 @@ class ReadWindow(NamedTuple):
         return Sample(error, **values, blank="torque" in values and not any(data))
 
     def codes(self) -> Iterator[tuple[str, str]]:
-        """Yield the struct code of every number and its field, "" for bytes without a meaning."""
+        """Yield the struct code of every number and its field, "" for unused bytes."""
         names = iter(self.fields)
         for code in re.findall(r"\d*x|[a-zA-Z]", self.layout):
             yield code, "" if code.endswith("x") else next(names)
 
     def measured(self) -> tuple[str, ...]:
-        """Return the fields of which no servo's answer is known beforehand."""
+        """Return the fields whose values are not known in advance."""
         return tuple(name for name in self.fields if name not in KNOWN)
 
     def columns(self, stride: int) -> Columns:
-        """Return the slices of the measured fields in a tuple of ``stride`` numbers a servo."""
+        """Return the slices of the measured fields in a tuple of ``stride`` numbers per servo."""
         return Columns(**{name: slice(i, None, stride) for i, name in enumerate(self.measured())})
 
 
 class WindowSchedule:
-    """Chooses the next window: the usual ones in turn, after a missing answer others for a while.
+    """Order of windows: the usual ones in rotation, spare ones for a while after a missing answer.
 
     Args:
-        usual: neighbours, and the first and last, have different lengths.
-        spare: no two alike; two of them take turns after each trouble, then the next two.
+        usual: Windows; neighbours, and the first and last, have different lengths.
+        spare: Windows of different lengths; two alternate after each trouble, then the next two.
 
-    troubled: whether the spare ones are read
+    troubled: whether the spare windows are read
     """
 
     def __init__(self, usual: Iterable[ReadWindow], spare: Iterable[ReadWindow]) -> None:
@@ -105,7 +105,7 @@ class WindowSchedule:
         self.troubled = False
 
     def next(self) -> ReadWindow:
-        """Return the window of the next reading."""
+        """Return the window of the next read."""
         if self.troubled:
             self._odd ^= 1
             return self._spare[(self._pair + self._odd) % len(self._spare)]
@@ -115,18 +115,18 @@ class WindowSchedule:
         return self._usual[self._at]
 
     def trouble(self, now_s: float) -> None:
-        """Record that an answer stayed out: the next readings have other lengths."""
+        """Record that an answer is missing: the next reads have other lengths."""
         self.troubled = True
         self._pair, self._odd = (self._pair + 2) % len(self._spare), 1
         self._calm_at_s = now_s + CALM_S
 
     def calm(self, now_s: float) -> None:
-        """Return to the usual windows when nothing can be late any more."""
+        """Return to the usual windows once no answer can be late any more."""
         if now_s >= self._calm_at_s:
             self.troubled = False
 
 
 def from_sign_magnitude(raw: int, sign: int) -> int:
-    """Return the number that a magnitude with its sign in bit ``sign`` stands for."""
+    """Return the signed value of a magnitude whose sign is in bit ``sign``."""
     magnitude = raw & (1 << sign) - 1
     return -magnitude if raw >> sign & 1 else magnitude

@@ -1,7 +1,7 @@
-"""Bringing servos back that have restarted, or whose bus had been gone.
+"""Recovery of servos that have restarted, or whose bus was lost.
 
-Nothing that was written to them before is relied on: settings are compared again, the goal
-becomes the present position, and only then comes the torque.
+Nothing written to them before is relied on: settings are compared again, the goal becomes the
+present position, and only then is torque switched on.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -16,19 +16,19 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import ServoConfig
 
-FAR_SIDE = "stands beyond its encoder's zero: turn it into its range by hand"
+FAR_SIDE = "is beyond its encoder's zero: turn it into its range by hand"
 
 
 class Recovery:
-    """Sets servos up again while others run.
+    """Recovery of servos while others run.
 
     Args:
-        line: the bus.
-        provisioning: what its servos must be like.
-        setups: the servos by id.
-        watchdog: Bus Watchdog to arm, in its units; 0 for none.
-        health: records the faults found.
-        log: gets the events.
+        line: Exchanges on the bus.
+        provisioning: Settings of its servos.
+        setups: The servos by id.
+        watchdog: Value of Bus Watchdog, in its units; 0 for none.
+        health: Records the faults found.
+        log: Records events.
     """
 
     def __init__(
@@ -49,15 +49,16 @@ class Recovery:
         self._said = ""
 
     def recover(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
-        """Set servos up as at the start, holding where they are if ``engaged``.
+        """Set servos up as at the start, holding their positions if ``engaged``.
 
-        Returns the position of each that is well again; None where something failed and
-        should be tried again.
+        Returns:
+            The position of each recovered servo by id; None if a step failed and should be tried
+            again.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
-        # Others are waiting: what fails is tried again later, not at once.
+        # Other servos are waiting: failures are tried again later, not immediately.
         before, self._line.tries = self._line.tries, 1
         try:
             return self._recover(ids, engaged, now_s)
@@ -65,10 +66,10 @@ class Recovery:
             self._line.tries = before
 
     def differs(self, servo_id: int) -> bool:
-        """Return whether a servo's settings are not as they should be; a silent one's may be.
+        """Return whether a servo's settings are wrong; False for a silent servo.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         try:
             return bool(self._provisioning.differences((servo_id,)))
@@ -108,12 +109,12 @@ class Recovery:
         return found
 
     def _same_models(self, ids: tuple[int, ...]) -> tuple[int, ...]:
-        """Leave out servos of another model than before."""
+        """Return the servos whose model has not changed."""
         expected = {i: self._family.models[self._setups[i].model].number for i in ids}
         numbers = self._line.ask(ids, "model_number")
         others = [i for i, n in numbers.items() if n != expected[i]]
         if others:
-            # Damaged bytes may pass for another model: who has been exchanged says so twice.
+            # Damaged bytes may look like another model: an exchanged servo reports it twice.
             again = self._line.ask(others, "model_number")
             numbers = {i: n for i, n in numbers.items() if i not in others or again.get(i) == n}
         for servo_id in numbers:
@@ -123,9 +124,9 @@ class Recovery:
         return tuple(i for i in ids if numbers.get(i) == expected[i])
 
     def _without_faults(self, ids: tuple[int, ...], torque: Mapping[int, int]) -> tuple[int, ...]:
-        """Leave out servos whose errors deny them their torque: the others would wait for them.
+        """Return the servos whose errors do not prevent torque: the others would delay them.
 
-        torque: of each servo that is to have its torque
+        torque: torque, on or off, of each servo that must have it
         """
         family = self._family
         found = find_faults(self._line, ids)
@@ -137,7 +138,7 @@ class Recovery:
         return tuple(i for i in ids if i not in denied or torque.get(i, 1))
 
     def _on_this_side(self, ids: tuple[int, ...]) -> tuple[int, ...]:
-        """Leave those without torque that would go the wrong way round into their range.
+        """Switch servos off that would move in the wrong direction; return the others.
 
         Raises:
             ServoMissing: a servo does not answer.
@@ -147,7 +148,7 @@ class Recovery:
         present = dict(zip(ids, positions(self._line, ids), strict=True))
         astray = [i for i in ids if self.is_lost(i, present[i])]
         if astray:
-            # Damaged bytes may pass for such a place.
+            # Damaged bytes may look like such a position.
             again = dict(zip(astray, positions(self._line, astray), strict=True))
             astray = [i for i in astray if self.is_lost(i, again[i])]
         for servo_id in astray:
@@ -157,18 +158,21 @@ class Recovery:
         return tuple(i for i in ids if i not in astray)
 
     def is_lost(self, servo_id: int, steps: int) -> bool:
-        """Return whether a servo that counts ``steps`` would go the wrong way into its range."""
+        """Return whether a servo at ``steps`` would move into its range in the wrong direction."""
         setup = self._setups[servo_id]
         turn = self._family.steps_per_turn
         return nearest_turn(steps, setup.min_steps, setup.max_steps, turn) != steps
 
     def enable(self, ids: Sequence[int]) -> tuple[tuple[int, ...], set[int]]:
-        """Set goals to the present positions, clipped to the limits, then torque on.
+        """Set goals to the present positions, clipped to the limits, then switch torque on.
 
-        Those outside their limits come inside slowly. Returns the goals, and who is outside.
+        Servos outside their limits move inside slowly.
+
+        Returns:
+            The goals in steps, and the ids of the servos outside.
 
         Raises:
-            ServoMissing: a servo does not answer or does not take its goal.
+            ServoMissing: a servo does not answer or rejects its goal.
             ServoFault: a servo refuses its torque, or has lost its zero.
         """
         line, family = self._line, self._family
@@ -190,7 +194,7 @@ class Recovery:
         return tuple(goals), outside
 
     def _refuse_lost(self, ids: Sequence[int], present: Sequence[int]) -> None:
-        """See that no servo would go the wrong way round into its range.
+        """Check that no servo would move into its range in the wrong direction.
 
         Raises:
             ServoFault: one would.
@@ -199,8 +203,8 @@ class Recovery:
             if self.is_lost(servo_id, steps):
                 low, high = self._setups[servo_id].min_steps, self._setups[servo_id].max_steps
                 raise ServoFault(
-                    f"{self._line.label(servo_id)} stands at {steps}, beyond its encoder's zero, and "
-                    f"would go the long way round into {low}..{high}: turn it in there by hand"
+                    f"{self._line.label(servo_id)} is at {steps}, beyond its encoder's zero, and "
+                    f"would go the long way round into {low}..{high}: turn it into that range by hand"
                 )
 
     def _accelerations(self, ids: Sequence[int]) -> list[int]:
@@ -208,7 +212,7 @@ class Recovery:
         return [units(self._setups[i].max_accel_steps_s2) for i in ids]
 
     def speeds(self, ids: Sequence[int], outside: Collection[int]) -> list[int]:
-        """Return limits of speed in register units, slow for those outside their limits."""
+        """Return speed limits in register units, slow for servos outside their limits."""
         turn, units = self._family.steps_per_turn, self._family.speed_units
         setups = [self._setups[i] for i in ids]
         return [
@@ -217,6 +221,6 @@ class Recovery:
         ]
 
     def clip(self, servo_id: int, steps: int) -> int:
-        """Keep a goal inside a servo's limits."""
+        """Return a goal clipped to a servo's limits."""
         setup = self._setups[servo_id]
         return min(max(steps, setup.min_steps), setup.max_steps)

@@ -1,4 +1,4 @@
-"""Single registers of single servos: for all that is not done every tick."""
+"""Access to single registers of single servos, for tasks outside the tick."""
 
 from collections.abc import Iterable, Sequence
 
@@ -11,23 +11,23 @@ REPLY_S = 0.04
 """Time-out for one servo: the longest return delay and two turns of a 16 ms latency timer."""
 
 LATE_S = 0.15
-"""No answer is later than so long after waiting for it has ended."""
+"""Longest delay of an answer after its time-out."""
 
 ROOM = 4096
 LONGEST = 1024
-"""A line that babbles is not listened to for longer than so many bytes."""
+"""Largest number of bytes read from a line that never falls silent."""
 
 
 class Registers:
-    """Single registers by name; every exchange is tried three times.
+    """Registers of servos by name; every exchange is tried three times.
 
     Args:
-        port: open at the servos' baud rate.
-        family: the make of the servos.
-        tries: how often a servo that does not answer is asked.
+        port: Port, open at the servos' baud rate.
+        family: Family of the servos.
+        tries: Number of attempts for a silent servo.
 
     error: error byte of the newest answer
-    refusal: error number of the newest exchange that was refused, 0 where it was not
+    refusal: error number of the newest exchange if it was refused, otherwise 0
     """
 
     def __init__(self, port: BusPort, family: Family, tries: int = TRIES) -> None:
@@ -37,28 +37,28 @@ class Registers:
         self.error = self.refusal = 0
 
     def identify(self, servo_id: int) -> Identity | None:
-        """Return what a servo calls itself, None where it does not answer."""
+        """Return a servo's model and firmware, None if it does not answer."""
         codec = self._family.codec
         status = self._exchange(servo_id, codec.identify(servo_id), codec.IDENTITY_LENGTH)
         return None if status is None else codec.identity(status)
 
     def read(self, servo_id: int, name: str) -> int | None:
-        """Return a register's value, None where no good answer came."""
+        """Return a register's value, None without a good answer."""
         register = self._family.registers[name]
         data = self.read_bytes(servo_id, register.address, register.size)
         return None if data is None else register.decode(data)
 
     def read_bytes(self, servo_id: int, address: int, length: int) -> bytes | None:
-        """Return bytes of the table, None where no good answer came."""
-        # Where a question's echo looks like an answer the answer must be of another length.
+        """Return bytes of the table, None without a good answer."""
+        # If a request's echo looks like an answer, another length must be requested.
         asked = length + (length == self._family.codec.ECHO_LENGTH)
         status = self._exchange(servo_id, self._family.codec.read(servo_id, address, asked), asked)
         return None if status is None else status.params[:length]
 
     def read_many(self, servo_id: int, names: Iterable[str]) -> dict[str, int | None]:
-        """Return values by name; registers that lie side by side are read together.
+        """Return values by name; adjacent registers are read together.
 
-        None where no good answer came. A servo that falls silent is asked nothing more.
+        The value is None without a good answer. A servo that falls silent is not read further.
         """
         values: dict[str, int | None] = dict.fromkeys(names)
         for span in side_by_side(self._family, values):
@@ -83,19 +83,22 @@ class Registers:
         return self._exchange(servo_id, request, 0, insist=True) is not None
 
     def write_all(self, ids: Sequence[int], name: str, value: int) -> None:
-        """Write one value to a register of several servos at once, unconfirmed."""
+        """Write one value to a register of several servos with one packet, unconfirmed."""
         register = self._family.registers[name]
         rows = [register.encode(value)] * len(ids)
         self._port.write(self._family.codec.sync_write(ids, register.address, register.size, rows))
 
     def settle(self, servo_id: int, name: str, value: int) -> bool:
-        """Write a register only where it differs; return whether it now has the value."""
+        """Write a register only if it differs; return whether it now has the value."""
         return self.read(servo_id, name) == value or self.write(servo_id, name, value)
 
     def write_lasting(self, servo_id: int, name: str, value: int) -> bool:
-        """Write a register so that it outlives the power, where it is one that can.
+        """Write a register so that an EEPROM value survives a loss of power.
 
-        A lock is open for this alone. Returns whether the servo has the value.
+        The lock, if any, is open only during the write.
+
+        Returns:
+            Whether the servo has the value.
         """
         lock = self._family.lock
         if lock is None or self._family.registers[name].area != "eeprom":
@@ -109,7 +112,7 @@ class Registers:
     def _exchange(
         self, servo_id: int, request: bytes, length: int, insist: bool = False
     ) -> Status | None:
-        """Send a request until a good answer comes; ``insist``: also after a refusal."""
+        """Send a request until a good answer arrives; ``insist``: also after a refusal."""
         for _ in range(self._tries):
             self._let_late_ones_pass(servo_id)
             self._port.clearPort()
@@ -128,9 +131,9 @@ class Registers:
         return None
 
     def _let_late_ones_pass(self, servo_id: int) -> None:
-        """Wait until no answer to an earlier question can come any more.
+        """Wait until no answer to an earlier request can arrive any more.
 
-        An answer does not name its register.
+        An answer does not contain the address of its register.
         """
         until_s = self._late_until_s.pop(servo_id, None)
         if until_s is not None:
@@ -139,7 +142,7 @@ class Registers:
 
 
 def side_by_side(family: Family, names: Iterable[str]) -> list[list[Register]]:
-    """Return registers in groups that one question can read: no byte between belongs to none."""
+    """Return registers in groups that one request can read: without unused bytes between them."""
     known = {
         address
         for one in family.registers.values()
@@ -165,18 +168,18 @@ def transact(
 ) -> tuple[bytes, Status | None]:
     """Send a request to one servo and wait for its answer.
 
-    Noise, echoes, answers of other servos and of another length are passed over.
+    Noise, echoes, and answers of other servos or of another length are skipped.
 
     Args:
-        port: open.
-        family: the make of the servo.
-        request: the packet.
-        length: of the answer's params.
-        timeout_s: time-out beyond the time on the wire, s.
-        servo_id: who must answer; None for any servo.
+        port: Open port.
+        family: Family of the servo.
+        request: Packet to send.
+        length: Number of params of the answer.
+        timeout_s: Time-out in addition to the time on the wire, seconds.
+        servo_id: Id of the servo that must answer; None for any.
 
     Returns:
-        All that came, and the answer; None where none came.
+        All received bytes, and the answer or None.
     """
     codec = family.codec
     port.write(request)

@@ -1,4 +1,4 @@
-"""Supervision of servos between the exchanges, independent of how a family reports faults."""
+"""Supervision of servos between the exchanges, independent of a family's fault reports."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
@@ -16,24 +16,24 @@ from gazerig.drivers.servo_bus.transaction import TRIES, Transactions
 from gazerig.drivers.types import ServoConfig
 
 AGAIN_S = 0.25
-"""Time between attempts to set a servo up again, or to learn what an alert is about."""
+"""Time between attempts to set a servo up again, or to read the cause of an alert."""
 
 
 class Supervisor(ABC):
-    """What is done about the servos' health.
+    """Supervisor of the servos' health.
 
     Args:
-        line: the bus.
-        setups: the servos by id.
-        recovery: sets them up again.
-        health: their faults.
-        feedback: what is known of them.
-        plan: how they are read.
-        watchdog: Bus Watchdog that is armed, in its units; 0 for none.
+        line: Exchanges on the bus.
+        setups: The servos by id.
+        recovery: Sets them up again.
+        health: Their faults.
+        feedback: Their feedback.
+        plan: Plan of their reads.
+        watchdog: Armed value of Bus Watchdog, in its units; 0 for none.
 
-    engaged: the torque is on
-    entering: servos on their slow way into their limits
-    withholds: whether it may ever withhold goals
+    engaged: whether torque is on
+    entering: servos that move slowly into their limits
+    withholds: whether the supervisor may ever withhold goals
     due_s: ``service`` has nothing to do before this time
     """
 
@@ -69,11 +69,11 @@ class Supervisor(ABC):
 
     @property
     def at_ease(self) -> bool:
-        """Return whether nothing is known of any servo that an answer could change."""
+        """Return whether no servo has a condition that an answer could change."""
         return True
 
     def torque_enabled(self, entering: Collection[int]) -> None:
-        """Begin to look after servos under torque; some of them are outside their limits."""
+        """Start supervision under torque; ``entering``: servos outside their limits."""
         self.engaged = True
         self.entering.begin(entering)
         self._suspects.clear()
@@ -83,7 +83,7 @@ class Supervisor(ABC):
         self._feedback.places.forget()
 
     def torque_disabled(self) -> None:
-        """Leave servos without torque alone."""
+        """Stop supervision, as the servos have no torque."""
         self.engaged = False
         self.entering.clear()
         self._suspects.clear()
@@ -92,7 +92,7 @@ class Supervisor(ABC):
         self._feedback.expect_torque(False)
 
     def mark_all_for_recovery(self) -> None:
-        """Trust no servo to be as it was left."""
+        """Mark every servo for recovery."""
         self._suspects.update(self._ids)
         self._recover_at_s = -inf
         self._feedback.places.forget()
@@ -107,10 +107,10 @@ class Supervisor(ABC):
 
     @abstractmethod
     def service(self, group: Collection[int], now_s: float) -> None:
-        """Do what is due after a read from ``due_s`` on; servos that are well again are taken here.
+        """Do the tasks due after a read from ``due_s`` on; recover servos that work again.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
 
     def withheld(self, now_s: float) -> frozenset[int]:
@@ -118,17 +118,17 @@ class Supervisor(ABC):
         return frozenset()
 
     def answers_again(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
-        """Check a servo that had been out of the group."""
+        """Check a servo that was out of the group."""
 
     def record_out(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
-        """Record who is out of the group now."""
+        """Record the servos that are out of the group."""
 
     # --- servos to be set up again
 
     def _recover(self, group: Collection[int], now_s: float) -> None:
-        """Set up again who may have restarted and answers; tried again later where that fails.
+        """Set up servos again that may have restarted and answer; try again later after a failure.
 
-        After a failure each is set up alone, in turn: one that fails keeps no other waiting.
+        After a failure each is set up alone, so that no other servo waits for the failing one.
         """
         ids = tuple(i for i in self._ids if i in self._suspects and i in group)
         if not ids:
@@ -161,10 +161,10 @@ class Supervisor(ABC):
                 self.entering.add_outside(servo_id, position)
 
     def _recovered(self, servo_id: int) -> None:  # noqa: B027  # most have nothing to add
-        """Forget what was thought of a servo that is well again."""
+        """Clear the state of a servo that works again."""
 
     def recover_tripped(self, group: Iterable[int]) -> None:
-        """Bring servos back whose own watchdog has stopped them."""
+        """Rearm servos that were stopped by their own watchdog."""
         self._line.starved = False
         ids = tuple(group)
         if not ids:
@@ -183,7 +183,7 @@ class Supervisor(ABC):
         self._feedback.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
 
     def _next_to_check(self, group: Collection[int], again_s: float) -> int | None:
-        """Return the servo whose turn it is, None where it is out of the group."""
+        """Return the next servo in rotation, None if it is out of the group."""
         self._check_at_s = again_s
         self._checked = (self._checked + 1) % len(self._ids)
         servo_id = self._ids[self._checked]
@@ -192,7 +192,7 @@ class Supervisor(ABC):
     # --- marks on answers
 
     def _mark_rearmed(self) -> None:
-        """Mark the first feedback of servos whose torque came on again."""
+        """Mark the first feedback of servos whose torque was switched on again."""
         for servo_id in tuple(self._rearmed):
             slot = self._slot[servo_id]
             if self._feedback.position(slot) is not None:
@@ -200,7 +200,7 @@ class Supervisor(ABC):
                 self._feedback.mark_rearmed(slot)
 
     def _mark_entering(self, now_s: float) -> None:
-        """Mark the feedback of servos moving slowly into limits; restore speed on arrival."""
+        """Mark the feedback of servos that enter their limits slowly; restore speed on arrival."""
         for slot, servo_id in enumerate(self._ids):
             if servo_id not in self.entering:
                 continue
@@ -214,7 +214,7 @@ class Supervisor(ABC):
         """Restore a servo's full speed, with its next goal or by a write; return whether it has it.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         if self._family.goal_speed:
             return True

@@ -1,8 +1,8 @@
-"""Sync reads with everything fixed beforehand: one status a servo, in the order asked.
+"""Prepared sync reads: one status per servo, in the order of the request.
 
-Where the whole answer is right and no servo has anything to report, one comparison and one
-unpacking give all values; otherwise what can be proved right is taken out piece by piece, so that a
-bad servo costs only itself.
+If the whole answer is intact and no servo reports an error, one comparison and one unpacking return
+all values. Otherwise the parts that can be verified are extracted one by one, so that a faulty
+servo affects only itself.
 """
 
 import struct
@@ -15,16 +15,16 @@ Values = tuple[Any, ...]
 """The measured numbers of a whole answer; ``columns`` maps them to servos."""
 
 Expected = Mapping[str, Sequence[int | None]]
-"""Known fields of the answers of healthy servos, a value a servo; None: anything will do."""
+"""Known fields of the answers of healthy servos, one value per servo; None accepts any value."""
 
 
 class PartialReply(NamedTuple):
-    """What could be saved of an answer.
+    """Verified parts of an answer.
 
-    samples: proved values by id
-    damaged: servos whose bytes were spoilt
-    unproved: servos whose bytes cannot be judged because of a damaged one before them
-    stray: bytes came that are of no right answer, and an answer is missing
+    samples: verified values by id
+    damaged: servos whose bytes were damaged
+    unproved: servos whose bytes cannot be verified because of a damaged answer before them
+    stray: whether an answer is missing and bytes arrived that belong to no valid answer
     """
 
     samples: dict[int, Sample]
@@ -34,7 +34,7 @@ class PartialReply(NamedTuple):
 
 
 class GroupRead(Protocol):
-    """A read of some servos with everything fixed beforehand."""
+    """A prepared read of some servos."""
 
     ids: tuple[int, ...]
     window: ReadWindow
@@ -48,28 +48,28 @@ class GroupRead(Protocol):
         """Return ``WholeAnswer.values`` of its answer."""
 
     def missing(self, raw: bytes) -> int:
-        """Return how many bytes are still to come."""
+        """Return how many bytes have not arrived yet."""
 
     def pieces(self, raw: bytes) -> PartialReply:
-        """Return what can be proved right."""
+        """Return the verified parts."""
 
 
 class WholeAnswer:
-    """The bytes of an answer of all servos, in which each has an error byte of 0 and no news.
+    """Expected bytes of an answer of all servos without errors.
 
-    Most of these bytes are known beforehand: heads, ids, errors, torque, limits. They are compared
-    all at once, as one number under a mask; only the others are unpacked.
+    Most of these bytes are known in advance: headers, ids, errors, torque, limits. They are
+    compared together, as one number under a mask; only the others are unpacked.
 
     Args:
-        front: bytes before those of the first servo.
-        heads: of each servo, the error byte among them.
-        window: what follows a head.
-        check: struct code of the check at the end of each servo's bytes.
-        parts: struct codes of what is under the checks.
-        intact: whether checks are right, from what is under them and the checks.
+        front: Bytes before those of the first servo.
+        heads: Header of each servo's bytes, including the error byte.
+        window: Registers after a header.
+        check: Struct code of the checksum at the end of each servo's bytes.
+        parts: Struct codes of the parts that the checksums cover.
+        intact: Returns whether checksums match, from the covered parts and the checksums.
 
-    length: of the answer
-    columns: where the measured values are
+    length: number of bytes of the answer
+    columns: slices of the measured values
     """
 
     def __init__(
@@ -94,12 +94,12 @@ class WholeAnswer:
         self._mask = self._known = 0
 
     def values(self, raw: bytes, expected: Expected) -> Values | None:
-        """Return all measured values, None where anything at all is not as it should be.
+        """Return all measured values, None if any byte differs from the expected ones.
 
         Args:
-            raw: the answer.
-            expected: what servos answer that are as they were left; the same mapping where nothing
-                has changed.
+            raw: Bytes of the answer.
+            expected: Expected values of servos in their last known state; the same mapping object
+                if nothing has changed.
         """
         if expected is not self._expected:
             self._expect(expected)
@@ -109,7 +109,7 @@ class WholeAnswer:
         return values if self._intact(self._parts(raw), values[self._checks]) else None
 
     def _expect(self, expected: Expected) -> None:
-        """Compare with these values of known fields from now on; a status is always 0."""
+        """Set the expected values of known fields; a status is always 0."""
         self._expected = expected
         order, expected = self._window.order, {"status": (0,) * len(self._heads), **expected}
         mask, known = [b"\xff" * len(self._front)], [self._front]

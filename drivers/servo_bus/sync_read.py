@@ -1,7 +1,7 @@
-"""The one read of every tick: all servos in one exchange, and what to do about those who fail.
+"""The read of every tick: all servos in one exchange, and retries for those that fail.
 
-A servo that keeps silent or garbles costs only itself: those whose answers were lost with
-its own are asked again at once without it.
+A silent or garbling servo affects only itself: servos whose answers were lost with its own are
+immediately read again without it.
 """
 
 from collections.abc import Collection, Sequence
@@ -16,10 +16,10 @@ from gazerig.drivers.servo_bus.sync_packets import GroupRead, PartialReply, Whol
 from gazerig.drivers.servo_bus.transaction import Transactions
 
 MOST_GROUPS = 64
-"""So many prepared exchanges are kept."""
+"""Largest number of prepared exchanges."""
 
 OWED_S = 0.5
-"""An answer may still come so long after waiting for it has ended."""
+"""Time after its time-out during which an answer may still arrive."""
 
 
 class ServoReply(NamedTuple):
@@ -30,15 +30,15 @@ class ServoReply(NamedTuple):
 
 
 class SyncReader:
-    """Reads all servos of a poll list.
+    """Reader of all servos of a poll list.
 
     Args:
-        line: the bus.
-        polled: the servos that are read; gets those that failed.
-        plan: how they are read.
+        line: Exchanges on the bus.
+        polled: Servos to read; failures are recorded in it.
+        plan: Plan of their reads.
 
-    unanswered_s: when a servo left a question unanswered last, the time of reading
-    stray_s: when bytes that are of no right answer came instead of one last, the same
+    unanswered_s: time of the last read that a servo did not answer
+    stray_s: time of the last read with stray bytes instead of an answer
     """
 
     def __init__(self, line: Transactions, polled: PollList, plan: ReadPlan) -> None:
@@ -55,14 +55,15 @@ class SyncReader:
         self._prepared: dict[int, GroupRead] = {}
 
     def next_group(self, now_s: float) -> GroupRead | None:
-        """Return the read of all servos that is due; None if not all are asked in one."""
+        """Return the due read of all servos; None if they are not all read in one exchange."""
         polled, turns = self.poll_list, self._together
         if turns.troubled:
             turns.calm(now_s)
         if polled.troubled or not self._sync_read:
             return None
         window = turns.next()
-        # By identity: hashing ids and windows in every tick costs as much as reading the answer.
+        # Looked up by identity: hashing ids and windows every tick takes as long as reading the
+        # answer.
         if polled.group is self._prepared_ids and (ready := self._prepared.get(id(window))):
             return ready
         return self._group(polled.group, window)
@@ -70,13 +71,13 @@ class SyncReader:
     def salvage(
         self, group: GroupRead, raw: bytes, at_s: float, now_s: float
     ) -> dict[int, ServoReply]:
-        """Return what can be proved right of an answer to a read of all servos.
+        """Return the verified parts of an answer to a read of all servos.
 
-        Who is not in it gave no good answer, not even when asked once more. To be called before
-        anything else is sent.
+        A servo that is absent from the result gave no good answer, not even in a second read. Call
+        this before anything else is sent.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         self._until_s = self._line.whole_s + self._line.most_s
         replies: dict[int, ServoReply] = {}
@@ -84,18 +85,18 @@ class SyncReader:
         return replies
 
     def answer_owed(self, servo_id: int, now_s: float) -> bool:
-        """Return whether a servo has left a question unanswered of late.
+        """Return whether a servo has recently left a request unanswered.
 
-        The answer that comes now may be to that one where a packet says nothing of when or to
-        what question it was given, and neither length nor silence tells.
+        The present answer may belong to that request, as a packet identifies neither its time nor
+        its request, and neither length nor silence decides it.
         """
         return now_s - self._unanswered_s.get(servo_id, -inf) <= OWED_S
 
     def again(self, ids: Sequence[int]) -> dict[int, ServoReply]:
-        """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
+        """Read some servos once more, in one exchange; absent servos gave no good answer.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         replies: dict[int, ServoReply] = {}
         window = self._second.next()
@@ -110,10 +111,10 @@ class SyncReader:
         return replies
 
     def read_troubled(self, now_s: float) -> dict[int, ServoReply]:
-        """Read the group, and one of those who are out of it; who is missing gave no good answer.
+        """Read the group and one servo that is out of it; absent servos gave no good answer.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: the port is lost.
         """
         replies: dict[int, ServoReply] = {}
         together, due = self.poll_list.group, self.poll_list.due(now_s)
@@ -136,10 +137,10 @@ class SyncReader:
         window: ReadWindow,
     ) -> None:
         group = self._group(ids, window)
-        # Who has been silent already is not worth the reserve.
+        # A servo that was silent before gets no reserve.
         reserve = turns is self._together
         raw, at_s = self._line.exchange(group.request, group.reply_length, reserve)
-        # The whole read has one time limit, that of its first exchange at its most patient.
+        # The whole read has one time limit, the longest one of its first exchange.
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
         self._save(group, raw, at_s, replies, now_s, turns)
 
@@ -153,7 +154,7 @@ class SyncReader:
         return group
 
     def _prepare(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
-        """Return the exchange for some servos, made once."""
+        """Create the exchange for some servos."""
         key = ids, window.address, window.length
         group = self._groups.get(key)
         if group is None:
@@ -175,7 +176,7 @@ class SyncReader:
         now_s: float,
         turns: WindowSchedule,
     ) -> None:
-        """Save what is right of an answer; ask again those who lost theirs through another."""
+        """Store the verified parts of an answer; read servos again that lost theirs to another."""
         while True:
             raw = self._line.complete(raw, group.missing, self._line.deadline_s)
             samples, damaged, unproved, stray = group.pieces(raw)
@@ -191,7 +192,7 @@ class SyncReader:
                     self._unanswered_s[servo_id] = now_s
             silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
             if not samples and not damaged and self._header in raw:
-                self._line.lateness.late_answer(now_s)  # that of an earlier question
+                self._line.lateness.late_answer(now_s)  # to an earlier request
             self._blame(damaged, silent, now_s, turns)
             done = replies.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
@@ -203,10 +204,10 @@ class SyncReader:
     def _blame(
         self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: WindowSchedule
     ) -> None:
-        """Record who failed; what still comes must not be taken for the next answer."""
+        """Record the failed servos; later bytes must not be taken for the next answer."""
         line, polled = self._line, self.poll_list
         if damaged:
-            line.lateness.forget()  # noise looks late, too
+            line.lateness.forget()  # noise looks like a late answer
         for servo_id in damaged:
             line.errors["corrupt"] += 1
             polled.damaged(servo_id, now_s)
@@ -219,7 +220,7 @@ class SyncReader:
 
 
 class SyncRead:
-    """A sync read, one status a servo; of one servo a plain read where there is no other.
+    """A sync read with one status per servo; a plain read for families without sync read.
 
     See ``GroupRead``.
     """
@@ -237,22 +238,23 @@ class SyncRead:
         self.reply_length, self.covers_torque = answer.length, "torque" in window.fields
 
     def missing(self, raw: bytes) -> int:
-        """Count the bytes still to come."""
+        """Return how many bytes have not arrived yet."""
         codec, count, length = self._codec, len(self.ids), self.window.length
         missing = codec.bytes_missing(raw, count, length)
         if missing:
             return missing
-        # Repeated statuses, echoes, and others' than asked for, are not those waited for.
+        # Repeated statuses, echoes and statuses of other servos are not expected ones.
         found = codec.statuses(raw)
         fits = {s.id for s in found if len(s.params) == length or s.error & codec.REFUSAL}
         there = len(fits.intersection(self.ids))
         return codec.bytes_missing(raw, len(found) + count - there, length)
 
     def pieces(self, raw: bytes) -> PartialReply:
-        """Return what can be proved right.
+        """Return the verified parts.
 
-        Servos answer in the order asked. Where an answer is missing, one in the place of another
-        servo's proves nothing: that servo may have lost its id, and the right answer its header.
+        Servos answer in the order of the request. If an answer is missing, one in the position of
+        another servo's is not verified: that servo may have lost its id, and the correct answer its
+        header.
         """
         samples: dict[int, Sample] = {}
         damaged, twofold, in_place = set[int](), set[int](), set[int]()
@@ -269,13 +271,13 @@ class SyncRead:
                 damaged.add(status.id)
             elif len(status.params) == self.window.length:
                 sample = self.window.sample(status.error, status.params)
-                # Twice the same is an echo; two that differ cannot both be this servo's.
+                # Two equal answers are an echo; two different ones cannot both be this servo's.
                 if samples.setdefault(status.id, sample) != sample:
                     twofold.add(status.id)
             elif not status.params and status.error & self._codec.REFUSAL:
                 samples[status.id] = Sample(status.error)
             else:
-                # An answer, but not what was asked for: late, or the servo is out of its mind.
+                # A valid answer of another length: late, or the servo is confused.
                 damaged.add(status.id)
         missing = len(samples) < len(self.ids)
         unproved = samples.keys() - in_place if missing else set[int]()

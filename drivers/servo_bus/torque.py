@@ -1,9 +1,9 @@
-"""Switching the torque on and off, so that nothing moves that was not asked to.
+"""Switching torque on and off without unrequested motion.
 
-Some firmware follows the last goal as soon as the torque comes on, some switches the torque on
-with a goal, some wraps the position by a turn at that moment. So the first goal is the present
-place, with the speed that may be used for it where a goal carries one; it is read back before
-the torque comes on, and positions are read again after.
+Some firmware follows the last goal as soon as torque is switched on, some switches torque on with a
+goal, and some wraps the position by a turn at that moment. So the first goal is the present
+position, with its speed if a goal includes one. It is read back before torque is switched on, and
+positions are read again afterwards.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,27 +18,27 @@ from gazerig.drivers.servo_bus.transaction import Transactions
 
 TRIES = 3
 TRIPPED = 255
-"""Bus Watchdog reads so after it has stopped the servo."""
+"""Value of Bus Watchdog after it has stopped the servo."""
 
 JUMP_TURN = 0.25
-"""No hand moves a joint by so much of a turn while the torque comes on: it has wrapped."""
+"""Share of a turn that no hand moves a joint while torque is switched on: it has wrapped."""
 
 STILL_STEPS = 16
-"""A joint without torque, held by a hand, moves so far between two questions."""
+"""Distance that a joint without torque, held by a hand, may move between two reads."""
 
 LEAST_S, MOST_S = 0.005, 0.02
-"""Time-out of an answer beyond its time on the wire, where a raw port is released."""
+"""Time-outs of an answer beyond its time on the wire, when torque is released on a raw port."""
 
 Value = TypeVar("Value")
 
 
 def positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
-    """Read every position, as the servos count.
+    """Read every position, in the servos' own count.
 
-    The first goals are made of these: where the check over an answer is weak, two must agree.
+    They become the first goals: with a weak checksum, two answers must agree.
 
     Raises:
-        ServoMissing: a servo does not answer, or says two things.
+        ServoMissing: a servo does not answer, or its answers disagree.
     """
     found = line.ask(ids, "present_position")
     if line.family.weak_check:
@@ -52,7 +52,7 @@ def insist(line: Transactions, ids: Sequence[int], name: str, values: Sequence[i
     """Write a register and read it back until every servo has its value.
 
     Raises:
-        ServoMissing: a servo does not answer or does not take it.
+        ServoMissing: a servo does not answer or rejects it.
     """
     _until(
         line,
@@ -72,7 +72,7 @@ def _send_goals(line: Transactions, wanted: Mapping[int, tuple[int, int]]) -> No
 def _ask_goals(
     line: Transactions, present: Mapping[int, tuple[int, int]], ids: Sequence[int]
 ) -> dict[int, tuple[int, int]]:
-    """Read goals and goal speeds; a goal that has only followed the shaft counts as the wanted one.
+    """Read goals and goal speeds; a goal that only followed the shaft counts as the wanted one.
 
     present: position and wanted goal of servos without torque
     """
@@ -82,7 +82,7 @@ def _ask_goals(
     for i, data in line.ask_bytes(ids, goal.address, span).items():
         steps = goal.decode(data[: goal.size])
         place, wanted = present.get(i, (steps, steps))
-        # The goal of a servo without torque may follow its shaft: then nothing can jump either.
+        # The goal of a servo without torque may follow its shaft, which cannot cause a jump.
         near = abs(steps - place) <= STILL_STEPS
         found[i] = wanted if near else steps, speed.decode(data[-speed.size :])
     return found
@@ -95,7 +95,7 @@ def _until(
     ask: Callable[[Sequence[int]], Mapping[int, Value]],
     name: str,
 ) -> None:
-    """Send and ask until every servo has what is wanted of it."""
+    """Send and read until every servo has its wanted value."""
     left: dict[int, Value] = dict(wanted)
     found: Mapping[int, Value] = {}
     for _ in range(TRIES):
@@ -114,10 +114,10 @@ def _until(
 def switch_on(
     line: Transactions, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]
 ) -> None:
-    """Set the goals, then the torque, and see that every position is still the same.
+    """Set the goals, then switch torque on, and check that no position has changed.
 
     Raises:
-        ServoMissing: a servo does not answer or does not take its goal.
+        ServoMissing: a servo does not answer or rejects its goal.
         ServoFault: a servo refuses its torque, or its position jumped.
     """
     family = line.family
@@ -152,12 +152,12 @@ def switch_on(
 
 
 def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
-    """Switch the watchdog, then the torque off, and verify that it is off."""
+    """Switch the watchdog, then torque off, and verify that torque is off."""
     left = tuple(ids)
     found: dict[int, int] = {}
     watchdog = () if line.family.watchdog_unit_s is None else ("bus_watchdog",)
     for _ in range(TRIES):
-        # Twice: no servo confirms a group write, and this one matters most.
+        # Twice, as no servo confirms a group write, and this one matters most.
         for name in (*watchdog, "torque_enable", "torque_enable"):
             line.write_all(left, name, [0] * len(left))
         found = line.ask(left, "torque_enable")
@@ -169,17 +169,17 @@ def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
 
 
 def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int]) -> tuple[int, ...]:
-    """Open a port and switch the torque off; return the ids that did not confirm it.
+    """Open a port and switch torque off; return the ids that did not confirm it.
 
     Args:
-        port: closed, or open already; it is left open.
-        family: make of the servos.
-        baud: bit/s.
-        ids: of the servos.
+        port: Closed or open port; it stays open.
+        family: Family of the servos.
+        baud: Baud rate, bit/s.
+        ids: Ids of the servos.
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: the port went away.
+        BusLost: the port is lost.
     """
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose {family.usual_bauds}")
@@ -188,7 +188,7 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
 
 
 def find_faults(line: Transactions, ids: Sequence[int]) -> dict[int, int]:
-    """Return the error bits of the servos that answer and have any."""
+    """Return the error bits of the answering servos that have any, by id."""
     found = line.ask(ids, line.family.error_register)
     return {servo_id: bits for servo_id, bits in found.items() if bits}
 
@@ -196,10 +196,13 @@ def find_faults(line: Transactions, ids: Sequence[int]) -> dict[int, int]:
 def rearm_tripped(
     line: Transactions, ids: Sequence[int], watchdog: int, clip: Callable[[int, int], int]
 ) -> tuple[int, ...]:
-    """Return servos whose bus watchdog has tripped their present position as goal and arm it again.
+    """Rearm tripped bus watchdogs; the servos' goals become their present positions.
 
-    A tripped servo stands still and refuses goals. ``clip(id, steps)`` keeps a goal inside
-    the limits. Returns the servos that were healed.
+    A tripped servo does not move and refuses goals. ``clip(id, steps)`` keeps a goal inside the
+    limits.
+
+    Returns:
+        The ids of the rearmed servos.
     """
     state = line.ask(ids, "bus_watchdog")
     tripped = [servo_id for servo_id, value in state.items() if value == TRIPPED]

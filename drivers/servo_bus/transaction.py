@@ -1,4 +1,4 @@
-"""Exchanges on a servo bus: bounded waiting, clean lines, counts, starvation noticed."""
+"""Exchanges on a servo bus: bounded waits, drained lines, counts, detection of starvation."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,7 +12,7 @@ from gazerig.drivers.servo_bus.poll_list import silent_servos
 
 TRIES, HURRIED = 3, 4.0
 SETUP_PAUSES_S = 0.1, 0.4
-"""Pauses before a servo that stayed silent is asked again, outside the loop."""
+"""Pauses before a silent servo is read again, outside the loop."""
 
 _ROOM = 4096
 _BACKLOG_S = 0.05
@@ -21,19 +21,19 @@ _BACKLOG_S = 0.05
 class Transactions:
     """A port with the time-outs of one bus; every method may raise BusLost.
 
-    What is asked and written here goes through sync read and sync write even for a single
-    servo: an echo of such a question cannot be taken for its answer.
+    All reads and writes use sync read and sync write even for a single servo: an echo of such a
+    request cannot be taken for its answer.
 
-    family: the make of the servos
-    tx_bytes, rx_bytes: counts since it was made
+    family: family of the servos
+    tx_bytes, rx_bytes: counts since creation
     errors: counts by kind
-    timeout: that of the cyclic exchange; all others have the longest
-    tries: how often a servo is asked outside the cyclic exchange; in the loop, once
-    starving_s: silence after which a servo's own watchdog trips; inf where none is armed
-    starved: such a silence has happened
-    lateness: how this computer was late: its own silences, answers after waiting had ended
-    quiet: nothing came any more when the last exchange was given up
-    whole_s: when the last exchange's answer was due as far as the wire goes
+    timeout: time-out of the cyclic exchange; all others have the longest one
+    tries: number of attempts to read a servo outside the cyclic exchange; 1 in the loop
+    starving_s: silence after which a servo's own watchdog trips; inf if none is armed
+    starved: whether such a silence has happened
+    lateness: delays of this computer: its own silences, answers after their time-outs
+    quiet: whether the line was silent at the end of the last exchange
+    whole_s: time at which the last answer was due, by its time on the wire
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Transactions:
         self._free_s = self._sent_s
 
     def label(self, servo_id: int) -> str:
-        """Name a servo for people."""
+        """Return a servo's label for messages."""
         return self._names.get(servo_id, f"servo {servo_id}")
 
     def send(self, packet: bytes) -> None:
@@ -71,37 +71,40 @@ class Transactions:
         port = self.port
         now_s = port.now_s()
         port.write(packet)
-        # Up to after the write: the host may have been asleep just before the bytes left.
+        # Measured after the write: the host may have slept just before the bytes left.
         if port.now_s() - self._sent_s >= self.starving_s:
             self._starve(port.now_s() - self._sent_s)
         self._sent_s = now_s
-        # Bytes leave after those still on their way out, at the bus's own speed.
+        # Bytes leave after those still in the output buffer, at the speed of the bus.
         free_s = self._free_s if now_s <= self._free_s <= now_s + _BACKLOG_S else now_s
         self._free_s = free_s + len(packet) * self._byte_s
         self.tx_bytes += len(packet)
 
     def _starve(self, silent_s: float) -> None:
-        """Record a silence of this computer after which the servos' watchdogs have tripped."""
+        """Record a silence of this computer that tripped the servos' watchdogs."""
         self.starved = True
         self.lateness.own_silence(silent_s, self.port.now_s())
 
     def exchange(self, request: bytes, length: int, reserve: bool = True) -> tuple[bytes, float]:
-        """Send a request, wait for ``length`` bytes; return what came, and when.
+        """Send a request and wait for ``length`` bytes.
 
-        The wait ends as the time-out does, beyond the time the bytes take on the wire.
+        The wait ends with the time-out, which is added to the time of the bytes on the wire.
 
         Args:
-            request: the packet.
-            length: bytes of a whole answer.
-            reserve: wait for as long as the time-out's reserve goes; else only promptly.
+            request: Packet to send.
+            length: Number of bytes of a complete answer.
+            reserve: Whether to use the time-out's reserve; otherwise only the prompt time-out.
+
+        Returns:
+            The received bytes, and the time of their arrival, seconds.
         """
         port, timeout = self.port, self.timeout
-        # What is here before the question cannot be its answer: it is that of an earlier one.
+        # Bytes received before the request belong to an earlier one.
         waited = self._reply_owed and bool(port.getBytesAvailable())
         if waited:
             self._note_late(port.read_until(_ROOM, port.now_s()))
         now_s, prompt_s = port.now_s(), timeout.seconds
-        # Times and counts as in ``send``, which would be one function more in every tick.
+        # Times and counts as in ``send``, without the cost of another call every tick.
         free_s = self._free_s if now_s <= self._free_s <= now_s + _BACKLOG_S else now_s
         self._free_s = free_s = free_s + len(request) * self._byte_s
         self.tx_bytes += len(request)
@@ -116,7 +119,7 @@ class Transactions:
             raw += self._wait_on(length - len(raw), 0.5 * prompt_s)
         at_s = port.now_s()
         self.rx_bytes += len(raw)
-        # The first that is heard after a silence may be owed, too: more of that may follow.
+        # The first bytes after a silence may be a late answer too: more may follow.
         self._reply_owed = not raw or (self._reply_owed and (self._silent or waited))
         self._silent = not raw
         if len(raw) == length:
@@ -133,7 +136,7 @@ class Transactions:
         return self.whole_s + wait_s
 
     def _wait_on(self, length: int, rest_s: float) -> bytes:
-        """Return bytes that have not come within half of the prompt time-out.
+        """Return bytes that arrive after half of the prompt time-out.
 
         The last ``rest_s`` of the whole time-out show whether the line has fallen silent.
         """
@@ -146,7 +149,7 @@ class Transactions:
         return late + more
 
     def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
-        """Wait on for an answer that has turned out to be longer than its shortest form."""
+        """Continue to wait for an answer that is longer than its shortest form."""
         while wanted := missing(raw):
             more = self.port.read_until(wanted, deadline_s)
             if not more:
@@ -157,9 +160,9 @@ class Transactions:
         return raw
 
     def drain(self, quiet_s: float = QUIET_S) -> int:
-        """Throw away what arrives until the line is quiet; return the number of bytes.
+        """Discard received bytes until the line is quiet; return their number.
 
-        Stops after a while on a line that never falls silent.
+        It stops after a while on a line that never falls silent.
         """
         end_s = self.port.now_s() + BABBLE_S
         dropped = b""
@@ -174,16 +177,15 @@ class Transactions:
                 return len(dropped)
 
     def _note_late(self, raw: bytes) -> None:
-        """Record answers that came after waiting for them had ended; noise is none."""
+        """Record answers that arrived after their time-outs; noise does not count."""
         if any(status.intact for status in self.family.codec.statuses(raw)):
             self.lateness.late_answer(self.port.now_s())
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos.
 
-        A silent servo silences those behind it: they are asked again without it, and it
-        alone where it may be asked more than once. In the loop, where no servo answers at all
-        that is the end of it.
+        A silent servo blocks the servos after it: they are read again without it, and it alone if
+        several attempts are allowed. In the loop there is no further attempt if no servo answers.
         """
         values: dict[int, bytes] = {}
         left, silent = tuple(ids), list[int]()
@@ -195,7 +197,7 @@ class Transactions:
             blamed = silent_servos(left, values)
             silent += blamed
             left = tuple(i for i in left if i not in values and i not in blamed)
-        # A computer that is busy may have kept an answer back, and a servo may be restarting.
+        # A busy computer may have delayed an answer, and a servo may be restarting.
         pauses_s = (*[0.0] * (self.tries - 1), *SETUP_PAUSES_S) if self.tries > 1 else ()
         for pause_s in pauses_s:
             silent = [i for i in silent if i not in values]
@@ -206,7 +208,7 @@ class Transactions:
         return values
 
     def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
-        """Read one register of several servos; who is not in the answer did not answer well."""
+        """Read one register of several servos; absent servos gave no good answer."""
         register = self.family.registers[name]
         found = self.ask_bytes(ids, register.address, register.size)
         return {servo_id: register.decode(data) for servo_id, data in found.items()}
@@ -218,10 +220,10 @@ class Transactions:
         self.send(self.family.codec.sync_write(ids, register.address, register.size, rows))
 
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
-        """Read the same bytes of several servos once; return those of servos that answered well."""
+        """Read the same bytes of several servos once; return those of good answers."""
         found: dict[int, bytes] = {}
         alone = not self.family.sync_read
-        # Where a question's echo looks like an answer the answer must be of another length.
+        # If a request's echo looks like an answer, another length must be requested.
         more = int(alone and length == self.family.codec.ECHO_LENGTH)
         for asked in self.family.asked_together(ids):
             answers = self._ask_once(asked, address, length + more)
@@ -229,7 +231,7 @@ class Transactions:
         return found
 
     def _ask_once(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
-        """Send one request and return the bytes of the servos that answered well."""
+        """Send one request and return the bytes of good answers by id."""
         codec = self.family.codec
         self.port.clearPort()
         self.send(self.family.request(ids, address, length))
@@ -255,9 +257,9 @@ class Transactions:
         return found
 
     def _ends_s(self, answer_bytes: int) -> float:
-        """Return until when an answer to what was just sent is waited for.
+        """Return the deadline of an answer to the last request, seconds.
 
-        In the loop others are waiting, and how late answers are has been measured.
+        In the loop other servos wait, and the delay of answers has been measured.
         """
         hurried_s = min(self.most_s, HURRIED * self.timeout.seconds)
         timeout_s = self.most_s if self.tries > 1 else hurried_s

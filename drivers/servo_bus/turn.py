@@ -1,14 +1,14 @@
-"""Which turn a position belongs to. Numbers in, numbers out.
+"""Choice of the turn that a position belongs to.
 
-The encoder knows its place within one turn; a joint whose range lies near the encoder's
-zero can stand on the other side of it, at 4090 where -6 is meant, and a servo that counts
-turns may have counted some while the torque was off. What the joint is told is the place
-nearest to its range. The servo itself would go the other way round: it must not.
+The encoder measures the position within one turn. A joint whose range is near the encoder's zero
+can be on the other side of it, at 4090 instead of -6, and a servo that counts turns may have
+counted some while torque was off. The joint gets the position nearest to its range. The servo
+itself would move in the other direction, which must be prevented.
 """
 
 
 def nearest_turn(steps: int, low: int, high: int, turn: int) -> int:
-    """Return the position, whole turns added, that lies nearest to the range low..high."""
+    """Return the position with whole turns added so that it is nearest to the range low..high."""
     if low <= steps <= high:
         return steps
     above = low + (steps - low) % turn
@@ -17,5 +17,5 @@ def nearest_turn(steps: int, low: int, high: int, turn: int) -> int:
         return above
     if above - high > low - below:
         return below
-    # Both ways are as long: as the servo has it where it is one of them.
+    # Both are equally far: the servo's own count decides if it is one of them.
     return below if steps < low else above
