@@ -1,5 +1,6 @@
 """Capabilities beside the control of a head: each is one folder, and the core imports none.
 
 A feature registers its commands and file schemas by entry points (``gazerig.drivers.plugins``), as
-other packages do. Without its folder the rest works. ``study`` imports ``lab`` and ``world``.
+other packages do. Its tests are in ``tests/`` and its pages in ``docs/``, in folders of the same
+name. Without these folders the rest works; ``study`` needs ``lab``, and ``world`` to render films.
 """

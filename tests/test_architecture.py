@@ -147,6 +147,7 @@ WRONG = (
     ("robot/app", "gazerig.features.world.script"),
     ("sim_mock/pty", "gazerig.features.world.script"),
     ("features/lab", "gazerig.features.world.script"),
+    ("features/study", "gazerig.features.world.script"),
     ("robot/control", "gazerig.config.schema"),
     ("robot/control", "gazerig.robot.dashboard.feed.snapshot"),
     ("robot/dashboard", "gazerig.robot.recording.read"),

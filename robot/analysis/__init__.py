@@ -1,1 +1,1 @@
-"""What a run or an eye tracker's recording says about gaze."""
+"""What a run says about gaze, and what people do: measures for the page, summaries and features."""
