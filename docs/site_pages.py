@@ -32,7 +32,9 @@ FROM_ELSEWHERE = {
 FIRST = (
     *(
         "index",
+        "install",
         "start",
+        "tour",
         "troubleshooting",
         "tutorial",
         "examples",

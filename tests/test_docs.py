@@ -226,6 +226,7 @@ def test_tests_and_functions_named_exist(paper: Path) -> None:
 OUTCOMES = get_args(gazerig.Outcome)
 
 SAID = {
+    ". .venv/bin/activate",
     # of a program's own
     *("import gazerig", "mypy --strict", "with", "for_s=2.0", "fast=True", *OUTCOMES),
     # keys, lines and answers of the program
