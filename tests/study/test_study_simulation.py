@@ -53,7 +53,7 @@ def test_means_of_scales_and_repetitions_have_it_too(items: int, repetitions: in
 
 @pytest.mark.parametrize(("people", "effect"), [(12, 0.8), (24, 0.6), (40, 0.5)])
 def test_500_studies_find_as_often_as_their_design_claims(people: int, effect: float) -> None:
-    """tests/bench/bench_study_power.py lets 500 studies go the whole way, for each test."""
+    """tests/study/bench_study_power.py lets 500 studies go the whole way, for each test."""
     rows = differences(effect, (500, people), np.random.default_rng(5))
     share = np.mean([exact_signed_rank(row) <= 0.05 for row in rows])
     claimed = power_of(PowerQuestion("signed_rank", effect, 0.05), people)

@@ -1,6 +1,6 @@
 """How often simulated studies are significant: with no effect, and beside the claimed power.
 
-Run by hand: ``nice -n 10 python tests/bench/bench_study_power.py``. Each of 2,000 studies takes the
+Run by hand: ``nice -n 10 python tests/study/bench_study_power.py``. Each of 2,000 studies takes the
 path of all: participants answer, their records become rows, the design's rules leave some out, the
 planned test decides. The claim is that of ``gazerig study design``. Chance alone moves a share of
 2,000 studies by .005 (one standard error at .05) and by .009 at .8. Intervals of effects decide

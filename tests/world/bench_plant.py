@@ -1,4 +1,4 @@
-"""Servos in a world with physics beside the same ones alone: python tests/bench/bench_plant.py
+"""Servos in a world with physics beside the same ones alone: python tests/world/bench_plant.py
 
 Prints, as Markdown:
 - the same moves of servos with mechanics of their own and in a world: overshoot, time until within

@@ -1,4 +1,4 @@
-"""What a study keeps when it is killed: python tests/bench/bench_study_kills.py --kills 100."""
+"""What a study keeps when it is killed: python tests/study/bench_study_kills.py --kills 100."""
 
 import argparse
 import sys
