@@ -42,17 +42,11 @@ def test_papers_name_most_commands() -> None:
 
 @pytest.mark.parametrize("words", COMMANDS)
 def test_a_command_of_a_paper_is_one(words: str) -> None:
-    if words.startswith("study "):
-        pytest.importorskip("gazerig.features.study")
-    if words.startswith(("report ", "compare ", "sweep ", "fit-scanpath ")):
-        pytest.importorskip("gazerig.features.lab")
     parse(shlex.split(words))
 
 
 @each_of_papers("paper")
 def test_a_command_named_in_prose_is_one(paper: Path) -> None:
-    if paper.name == "studies.md":
-        pytest.importorskip("gazerig.features.study")
     for span in spans(paper):
         if span.startswith("gazerig "):
             words = [_tried(word) for word in span.split()[1:]]
@@ -64,8 +58,6 @@ def test_a_command_named_in_prose_is_one(paper: Path) -> None:
 
 @each_of_papers("paper")
 def test_an_option_named_in_prose_is_one(paper: Path) -> None:
-    if paper.name == "studies.md":
-        pytest.importorskip("gazerig.features.study")
     known = options("emulate") if paper == EMULATOR else options()
     for span in spans(paper):
         if not span.startswith("--"):
@@ -119,8 +111,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("words", quick_commands())
 def test_a_quick_command_works(words: str, folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    if "--world" in words:
-        pytest.importorskip("gazerig.features.world")
     if words.startswith("run "):
         words = re.sub(r"--seconds \S+", "", words) + " --fast --seconds 0.05"
         if "--world" in words and "--no-pictures" not in words:
