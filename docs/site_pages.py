@@ -35,6 +35,7 @@ FIRST = (
         "install",
         "start",
         "tour",
+        "glossary",
         "troubleshooting",
         "tutorial",
         "examples",

@@ -17,6 +17,7 @@ import gazerig
 from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.parameters import NEXT_TICK, changed, parameters, value_of
+from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -314,6 +315,22 @@ def _is_file(span: str) -> bool:
     return any((ROOT / base / span).exists() for base in ("", "robot")) or span.endswith(
         (".py", ".yaml")
     )
+
+
+def test_the_glossary_has_a_line_for_every_section_of_gaze() -> None:
+    text = (ROOT / "docs/glossary.md").read_text("utf-8")
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ")][1:]
+    assert len(rows) >= 60 and all(len(row) == 4 and all(row) for row in rows)
+    terms = [row[0].removeprefix("| ") for row in rows]
+    assert terms == sorted(terms, key=str.lower) and len(set(terms)) == len(terms)
+    # The sections whose names are terms of the field; the others are plain words.
+    sections = {field.name for field in fields(GazeConfig)} - {
+        "field_of_view", "chooser", "attention", "idle", "breathing", "lids", "oculomotor",
+    }  # fmt: skip
+    named = set(re.findall(r"`gaze\.(\w+)", text)) | {
+        "gestures" for term in terms if term == "gesture"
+    }
+    assert sections <= named
 
 
 def test_every_numbered_check_listed_is_a_test() -> None:
