@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import degrees
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.errors import Refused
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor

@@ -3,13 +3,9 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import radians
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
-from gazerig.config.export import suggestion
 from gazerig.config.load import (
     ConfigError,
     ConfigFault,
@@ -18,10 +14,7 @@ from gazerig.config.load import (
     shipped,
     shipped_names,
 )
-from gazerig.config.rig import Rig
 from gazerig.gaze.gesture.gesture import Gesture, faults_of, loop_fault
-from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, motions
-from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 _HEAD_KEYS = {
@@ -121,46 +114,6 @@ def _joint_names(gesture: Gesture) -> Iterable[tuple[str, str]]:
                     yield f"{key}.{i}.joints_deg.{joint}", f"is moved by {instead}; write that"
                 elif not JOINT_NAME.fullmatch(joint):
                     yield f"{key}.{i}.joints_deg.{joint}", "no name of a joint"
-
-
-def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find what keeps a rig from its own gestures, and the gestures that rules name in vain."""
-    known = set(shipped_gestures())
-    for i, file in enumerate(rig.gesture_files):
-        try:
-            gesture = load_gesture(gesture_path(file))
-            known.add(gesture_name(file))
-            _refuse_beyond(rig, gesture)
-        except ConfigError as error:
-            for fault in error.faults:
-                yield f"gesture_files.{i}", str(fault)
-        except GestureRefused as refused:
-            yield f"gesture_files.{i}", f"{file}: {refused}"
-    for behaviour, rule in rig.gaze.top_down.rules.items():
-        if rule.gesture and rule.gesture not in known:
-            near = suggestion(rule.gesture, sorted(known)) or ";"
-            there = ", ".join(sorted(known))
-            yield (
-                f"gaze.top_down.rules.{behaviour}.gesture",
-                f"no gesture {rule.gesture!r}{near} there is {there}",
-            )
-
-
-def _refuse_beyond(rig: Rig, gesture: Gesture) -> None:
-    """Refuse a gesture that a rig cannot do from the middle of its ranges.
-
-    Raises:
-        gazerig.robot.model.gesture_fit.GestureRefused: with joint, time and limit.
-    """
-    limits = [rig.joints[name].limit() for name in rig.names]
-    middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
-    spans = {}
-    for name in LIDS:
-        shut, wide = rig.lid_joints.ends_deg(name)
-        if name in rig.joints and shut is not None and wide is not None:
-            spans[name] = radians(wide - shut)
-    fit = GestureFit(rig.names, spans)
-    fit.fit("", motions(gesture, rig.names), 1.0, middle, limits, rig.gaze.gestures.limit_share)
 
 
 CHECKS = (_frame_times, _joint_names)

@@ -17,8 +17,8 @@ from gazerig.config.bounds import Shape, shapes_of, validate
 from gazerig.config.export import abbreviated, suggestion
 from gazerig.config.load import ConfigError, ConfigFault, Entry, validate_entries
 from gazerig.config.plugin_sections import extended
-from gazerig.config.rig import GazeConfig
-from gazerig.config.schema import RULES, Rig
+from gazerig.config.rig import GazeConfig, Rig
+from gazerig.config.schema import RULES
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.commands import Value
 from gazerig.robot.model.parameter import Parameter

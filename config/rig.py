@@ -1,6 +1,6 @@
 """What a rig file holds: the Params of every room, in one place.
 
-Bounds stand with the values, in the rooms; the rules between sections in gazerig.config.rig_rules.
+Bounds stand with the values, in the rooms; the rules between sections in gazerig.config.schema.
 """
 
 from collections.abc import Mapping
@@ -16,10 +16,10 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.gaze.attention.attention import AttentionParams
 from gazerig.gaze.attention.aversion import AversionParams
 from gazerig.gaze.attention.bottom_up import BottomUpParams
 from gazerig.gaze.attention.idle import IdleParams
+from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.field_of_view import FieldOfViewParams
 from gazerig.gaze.gesture.breathing import BreathingParams

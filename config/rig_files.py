@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
+from gazerig.config.rig import Rig
 from gazerig.config.save import copy_shipped, rig_file, save
-from gazerig.config.schema import Rig, layers_of, load_rig
+from gazerig.config.schema import layers_of, load_rig
 from gazerig.drivers.files.file_input import kind_of, read_limited
 from gazerig.robot.model.parameter import SavedFile
 

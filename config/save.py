@@ -17,8 +17,9 @@ from typing import Any
 
 from gazerig.config.bounds import shapes_of
 from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, shipped
+from gazerig.config.rig import Rig
 from gazerig.config.save_text import EditRefused, Value, edited, written
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.config.shipped import SHIPPED
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.robot.model.parameter import ParamChange, SavedFile

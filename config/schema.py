@@ -1,15 +1,32 @@
-"""Rigs, rule sets and face walks by name or path: read, merged and checked."""
+"""Rigs, rule sets and face walks by name or path; the rules between the sections of a rig."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from math import radians
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 from gazerig.config.bounds import shapes_of
-from gazerig.config.load import Check, load, read_yaml, shipped
+from gazerig.config.export import suggestion
+from gazerig.config.gestures import gesture_name, gesture_path, load_gesture, shipped_gestures
+from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
-from gazerig.config.rig_rules import RULES as RULES
+from gazerig.drivers.bus.servo_models import SERVOS
+from gazerig.drivers.hobby_board.params import HobbyBoardParams
+from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.attention.top_down import TopDownParams
+from gazerig.gaze.gesture.gesture import Gesture
+from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
+from gazerig.gaze.types import PARTS
+from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable
+from gazerig.robot.model.forbidden_range import forbidden_pairs
+from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, motions
+from gazerig.robot.model.kinematics import LIDS, NECK
+from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 
 def load_rig(
@@ -83,3 +100,328 @@ def _find(kind: str, name_or_path: str) -> Path:
     if looks_like_path:
         return Path(name_or_path)
     return shipped(kind, name_or_path)
+
+
+def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
+    absent = [name for name in GAZE_JOINTS if name not in rig.joints]
+    for name in rig.joints:
+        if not JOINT_NAME.fullmatch(name):
+            yield (
+                f"joints.{name}",
+                "no name of a joint: small letters, digits and _, a letter first, at most 40",
+            )
+        elif name not in GAZE_JOINTS and (near := get_close_matches(name, absent, 1, 0.8)):
+            # A jaw may have any name; a neck that was misspelt would stand still without a word.
+            yield f"joints.{name}", f"did you mean {near[0]}? Other joints need less similar names"
+    for way in ("pan", "tilt"):
+        own = [name for name in (f"left_eye_{way}", f"right_eye_{way}") if name in rig.joints]
+        both = f"eyes_{way}"
+        if both in rig.joints and own:
+            yield f"joints.{both}", f"turns both eyes, which {' and '.join(own)} would do as well"
+        elif both not in rig.joints and len(own) < 2:
+            yield (
+                f"joints.{both}",
+                f"nothing turns {'an eye' if own else 'the eyes'} in {way}: needed are "
+                f"left_eye_{way} and right_eye_{way}, or {both} where one servo turns both",
+            )
+
+
+def _servo_ids(rig: Rig) -> Iterable[tuple[str, str]]:
+    owner: dict[tuple[str, int], str] = {}
+    for name, joint in rig.joints.items():
+        place = joint.bus, joint.id
+        if place in owner:
+            yield f"joints.{name}.id", f"id {joint.id} is already that of {owner[place]}"
+        owner.setdefault(place, name)
+
+
+def _models(rig: Rig) -> Iterable[tuple[str, str]]:
+    for name, joint in rig.joints.items():
+        if joint.model not in SERVOS:
+            known = ", ".join(sorted(SERVOS))
+            yield f"joints.{name}.model", f"unknown servo model {joint.model!r}; known are {known}"
+
+
+def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
+    if "" in rig.buses:
+        yield "buses", "a bus needs a name; the one without is under bus"
+    ports = {"bus": rig.bus.port}
+    for name, bus in rig.buses.items():
+        same = next((key for key, port in ports.items() if port == bus.port), None)
+        if same is not None:
+            yield f"buses.{name}.port", f"{bus.port} is already that of {same}: a port has one bus"
+        ports[f"buses.{name}"] = bus.port
+    for name, joint in rig.joints.items():
+        if joint.bus and joint.bus not in rig.buses:
+            there = ", ".join(rig.buses) or "none"
+            yield f"joints.{name}.bus", f"no bus {joint.bus!r} under buses; there is {there}"
+        elif joint.model in SERVOS and not SERVOS[joint.model].fits(rig.bus_of(name).kind):
+            kind = rig.bus_of(name).kind
+            yield (
+                f"joints.{name}.model",
+                f"a {joint.model} speaks {SERVOS[joint.model].bus}, and its bus is of kind {kind}",
+            )
+        elif joint.model in SERVOS:
+            yield from _channel(name, rig)
+    yield from _series(rig)
+    used = {joint.bus for joint in rig.joints.values()}
+    for name in rig.buses:
+        if name not in used:
+            yield f"buses.{name}", "no joint is on it: take it out, or give joints this bus"
+
+
+def _channel(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find what keeps a joint from its channel of a board of hobby servos."""
+    joint, params = rig.joints[name], rig.bus_of(name).section
+    if not isinstance(params, HobbyBoardParams):
+        return
+    try:
+        params.check(_setup(name, rig))
+    except ValueError as error:
+        what = str(error).removeprefix(f"channel {joint.id}: ")
+        yield f"joints.{name}{'' if what.startswith('its range') else '.id'}", what
+
+
+def _setup(name: str, rig: Rig) -> ServoConfig:
+    """Return what the bus must know of a joint's servo, as far as the rig is right so far."""
+    for one in rig.couplings.values():
+        known = {one.first, one.second} <= rig.joints.keys() and all(
+            rig.joints[joint].model in SERVOS for joint in (one.first, one.second)
+        )
+        pair = CoupledPair(one.first, one.second, one.made())
+        if known and name in pair[:2] and not unreachable(pair, rig.joints):
+            return pair_setups(pair, rig.joints, {})[name]
+    return rig.joints[name].setup(name)
+
+
+def _series(rig: Rig) -> Iterable[tuple[str, str]]:
+    """See that servos of one bus have their numbers the same way round."""
+    first: dict[str, str] = {}
+    for name, joint in rig.joints.items():
+        known, facts = SERVOS.get(first.setdefault(joint.bus, joint.model)), SERVOS.get(joint.model)
+        if known and facts and known.bus == facts.bus and known.family != facts.family:
+            yield (
+                f"joints.{name}.model",
+                f"a {joint.model} cannot be on one bus with a {first[joint.bus]}: their numbers "
+                "have another byte first; give each series a port of its own under buses",
+            )
+
+
+def _lid_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
+    for name in LIDS:
+        joint = rig.joints.get(name)
+        ends = zip(rig.lid_joints.keys(name), rig.lid_joints.ends_deg(name), strict=True)
+        for key, angle in ends:
+            if joint is not None and angle is None:
+                yield f"lid_joints.{key}", f"missing; the joint {name} needs it"
+            elif joint is not None and not joint.min_deg <= (angle or 0.0) <= joint.max_deg:
+                yield (
+                    f"lid_joints.{key}",
+                    f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}",
+                )
+
+
+def _collisions(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Whether the forbidden ranges leave any pose."""
+    if any(True for rule in (_joint_names, _models) for _ in rule(rig)):
+        return
+    try:
+        limits = tuple(rig.joints[name].limit() for name in rig.names)
+        forbidden_pairs(rig.guard.collisions, rig.guard.collision_margin_deg, limits, rig.names)
+    except ValueError as error:
+        yield "guard.collisions", str(error)
+
+
+def _park_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
+    for name, angle in rig.park_deg.items():
+        joint = rig.joints.get(name)
+        if joint is None:
+            yield f"park_deg.{name}", f"no such joint; there is {', '.join(rig.names)}"
+        elif not joint.min_deg <= angle <= joint.max_deg:
+            yield (
+                f"park_deg.{name}",
+                f"{angle} is outside the joint's range {joint.min_deg}..{joint.max_deg}",
+            )
+
+
+def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find couplings whose servos cannot do the whole range of their joints."""
+    owner: dict[str, str] = {}
+    for name, coupling in rig.couplings.items():
+        absent = [
+            (key, joint)
+            for key, joint in (("first", coupling.first), ("second", coupling.second))
+            if joint not in rig.joints
+        ]
+        for key, joint in absent:
+            there = ", ".join(rig.names)
+            yield f"couplings.{name}.{key}", f"no joint {joint!r}; there is {there}"
+        for joint in (coupling.first, coupling.second):
+            if joint in owner:
+                yield f"couplings.{name}", f"{joint} is in {owner[joint]} already"
+            owner.setdefault(joint, name)
+        known = not absent and all(
+            rig.joints[joint].model in SERVOS for joint in (coupling.first, coupling.second)
+        )
+        if known:
+            pair = CoupledPair(coupling.first, coupling.second, coupling.made())
+            if fault := unreachable(pair, rig.joints):
+                yield f"couplings.{name}", fault
+
+
+def _part_names(rig: Rig) -> Iterable[tuple[str, str]]:
+    for code in rig.face_parts_mm:
+        if code not in PARTS:
+            yield f"face_parts_mm.{code}", f"unknown face part; parts are {', '.join(PARTS)}"
+
+
+EYES = tuple(name for name in GAZE_JOINTS if name not in (*NECK, *LIDS))
+
+
+class _KeyedMove(NamedTuple):
+    """The widest move of a joint that a table can ask for, in degrees."""
+
+    key: str
+    joint: str
+    span_deg: float
+    time_s: float
+
+
+def expressions(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find expressions that the joints cannot do."""
+    ends: dict[str, tuple[float, float]] = {}
+    widest: dict[str, str] = {}
+    for name, angles in rig.expressions.items():
+        for joint, angle in angles.items():
+            key = f"expressions.{name}.{joint}"
+            if fault := _joint_fault(rig, joint) or _range_fault(rig, joint, angle):
+                yield key, fault
+                continue
+            low, high = ends.get(joint, (0.0, 0.0))
+            if not low <= angle <= high:
+                ends[joint], widest[joint] = (min(low, angle), max(high, angle)), key
+    for joint, (low, high) in ends.items():
+        move = _KeyedMove(widest[joint], joint, high - low, rig.expression_blend_s)
+        yield from _too_fast(rig, move, "expression_blend_s")
+
+
+def levels(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find levels that their joint cannot do."""
+    for name, level in rig.levels.items():
+        if fault := _joint_fault(rig, level.joint):
+            yield f"levels.{name}.joint", fault
+            continue
+        ends = {"low_deg": level.low_deg, "high_deg": level.high_deg}
+        faults = {end: _range_fault(rig, level.joint, angle) for end, angle in ends.items()}
+        yield from ((f"levels.{name}.{end}", fault) for end, fault in faults.items() if fault)
+        span = abs(level.high_deg - level.low_deg)
+        key = f"levels.{name}.smoothing_ms"
+        yield from _too_fast(rig, _KeyedMove(key, level.joint, span, level.smoothing_ms / 1e3), key)
+
+
+def _joint_fault(rig: Rig, joint: str) -> str:
+    """Return why a joint cannot be moved beside gaze, "" where it can."""
+    free = [name for name in rig.names if name not in EYES]
+    if joint in EYES:
+        return f"gaze alone turns the eyes; what can be moved here is {', '.join(free)}"
+    if joint not in rig.joints:
+        return f"no joint {joint!r}; there is {', '.join(free)}"
+    return ""
+
+
+def _range_fault(rig: Rig, joint: str, angle: float) -> str:
+    """Return why an angle cannot be added to a joint, "" where it can."""
+    params = rig.joints[joint]
+    if joint in LIDS:
+        shut, wide = rig.lid_joints.ends_deg(joint)
+        if shut is None or wide is None:
+            return ""  # said where the ends are missing
+        if abs(angle) <= abs(wide - shut):
+            return ""
+        return (
+            f"{angle:g} deg is more than the lid's whole way of {abs(wide - shut):g} deg "
+            f"from open at {wide:g} to shut at {shut:g}"
+        )
+    if params.min_deg <= angle <= params.max_deg:
+        return ""
+    return f"{angle:g} deg is outside the joint's range {params.min_deg:g}..{params.max_deg:g}"
+
+
+def _too_fast(rig: Rig, move: _KeyedMove, key: str) -> Iterable[tuple[str, str]]:
+    """Find a minimum-jerk move that is faster or more abrupt than the joint can be."""
+    joint = rig.joints[move.joint]
+    speed = PEAK_SPEED * move.span_deg / move.time_s
+    accel = PEAK_ACCELERATION * move.span_deg / move.time_s**2
+    slowest = max(
+        PEAK_SPEED * move.span_deg / joint.max_speed_deg_s,
+        (PEAK_ACCELERATION * move.span_deg / joint.max_accel_deg_s2) ** 0.5,
+    )
+    least = f"{slowest * 1e3:.0f} ms" if key.endswith("_ms") else f"{slowest:.2f} s"
+    if speed > joint.max_speed_deg_s:
+        limit = f"{speed:.0f} deg/s, its limit is max_speed_deg_s {joint.max_speed_deg_s:g}"
+    elif accel > joint.max_accel_deg_s2:
+        limit = f"{accel:.0f} deg/s2, its limit is max_accel_deg_s2 {joint.max_accel_deg_s2:g}"
+    else:
+        return
+    yield (
+        move.key,
+        f"{move.joint} would move {move.span_deg:g} deg within {move.time_s:g} s: {limit}; "
+        f"{key.rpartition('.')[2]} of {least} or more would do",
+    )
+
+
+def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find what keeps a rig from its own gestures, and the gestures that rules name in vain."""
+    known = set(shipped_gestures())
+    for i, file in enumerate(rig.gesture_files):
+        try:
+            gesture = load_gesture(gesture_path(file))
+            known.add(gesture_name(file))
+            _refuse_beyond(rig, gesture)
+        except ConfigError as error:
+            for fault in error.faults:
+                yield f"gesture_files.{i}", str(fault)
+        except GestureRefused as refused:
+            yield f"gesture_files.{i}", f"{file}: {refused}"
+    for behaviour, rule in rig.gaze.top_down.rules.items():
+        if rule.gesture and rule.gesture not in known:
+            near = suggestion(rule.gesture, sorted(known)) or ";"
+            there = ", ".join(sorted(known))
+            yield (
+                f"gaze.top_down.rules.{behaviour}.gesture",
+                f"no gesture {rule.gesture!r}{near} there is {there}",
+            )
+
+
+def _refuse_beyond(rig: Rig, gesture: Gesture) -> None:
+    """Refuse a gesture that a rig cannot do from the middle of its ranges.
+
+    Raises:
+        gazerig.robot.model.gesture_fit.GestureRefused: with joint, time and limit.
+    """
+    limits = [rig.joints[name].limit() for name in rig.names]
+    middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
+    spans = {}
+    for name in LIDS:
+        shut, wide = rig.lid_joints.ends_deg(name)
+        if name in rig.joints and shut is not None and wide is not None:
+            spans[name] = radians(wide - shut)
+    fit = GestureFit(rig.names, spans)
+    fit.fit("", motions(gesture, rig.names), 1.0, middle, limits, rig.gaze.gestures.limit_share)
+
+
+RULES = (
+    _joint_names,
+    _servo_ids,
+    _models,
+    _buses,
+    _lid_ranges,
+    _park_ranges,
+    _part_names,
+    _collisions,
+    _couplings,
+    expressions,
+    levels,
+    gesture_rules,
+)
+"""What no single section of a rig can know."""

@@ -10,8 +10,9 @@ from typing import Any
 from gazerig.config.gestures import GestureSet, gesture_name, gesture_path, load_gesture
 from gazerig.config.load import load
 from gazerig.config.parameters import plain
+from gazerig.config.rig import Rig
 from gazerig.config.save_text import written
-from gazerig.config.schema import Rig, load_walk
+from gazerig.config.schema import load_walk
 
 
 def rig_text(rig: Rig) -> str:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from attention_scene import FACE, UNBOUNDED, attention, body, looking, percept, waving
 
-from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms
 from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams, occluded
 from gazerig.gaze.types import Bodies, Percept

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
-from gazerig.gaze.attention.habituation import Habituation, HabituationParams
+from gazerig.gaze.attention.habituation import Habituation
 from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.params import AttentionParams, HabituationParams
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3

@@ -9,9 +9,10 @@ from attention_scene import looking
 from seeing.drawn_scene import frames, off_deg
 
 from gazerig.config.schema import load_rules
-from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
 from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams

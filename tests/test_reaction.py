@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from attention_scene import FACE, body, looking, percept
 
-from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
 from gazerig.gaze.attention.idle import Idle, IdleParams
-from gazerig.gaze.attention.reaction import ReactionParams
+from gazerig.gaze.attention.params import AttentionParams, ReactionParams
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.types import Floats, Percept

@@ -181,7 +181,9 @@ def test_the_last_bit_of_one_joint_is_seen(once: Once, monkeypatch: pytest.Monke
 
 def test_another_character_is_followed_by_the_servos(once: Once, tmp_path: Path) -> None:
     bold = tmp_path / "bold.yaml"
-    bold.write_text("gaze:\n  saccade:\n    profile: main_sequence\n  scanpath:\n    rate_scale: 4.0\n")
+    bold.write_text(
+        "gaze:\n  saccade:\n    profile: main_sequence\n  scanpath:\n    rate_scale: 4.0\n"
+    )
     seen: list[Tick] = []
     found = rerun(once.recording, character=str(bold), on_tick=seen.append)
     assert found.joints == "emulated" and not found.same

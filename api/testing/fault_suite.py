@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.testing.struck_machine import LINE, RESTARTS, Case, Machine, pair_of
 
 STRUCK_S = 0.6

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from math import pi, radians, sin
 from typing import NamedTuple
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS, servo_label
 from gazerig.robot.app.bus_wiring import rig_bus, rig_setups
 from gazerig.robot.app.emulation import emulated_lines, place_of

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.robot.app.assemble import assemble

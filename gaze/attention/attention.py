@@ -8,10 +8,8 @@ highest factor keeps the rule's whole constant, which the paper's comparison nee
 person alone is not left for habituation, and several people share the gaze.
 """
 
-from dataclasses import dataclass, field
 from math import inf
 from operator import mul
-from typing import Annotated
 
 import numpy as np
 
@@ -19,14 +17,14 @@ from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.comparison import NO_BODY, TargetComparison
 from gazerig.gaze.attention.face_memory import FaceMemory
-from gazerig.gaze.attention.habituation import Habituation, HabituationParams
+from gazerig.gaze.attention.habituation import Habituation
 from gazerig.gaze.attention.idle import Idle
+from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.persons import Persons
-from gazerig.gaze.attention.reaction import Reaction, ReactionParams
+from gazerig.gaze.attention.reaction import Reaction
 from gazerig.gaze.attention.top_down import RuleTarget, TopDown
 from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
 from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
-from gazerig.params import Bounds
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _NO_ONE: frozenset[int] = frozenset()
@@ -35,29 +33,6 @@ _FEW = 24
 _SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says nothing
 _DECIDED_S = 0.2
 """A camera may show the target of a new behaviour so long after the change."""
-
-
-@dataclass(frozen=True)
-class AttentionParams:
-    """Hysteresis of the choice, reaction time, and the greatest age of a frame."""
-
-    # fmt: off
-    hysteresis_ratio: Annotated[float, Bounds(1, 10),
-        "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
-    least_salience: Annotated[float, Bounds(0, 10),
-        "a thing less salient than this is no target of its own: glanced at like anything in view, as if nobody were there"] = 0.05
-    min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
-    stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
-    looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
-        "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
-    own_motion_ratio: Annotated[float, Bounds(0, 1),
-        "share of their motion that a person's own hands and clothes keep beside the face, unless they are raised to it or held "
-        "out; the rest counts for the face; 1: all"] = 0.3
-    face_memory_s: Annotated[float, Bounds(0, 600),
-        "a face that leaves the view while something else is looked at is remembered where it was for this time; 0: not at all"] = 15.0
-    habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
-    reaction: Annotated[ReactionParams, "reaction time"] = field(default_factory=ReactionParams)
-    # fmt: on
 
 
 class Attention:

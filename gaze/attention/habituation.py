@@ -11,33 +11,15 @@ Ruesch et al. 2008 (a Gaussian about that place that decays).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import acos, exp, radians
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.angles import dot, sub, unit
+from gazerig.gaze.attention.params import HabituationParams
 from gazerig.gaze.attention.shared_attention import SharedAttention
 from gazerig.gaze.types import BodyRows, Floats, Vec3
-from gazerig.params import Bounds
-
-
-@dataclass(frozen=True)
-class HabituationParams:
-    """Rates of habituation and recovery, and extent of the inhibition of return."""
-
-    # fmt: off
-    decay_rate_1_s: Annotated[float, Bounds(0, 10),
-        "rate at which the salience factor of the present target decreases from 1; 0: never"] = 0.2
-    recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the salience factors of everything else recover to 1"] = 1.0
-    rule_floor: Annotated[float, Bounds(0, 1),
-        "lowest salience factor of one of several targets of a rule; lower: the gaze changes sooner between people"] = 0.0
-    inhibition_of_return_strength: Annotated[float, Bounds(0, 1),
-        "how strongly the point that the gaze has just left is avoided; 0: not at all"] = 0.5
-    inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that inhibition around the point"] = 4.0
-    inhibition_of_return_s: Annotated[float, Bounds(0.05, 60), "time constant with which that inhibition decays"] = 1.5
-    # fmt: on
 
 
 class _Left(NamedTuple):

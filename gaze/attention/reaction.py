@@ -11,28 +11,12 @@ What comes nearer fast is answered sooner, and so is a face that was looked at a
 change of behaviour is the robot's own decision, not a stimulus: it waits for nothing.
 """
 
-from dataclasses import dataclass
 from math import exp, inf
-from typing import Annotated
 
 import numpy as np
 
+from gazerig.gaze.attention.params import ReactionParams
 from gazerig.gaze.types import Target
-from gazerig.params import Bounds
-
-
-@dataclass(frozen=True)
-class ReactionParams:
-    """Distribution of reaction times, and what shortens them."""
-
-    # fmt: off
-    median_ms: Annotated[float, Bounds(0, 1000),
-        "median time from the frame in which something else wins attention to the change of target; 0: at once; people 150 to 250"] = 150.0
-    spread: Annotated[float, Bounds(0, 1), "standard deviation of the logarithm of that time"] = 0.15
-    looming_ratio: Annotated[float, Bounds(0, 1), "share of that time for what comes nearer fast"] = 0.65
-    return_ratio: Annotated[float, Bounds(0, 1), "share of that time for a face that was looked at within return_s"] = 0.8
-    return_s: Annotated[float, Bounds(0, 600), "time for which a face counts as just looked at"] = 5.0
-    # fmt: on
 
 
 class Reaction:

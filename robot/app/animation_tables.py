@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from math import radians
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.gaze.gesture.animation import AnimationTables
 from gazerig.gaze.gesture.level import LevelParams, LevelRange
 from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset

@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from gazerig.config.rig import BusConfig
-from gazerig.config.schema import Rig
+from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.checked_bus import CheckedBus
 from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.bus.servo_models import SERVOS

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.camera import sources
 from gazerig.drivers.camera.browser_source import FIELD_DEG
 from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.pose_slot import PoseAt, PoseSlot
 from gazerig.drivers.camera.process import CameraProcess

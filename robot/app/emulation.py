@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from math import pi, radians
 
-from gazerig.config.rig import BusConfig
-from gazerig.config.schema import Rig
+from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, rig_setups

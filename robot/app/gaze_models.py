@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, find, is_ours, load, made
 from gazerig.gaze.attention.bottom_up import BottomUp

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.config.gestures import gesture_name, load_gesture
+from gazerig.config.rig import Rig
 from gazerig.config.save_text import written
-from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
 from gazerig.gaze.gesture.gesture import HEAD_TRACKS, Gesture

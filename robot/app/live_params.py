@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.parameters import NEXT_START, changed, differences, live
-from gazerig.config.schema import Rig, load_walk
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_walk
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.aversion import Aversion

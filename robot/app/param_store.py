@@ -29,6 +29,7 @@ from gazerig.config.parameters import (
     values_after,
 )
 from gazerig.config.parameters import parameters as described
+from gazerig.config.rig import Rig
 from gazerig.config.rig_files import (
     RigFiles,
     RigLayers,
@@ -39,7 +40,7 @@ from gazerig.config.rig_files import (
 )
 from gazerig.config.save import rig_file
 from gazerig.config.save_text import EditRefused, written
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.config.subprocess_call import in_subprocess
 from gazerig.robot.app.live_params import LiveParams
 from gazerig.robot.model.commands import Value

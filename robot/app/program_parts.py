@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple, cast
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.camera.camera_plugins import CheckedSource, is_source
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S

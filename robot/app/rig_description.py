@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.description.build import RigShape, describe

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from math import radians
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Mapping
 from operator import itemgetter
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.gaze.types import Mat3, Vec3

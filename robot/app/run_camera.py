@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Mat3

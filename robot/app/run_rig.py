@@ -3,7 +3,8 @@
 from dataclasses import replace
 from typing import TypeVar
 
-from gazerig.config.schema import Rig, load_rig, load_rules
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig, load_rules
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.surroundings import surroundings

@@ -14,7 +14,7 @@ from gazerig.drivers.plugins import SURROUNDINGS, find, is_ours, registered
 if TYPE_CHECKING:
     import numpy as np
 
-    from gazerig.config.schema import Rig
+    from gazerig.config.rig import Rig
     from gazerig.drivers.types import Camera
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.app.program_parts import ProgramParts

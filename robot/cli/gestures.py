@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 

@@ -235,7 +235,7 @@ def _world(recording: "RunRecording") -> "WorldShapes | None":
 def _built(config_yaml: str) -> "ShownRig | None":
     """Return how the recorded rig was built; None, with the reason, where that is unknown."""
     from gazerig.config.load import ConfigError, load
-    from gazerig.config.schema import Rig
+    from gazerig.config.rig import Rig
     from gazerig.robot.app.gaze_models import gaze_parts
     from gazerig.robot.app.rig_description import shape_of
     from gazerig.robot.dashboard.feed.snapshot import ShownRig

@@ -28,7 +28,8 @@ def checked_line(rig: str) -> str:
     Raises:
         ConfigError: with every fault of its files.
     """
-    from gazerig.config.schema import Rig, load_rig
+    from gazerig.config.rig import Rig
+    from gazerig.config.schema import load_rig
     from gazerig.robot.app.rig_description import mesh_faults
 
     found: Rig = load_rig(rig, further=[mesh_faults])

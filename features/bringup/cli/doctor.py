@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from gazerig.config.rig import BusConfig
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import BusConfig, Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
 from gazerig.drivers.vision.detector_status import detector_status

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 import typer
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, parked
 from gazerig.features.bringup.move_result import Step
 from gazerig.features.bringup.servo_families import KINDS

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from gazerig.config.rig import BusConfig
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import BusConfig, Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BusPort
 from gazerig.features.bringup.cli.ports import (
     MockOption,

@@ -9,7 +9,8 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.cli.manual_session import holding, holding_rig
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, rig_ports

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from math import degrees
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.camera_calibration import CameraCalibrationRefused
 from gazerig.features.bringup.cli.manual_session import holding_rig

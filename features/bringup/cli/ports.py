@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
 from gazerig.drivers.serial.list_ports import serial_ports

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.hobby_board.release import stop_pulses
 from gazerig.drivers.maestro.line import MaestroLink

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from gazerig.config.gestures import gesture_name
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.features.bringup.cli.motion import enter_pressed

@@ -6,8 +6,8 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from gazerig.config.rig import BusConfig
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import BusConfig, Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.serial.port import BusPort

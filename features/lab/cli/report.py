@@ -16,7 +16,7 @@ from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
 
 if TYPE_CHECKING:
-    from gazerig.config.schema import Rig
+    from gazerig.config.rig import Rig
     from gazerig.features.lab.report.gaze_trace import GazeTrace
     from gazerig.features.lab.report.heads import MutualGazeReport
     from gazerig.features.lab.report.run_header import RunHeader
@@ -241,7 +241,8 @@ def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
         gazerig.config.load.ConfigError: it is not valid today.
     """
     from gazerig.config.load import load
-    from gazerig.config.schema import RULES, Rig, load_walk
+    from gazerig.config.rig import Rig
+    from gazerig.config.schema import RULES, load_walk
     from gazerig.gaze.scanpath.scanpath import Walk
 
     with TemporaryDirectory() as folder:

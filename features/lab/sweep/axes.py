@@ -13,7 +13,7 @@ import numpy as np
 
 from gazerig.config.load import ConfigError, ConfigFault
 from gazerig.config.parameters import changed, parameters, value_of
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.commands import Value

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import gazerig
 from gazerig.config.parameters import plain
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.config.text import gestures_text, rig_text, walk_text
 from gazerig.features.lab.sweep.axes import Axis, Point
 from gazerig.features.lab.sweep.outcome import Outcome

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from gazerig.config.parameters import changed
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.config.text import rig_text
 from gazerig.errors import Error
 from gazerig.features.lab.simulated_run import simulate

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder

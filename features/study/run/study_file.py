@@ -10,7 +10,8 @@ from typing import cast
 
 from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped
 from gazerig.config.parameters import NEXT_START, changed, differences, live, values
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.features.study.design import Condition, StudyDesign
 from gazerig.features.study.preregistration import canonical, design_sha256
 from gazerig.features.study.questionnaire import Questionnaire

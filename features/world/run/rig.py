@@ -5,7 +5,7 @@ from functools import partial
 from math import radians
 from typing import TYPE_CHECKING
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.features.world.rig_in_world import (
     Gearing,
     JointGearing,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera
 from gazerig.features.world.other_heads import HeadInState, OtherHeads

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.config.load import ConfigError, ConfigFault, load, shipped
-from gazerig.config.schema import Rig, load_rig, rig_path
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig, rig_path
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.extras import extra_hint
 from gazerig.features.world.camera_params import WorldCameraParams

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.heads_scene import HeadFace, RigFrame
 from gazerig.features.world.run.lockstep import Lockstep

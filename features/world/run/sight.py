@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.camera.frame_analysis import Locate
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess

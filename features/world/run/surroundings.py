@@ -1,6 +1,6 @@
 """Our worlds as surroundings of a run: ``gazerig run --world``."""
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 from gazerig.config.shipped import shipped_names
 from gazerig.features.world.shipped import HOME
 from gazerig.robot.app.options import RunOptions

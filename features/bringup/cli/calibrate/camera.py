@@ -12,7 +12,8 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.oak.calibration import OakCalibration
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.orientation import UprightSource

@@ -5,7 +5,7 @@ from typing import Any
 
 from rich.table import Table
 
-from gazerig.config.schema import Rig
+from gazerig.config.rig import Rig
 
 
 def difference_table(rig: str, loaded: Rig, changes: Mapping[str, Any]) -> Table:

@@ -11,7 +11,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.face_calibration import (
     PART_NAMES_TEXT,

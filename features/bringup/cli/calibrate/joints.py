@@ -6,8 +6,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from gazerig.config.rig import Rig
 from gazerig.config.save import propose, rig_file
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
 from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
