@@ -93,7 +93,7 @@ def _described(gesture: Mapping[str, Any]) -> str:
 
 
 def _kept(value: float, seconds: float | None) -> Iterator[float]:
-    """Repeat a value for so long, at the pace that keeps it up."""
+    """Repeat a value for a time, often enough to keep it."""
     clock = RealClock()
     end_s = clock.now_s() + (inf if seconds is None else seconds)
     yield value

@@ -1,4 +1,4 @@
-"""Opening the live page in the user's browser, where there is a desktop and somebody before it."""
+"""Opening the live page in the user's browser, on a desktop with a user."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def has_desktop(environ: Mapping[str, str], platform: str, terminal: bool) -> bo
     if not terminal or environ.get("CI"):
         return False
     if environ.get("SSH_CONNECTION") or environ.get("SSH_TTY"):
-        return False  # it would open at the other computer, before nobody
+        return False  # it would open on the remote computer, which has no user
     if platform in ("darwin", "win32"):
         return True
     return bool(environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY"))

@@ -1,4 +1,4 @@
-"""The group of all commands, which imports the module of the one that was typed."""
+"""The group of all commands, which imports only the module of the typed command."""
 
 from collections import UserDict
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from gazerig.robot.cli.terminal import clear_errors
 class CommandsByName(UserDict[str, Any]):
     """Commands by name, each imported when it is taken out.
 
-    data: those imported so far; of the others only name, summary and panel
+    data: those imported until now; the others have a name, summary and panel only
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class CommandsByName(UserDict[str, Any]):
 
 
 class CommandGroup(TyperGroup):
-    """Lists the commands panel by panel, and imports one when it is run or asked about."""
+    """Lists the commands panel by panel, and imports one to run it or show its help."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)

@@ -81,7 +81,7 @@ def emulate(
 
 
 class LineOptions(NamedTuple):
-    """The options that say how a line is opened and how it behaves, as they were given."""
+    """The given options for opening a line and for its behaviour."""
 
     baud: int | None
     any_baud: bool
@@ -94,7 +94,7 @@ def _buses(devices: Mapping[str, Emulated], line: LineOptions) -> list[BusSettin
     """Return every bus with its terminal's settings.
 
     Raises:
-        SetupError: one baud rate is given for several buses, or one that the servos do not know.
+        SetupError: one baud rate is given for several buses, or the servos do not support it.
     """
     several = len(devices) > 1
     if line.baud is not None and several:
@@ -182,7 +182,7 @@ def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
 
 
 def _link(link: Path | None, bus: str) -> str | None:
-    """Return the link to a bus; names tell those of a rig apart."""
+    """Return the link to a bus, with its name if a rig has several."""
     if link is None:
         return None
     return f"{link}-{bus}" if bus else str(link)

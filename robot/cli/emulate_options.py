@@ -1,4 +1,4 @@
-"""The options of the command emulate: what each takes, and what --help says of it."""
+"""The options of the command emulate, with their help."""
 
 from pathlib import Path
 from typing import Annotated

@@ -29,7 +29,7 @@ def main() -> None:
             from gazerig.robot.cli.main import main as whole
 
             whole()
-    finally:  # all is said: nothing is left to interrupt
+    finally:  # all output is written: nothing is left to interrupt
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -43,8 +43,7 @@ def _gone(number: int, frame: FrameType | None) -> None:
 def hold_standard_files() -> None:
     """Open what of standard input, output and error was closed: nothing goes there.
 
-    Else the next file that is opened gets its number, and what is said to people goes to
-    the servos.
+    Otherwise the next file that is opened gets its number, and messages go to the servos.
     """
     for fd in (0, 1, 2):
         try:
@@ -52,7 +51,7 @@ def hold_standard_files() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
     nowhere = open(os.devnull, "r+", encoding="utf-8")  # noqa: SIM115 - for all of the program
-    # What was closed when Python began is None there, which libraries do not expect.
+    # A stream that was closed when Python started is None there, which libraries do not expect.
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, nowhere)
@@ -61,7 +60,7 @@ def hold_standard_files() -> None:
 def is_quick(arguments: Sequence[str], environ: Mapping[str, str]) -> bool:
     """Return whether cli/tune.py alone can do what was typed, or complete it for a shell.
 
-    arguments: what stands after ``gazerig``
+    arguments: those after ``gazerig``
     """
     if environ.get("_GAZERIG_COMPLETE", "").startswith("complete"):
         typed = environ.get("COMP_WORDS") or environ.get("_TYPER_COMPLETE_ARGS", "")

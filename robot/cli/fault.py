@@ -1,4 +1,4 @@
-"""The command ``gazerig ctl fault``: what befalls the emulated servos of a running rig."""
+"""The command ``gazerig ctl fault``: faults of the emulated servos of a running rig."""
 
 from typing import Annotated
 

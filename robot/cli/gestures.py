@@ -38,7 +38,7 @@ def import_gesture(
 
 
 def finish(rig: Rig, name: str, text: str, folder: Path, force: bool) -> None:
-    """Write a gesture, and say how this rig does it and how to use it."""
+    """Write a gesture, and print how this rig performs it and how to use it."""
     from gazerig.robot.app.gesture_file import write_gesture
 
     path, fitted = write_gesture(rig, name, text, folder, force)

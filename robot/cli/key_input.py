@@ -10,8 +10,8 @@ import tty
 from typing import Self
 
 _ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
-# What arrow keys send, in both modes of a terminal (ECMA-48 CSI, or SS3), and other keys that
-# send sequences, which say nothing here.
+# Sequences of arrow keys in both modes of a terminal (ECMA-48 CSI, or SS3), and of other keys,
+# which are ignored.
 _SEQUENCE = re.compile(r"\x1b(?:\[[0-9;?]*([A-Za-z~])|O([A-Za-z]))")
 _BEGUN = re.compile(r"\x1b(?:\[[0-9;?]*|O)?$")
 
@@ -51,7 +51,7 @@ class TerminalInput:
             termios.tcsetattr(sys.stdin, termios.TCSANOW, self._before)
 
     def text(self) -> str | None:
-        """Return what has been typed, "" for nothing, None where the terminal is gone."""
+        """Return the typed text, "" for nothing, None if the terminal is gone."""
         if not select.select([sys.stdin.fileno()], [], [], 0.0)[0]:
             return ""
         try:

@@ -38,7 +38,7 @@ def kinds(
 
 
 def _row(found: Registration) -> dict[str, Any]:
-    """Return what is shown of a part; one that cannot be loaded has a fault."""
+    """Return the listing of a part; a part that cannot be loaded has a fault."""
     row: dict[str, Any] = {
         "name": found.name, "group": GROUPS[found.group], "package": found.package,
         "version": found.version, "abilities": [], "evidence": {}, "proven": "", "fault": "",

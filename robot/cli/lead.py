@@ -1,4 +1,4 @@
-"""Commands that lead, stop and resume a rig which runs in another terminal."""
+"""Commands that move, stop and resume a rig that runs in another terminal."""
 
 import contextlib
 from collections.abc import Sequence
@@ -76,7 +76,7 @@ def _until(seconds: float | None) -> str:
 
 
 def _lead_on(rig: RobotClient, seconds: float) -> None:
-    """Lead for so long, or until Ctrl-C or until another client leads; then end the lead."""
+    """Control the gaze for a time, until Ctrl-C or until another client does; then release it."""
     clock = RealClock()
     end_s = clock.now_s() + seconds
     with contextlib.suppress(KeyboardInterrupt):
@@ -100,7 +100,7 @@ def stop(
     with clear_errors():
         rigs = running(pid, "gazerig stop")
         if not rigs:
-            RobotClient.connect(pid)  # says why there is none
+            RobotClient.connect(pid)  # raises the reason
         failed = False
         for rig in rigs:
             try:
@@ -122,7 +122,7 @@ def resume(
     ] = False,
     pid: PidOption = None,
 ) -> None:
-    """Switch the torque on again after a stop, where the joints are, and go on slowly."""
+    """Switch the torque on again after a stop, at the present pose, and continue slowly."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl resume") as rig:
         now = rig.status()
         if not now["stopped"]:
@@ -136,7 +136,7 @@ def resume(
 
 
 def read_look(words: Sequence[str], head: bool = False, distance_m: float | None = None) -> Look:
-    """Read what is to be looked at.
+    """Read the target to look at.
 
     Args:
         words: X Y Z in metres, "person" N, "pixel" X Y, "direction" YAW PITCH in degrees, "free".

@@ -1,7 +1,7 @@
 """Lines for people, written by a thread: a terminal that takes none delays no caller.
 
 A pipe without a reader, a terminal stopped with Ctrl-S, a full disk, a terminal that was
-closed: the caller goes on at once. What cannot be written is dropped and counted.
+closed: the caller continues immediately. Lines that cannot be written are dropped and counted.
 """
 
 import contextlib
@@ -44,7 +44,7 @@ class LineWriter:
         if self._gone or self._call.waiting() >= self._most:
             self.dropped += 1
             return
-        # What was on the status line is older than this.
+        # The text on the status line is older than this.
         self._status = None
         self._call.begin(lambda: self._write(text))
 

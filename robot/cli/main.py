@@ -47,7 +47,7 @@ def begin(
 
 
 def main() -> None:
-    """Run the command line: an error is one line, and with --debug also where it comes from."""
+    """Run the command line: an error is one line, with --debug also its traceback."""
     arguments = sys.argv[1:]
     if "--debug" in arguments:  # wherever people put it
         arguments = [word for word in arguments if word != "--debug"]

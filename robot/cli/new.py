@@ -57,7 +57,7 @@ def new(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Write a rig's YAML of your own from a few answers, check it, and say what to type next."""
+    """Write a new rig's YAML from a few answers, check it, and print the next command."""
     with clear_errors():
         if file.suffix not in (".yaml", ".yml"):
             raise SetupError(f"{file}: a rig's file ends in .yaml: gazerig new {file.stem}.yaml")
@@ -82,7 +82,7 @@ def new(
 class Questions:
     """Asks on the terminal what no option has answered; without one, what is usual is taken.
 
-    terminal: a person can be asked
+    terminal: a person can answer
     """
 
     def __init__(self, terminal: bool) -> None:
@@ -95,9 +95,9 @@ class Questions:
         """Return one of some choices, by its name or its number.
 
         Args:
-            question: What is asked.
+            question: Its text.
             option: The option that answers it.
-            given: What that option was given.
+            given: The value of that option.
             choices: Each with what it is.
             usual: The answer of who presses Enter.
             others: Other answers are right as well.
@@ -178,7 +178,7 @@ def _write(rig: NewRig, file: Path, force: bool) -> None:
 
 
 def _plugged_in(board: str) -> str:
-    """Return the only USB serial adaptor's port, where the board is behind one; else ""."""
+    """Return the port of the only USB serial adaptor if the board uses one, else ""."""
     if not usual_port(board).startswith("/dev/tty") or board == "none":
         return ""
     from gazerig.drivers.serial.list_ports import serial_ports

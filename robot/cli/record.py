@@ -86,7 +86,7 @@ def _record(
     force: bool,
     stopped: Callable[[], str | None],
 ) -> None:
-    """Record until told to stop, and say what is in the file."""
+    """Record until stopped, and print what the file contains."""
     from gazerig.drivers.camera.recorder import CameraRecorder
 
     clock = RealClock()

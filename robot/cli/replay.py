@@ -110,7 +110,7 @@ def export(
 def _export(
     file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None, force: bool
 ) -> None:
-    """Write one kind of export and say what was written."""
+    """Write one kind of export and print the names of its files."""
     from gazerig.robot.control.feedback_basis import ESTIMATED
     from gazerig.robot.recording.export_bids import DatasetDescription, write_bids
     from gazerig.robot.recording.export_csv import csv_files, write_csv
@@ -163,7 +163,7 @@ def _show(
     seconds: float | None,
     stopped: Callable[[], str | None],
 ) -> bool:
-    """Serve the page until told to stop; False where it cannot be had."""
+    """Serve the page until stopped; return False if it cannot start."""
     from gazerig.robot.dashboard.feed.live_feed import (
         LiveRig,
         RunState,
@@ -219,7 +219,7 @@ def _show(
 
 
 def _world(recording: "RunRecording") -> "WorldShapes | None":
-    """Return how the recorded run's world looked; None without one, or, said why, if it is lost."""
+    """Return the recorded run's world; None without one, or if it is lost, with a message."""
     if recording.world is None:
         return None
     from gazerig.robot.app.surroundings import surroundings
@@ -233,7 +233,7 @@ def _world(recording: "RunRecording") -> "WorldShapes | None":
 
 
 def _built(config_yaml: str) -> "ShownRig | None":
-    """Return how the recorded rig was built; None, with the reason, where that is unknown."""
+    """Return the recorded rig's build; None, with the reason, if it is unknown."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.rig import Rig
     from gazerig.robot.app.gaze_models import gaze_parts
@@ -264,7 +264,7 @@ def _built(config_yaml: str) -> "ShownRig | None":
 
 
 def _rerun(file: Path, rig: str | None, character: str | None, joints: str | None) -> bool:
-    """Run a recording again and print what came out; False where it should be the same and is not.
+    """Run a recording again and print the result; return False if it should be the same and is not.
 
     Only joints as recorded can come out the same; nothing else was then to change.
     """
@@ -331,7 +331,7 @@ def _words(value: object) -> str:
 
 
 def _with_progress(ticks: Iterable["Tick"], read: Callable[[float], None]) -> Iterator["Tick"]:
-    """Pass ticks on, and tell how far they are."""
+    """Pass ticks on and show the progress."""
     start_s = None
     for number, tick in enumerate(ticks):
         start_s = tick.t_s if start_s is None else start_s

@@ -23,7 +23,7 @@ def check(rig: RigArgument = "desk") -> None:
 
 
 def checked_line(rig: str) -> str:
-    """Load a rig and return one line that says that it is good.
+    """Load a rig and return one line of success.
 
     Raises:
         ConfigError: with every fault of its files.

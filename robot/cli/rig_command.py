@@ -1,4 +1,4 @@
-"""How every command names its rig: RIG is a word, and the first one wherever there are others."""
+"""The RIG argument of commands: the first of several, and it may be left out."""
 
 from typing import Any
 

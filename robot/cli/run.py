@@ -108,7 +108,7 @@ class Opening:
     """Says in its first line what runs: before any other, and not for a run that is refused.
 
     Args:
-        line: what runs; "" says nothing.
+        line: describes the run; "" prints nothing.
     """
 
     def __init__(self, line: str) -> None:
@@ -136,7 +136,7 @@ def what_runs(asked: RunOptions) -> str:
 
 
 def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
-    """Return whether a run had faults, and say which joints they held."""
+    """Return whether a run had faults, and print the joints that they held."""
     alike: dict[tuple[str, int, float], list[str]] = {}
     for joint, reasons in figures["joint_faults"].items():
         for reason, count in reasons.items():

@@ -1,4 +1,4 @@
-"""The options of the command run: what each takes, and what --help says of it."""
+"""The options of the command run, with their help."""
 
 from pathlib import Path
 from typing import Annotated

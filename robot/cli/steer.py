@@ -1,4 +1,4 @@
-"""The command ``gazerig ctl steer``: keys or a gamepad lead a rig that runs in another terminal."""
+"""The command ``gazerig ctl steer``: keys or a gamepad move a rig that runs in another terminal."""
 
 import contextlib
 import sys
@@ -30,7 +30,7 @@ HELP = {
 
 
 class SteeringInput(Protocol):
-    """What a person steers with."""
+    """An input device for steering."""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
         """Steer by what was moved, and return what was pressed: gestures, STOP, END."""
@@ -129,7 +129,7 @@ class KeyControls:
         self._rest = ""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Do what keys say; see SteeringInput."""
+        """Apply pressed keys; see SteeringInput."""
         from gazerig.robot.cli.key_input import split_keys
 
         typed = self._text()
@@ -164,7 +164,7 @@ class GamepadControls:
         self._pad = pad
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Do what stick and buttons say; see SteeringInput."""
+        """Apply stick and buttons; see SteeringInput."""
         news = self._pad.news()
         steering.stick(news.stick)
         return news.pressed

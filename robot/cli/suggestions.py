@@ -1,6 +1,6 @@
 """Commands that a message suggests, made ready to be typed: with the rig and port of this one.
 
-Who finds a fault (a driver, the doctor) does not know by which rig and port it was reached;
+A driver or the doctor that finds a fault does not know the rig and port of the command;
 the command line does. A cure that leaves them out would set up the default rig instead.
 """
 
@@ -54,9 +54,9 @@ def completed(text: str, given: Mapping[str, object] | None = None) -> str:
     def whole(found: re.Match[str]) -> str:
         named = (f" {shlex.quote(str(known['rig']))}", " --port ")
         if text[found.end() :].startswith(named):
-            return found[0]  # it says so itself
+            return found[0]  # its message is complete
         if found["command"] == "reboot" and not found["words"]:
-            return found[0]  # told of, not to be typed
+            return found[0]  # a description, not a command
         return _command(found["command"], found["words"], known)
 
     return _SUGGESTED.sub(whole, text)

@@ -94,7 +94,7 @@ def _errors_said() -> Iterator[None]:
 
 
 def _show_origin() -> None:
-    """With --debug, show where the error at hand comes from."""
+    """With --debug, show the traceback of the current error."""
     if logging.getLogger(DEBUG_LOGGER).isEnabledFor(logging.DEBUG):
         say(traceback.format_exc().rstrip("\n"))
 
@@ -197,7 +197,7 @@ def status(line: str) -> None:
 
 
 def _write(text: str, wiped: bool = False, status: bool = False) -> None:
-    """Write to standard error: by the writer's thread where that is a file, a pipe or a tty."""
+    """Write to standard error, in the writer's thread if that is a file, a pipe or a tty."""
     stderr = sys.stderr
     if stderr is None:  # it was closed before this program began
         return

@@ -78,7 +78,7 @@ def complete_menu(incomplete: str) -> list[str]:
 
 
 def complete_choice(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete what can be chosen from the menu that stands before it."""
+    """Complete choices of the menu named before it."""
     choices = _menus().get(context.params.get("menu") or "", ())
     return [choice for choice in choices if choice.startswith(incomplete)]
 
@@ -159,7 +159,7 @@ def save(
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Write what was set into the rig's YAML; comments stay, the old file is kept beside it."""
+    """Write what was set into the rig's YAML; comments stay, the old file is kept as a backup."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         saved = rig.save(path)
     _tell(f"{change.key}: {change.old} -> {change.new}" for change in saved.changes)
@@ -238,7 +238,7 @@ def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
     """Read KEY VALUE KEY VALUE ... with values as YAML.
 
     Raises:
-        SetupError: a value is missing or no YAML, or a key stands twice.
+        SetupError: a value is missing or no YAML, or a key is given twice.
     """
     if len(pairs) % 2:
         raise SetupError(
@@ -252,10 +252,10 @@ def read_pairs(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 def read_value(key: str, text: str) -> Any:
-    """Read a value as it would stand after its key in the YAML file.
+    """Read a value as YAML, as it follows its key in a file.
 
     Raises:
-        SetupError: it cannot stand there.
+        SetupError: it is no YAML value.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "value.yaml"
@@ -295,7 +295,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
 
 
 def _choices(choices: Sequence[str]) -> str:
-    """Write a menu's choices, of which the one in force comes first."""
+    """Write a menu's choices, the active one first."""
     return ", ".join((f"{choices[0]} (in force)", *choices[1:]))
 
 

@@ -1,4 +1,4 @@
-"""What to do next: shown where ``gazerig`` is typed with nothing after it."""
+"""Next steps: shown for ``gazerig`` without arguments."""
 
 from collections.abc import Iterable
 from pathlib import Path
