@@ -63,8 +63,7 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
     "Tools": {
         "new": CommandEntry(
             "new",
-            "Write a rig's YAML of your own from a few answers, check it, and say what to type "
-            "next.",
+            "Write a new rig's YAML from a few answers, check it, and print the next command.",
         ),
         "check": CommandEntry(
             "rig_check",
