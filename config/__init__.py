@@ -1,1 +1,1 @@
-"""YAML to frozen values, strictly; the shipped rigs, profiles and scanpaths lie beside it."""
+"""Strict reading of YAML into frozen values; with the shipped rigs, profiles and scanpaths."""

@@ -40,7 +40,7 @@ class AllowedFolder:
             start: where relative paths begin; None: in the folder
 
         Raises:
-            gazerig.config.load.ConfigError: the file lies elsewhere, links followed.
+            gazerig.config.load.ConfigError: the file is elsewhere, links followed.
         """
         if kind and "/" not in given and not given.endswith(_YAML):
             if given in shipped_names(kind):

@@ -40,11 +40,11 @@ _TURNS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # left to rig
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Shape:
-    """What may stand at one position in a file.
+    """The allowed values at one position in a file.
 
     inner: shape of the items of a list or mapping
     params: the dataclass, for form "params"
-    optional: null may stand here
+    optional: null is allowed
     low, high, choices, unit, description: as declared
     length: number of items of a list, None if free
     """
@@ -77,7 +77,7 @@ def with_stand_ins(
 ) -> T:
     """Return the dataclass with stand-ins at the faulty paths, its own rules unchecked.
 
-    A stand-in lies at the low or the high end of what may stand there. Lists and
+    A stand-in is at the low or the high end of the allowed values. Lists and
     mappings have none: reading such a field raises AttributeError.
     """
     return typing.cast(T, _fill(Shape("params", params=into), data, (), faulty, high))
@@ -131,7 +131,7 @@ def shapes_of(params: type) -> dict[str, Shape]:
 
 
 def _shape(declared: Declaration, kind: Any, place: str) -> Shape:
-    """Return what may stand where a type is declared, or in a list or mapping of it."""
+    """Return the allowed values of a declared type, or of a list or mapping of it."""
     shape = _of_type(declared, kind, place)
     return dataclasses.replace(shape, unit=declared.unit, description=declared.description)
 
@@ -266,7 +266,7 @@ _LEFT_OUT: Any = object()
 def _fill(
     shape: Shape, data: Any, path: tuple[Step, ...], faulty: Container[tuple[Step, ...]], high: bool
 ) -> Any:
-    """Return what stands at a path, all but its faulty parts from ``data``."""
+    """Return the value at a path, all but its faulty parts from ``data``."""
     if path in faulty:
         return _stand_in(shape, high)
     if data is None:
@@ -291,7 +291,7 @@ def _fill(
 
 
 def _stand_in(shape: Shape, high: bool) -> Any:
-    """Return a value from one end of what may stand at a place."""
+    """Return a value from one end of the allowed range of a place."""
     match shape:
         case Shape(form="number" | "whole"):
             least = shape.low if shape.low is not None else 0.0

@@ -44,7 +44,7 @@ class Entry:
         return self.value
 
     def nearest(self, path: Sequence[Step]) -> "Entry":
-        """Return the entry at a path, or the last one there is on the way to it.
+        """Return the entry at a path, or the last existing one above it.
 
         A key of a file may be a dotted path itself, as those of a study's parameters are.
         """
@@ -71,9 +71,9 @@ class Entry:
 def read(
     path: Path, faults: list[ConfigFault], known: Collection[str] = ()
 ) -> tuple[str, Entry | None]:
-    """Return a file's text and its top entry, None where nothing of it can be used.
+    """Return a file's text and its top entry, None if nothing of it can be used.
 
-    known: keys of such a file's top level. What has none of them is something else, and
+    known: keys of such a file's top level. A file with none of them is something else, and
         nothing of it is shown: any client that may choose a character could read it.
     """
     file, text = str(path), ""
@@ -145,7 +145,7 @@ def composed(text: str) -> Node | None:
 
 @lru_cache(maxsize=64)
 def _entries_of(file: str, text: str) -> tuple[Entry | None, tuple[ConfigFault, ...]]:
-    """Return the top mapping of a text as an entry, None where it is too much, and its faults.
+    """Return the top mapping of a text as an entry, None if it is too large, and its faults.
 
     Kept for the next loading of the same file: entries are only read, as nodes are.
     """
@@ -221,7 +221,7 @@ class _Reader:
         self._endless = False
 
     def whole(self, node: MappingNode) -> Entry | None:
-        """Return the top node as an entry, None where it is too deep, too large or no mapping."""
+        """Return the top node as an entry, None if it is too deep, too large or no mapping."""
         root = self._entry(node, _line(node), ())
         return root if isinstance(root.value, dict) and not self._endless else None
 

@@ -54,7 +54,7 @@ def violation(into: type, details: ErrorDetails) -> Violation:
 
 
 def expected(shape: Shape) -> str:
-    """Return what may stand at a position, as text."""
+    """Return the allowed values of a position, as text."""
     match shape:
         case Shape(form="number"):
             text = f"a number{_range(shape)}"
@@ -79,13 +79,13 @@ def expected(shape: Shape) -> str:
 
 
 def suggestion(word: str, words: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" where a known word is similar, else ""."""
+    """Return "; did you mean 'x'?" if a known word is similar, else ""."""
     near = difflib.get_close_matches(word, list(words), n=1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def abbreviated(value: object) -> str:
-    """Return a value for a message, cut where it is long."""
+    """Return a value for a message, cut if it is long."""
     writer = reprlib.Repr()
     writer.maxlevel, writer.maxstring, writer.maxother = 2, 60, 60
     writer.maxdict = writer.maxtuple = 6
@@ -126,7 +126,7 @@ def _named(value: object) -> str:
 
 
 def _hint(shape: Shape, value: object) -> str:
-    """Return how a value of the wrong type is corrected, where that is plain, else ""."""
+    """Return the correction of a value of the wrong type if it is obvious, else ""."""
     if shape.form == "text" and isinstance(value, bool | int | float):
         return "; put it in quotes"
     if shape.form in ("number", "whole") and isinstance(value, str):

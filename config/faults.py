@@ -10,8 +10,8 @@ from gazerig.errors import Error
 class ConfigFault:
     """One thing to change in a file.
 
-    line, column: from 1, None where the file could not be read at all
-    key: dotted key path, list items counted from 0; value: what stands there, shortened
+    line, column: from 1, None if the file could not be read
+    key: dotted key path, list items counted from 0; value: the text there, shortened
     rule: what is wrong, and the remedy
     """
 

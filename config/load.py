@@ -65,7 +65,7 @@ def load(
 ) -> T:
     """Return the frozen dataclass that ``path`` over its ``defaults`` (the earliest lowest) makes.
 
-    Checks are asked about the whole value; where fields are at fault, what they find
+    Checks get the whole value; if fields are at fault, what they find
     is listed if it holds whatever right values take their place.
 
     Raises:
@@ -76,7 +76,7 @@ def load(
     known = tuple(shapes_of(cast(Any, into)))
     layers = [read(file, faults, known)[1] for file in files]
     whole = [_from_its_folder(layer) for layer in layers if layer is not None]
-    if len(whole) < len(files):  # what a missing layer would have said is unknown
+    if len(whole) < len(files):  # the content of a missing layer is unknown
         raise ConfigError(faults)
     root = whole[0]
     for layer in whole[1:]:
@@ -95,7 +95,7 @@ def validate_entries(
 ) -> tuple[T | None, list[ConfigFault]]:
     """Return the frozen dataclass that merged entries make, None where impossible, and every fault.
 
-    What checks find is a fault as well, so a value may come with some.
+    Findings of checks are faults too, so a value may come with some.
     """
     into, problems = extended(into, root.plain())
     if problems:
@@ -175,7 +175,7 @@ def _steps(key: str) -> tuple[str, ...]:
 
 
 def _from_its_folder(layer: Entry) -> Entry:
-    """Return a file's entries with the paths of files beside it as seen from the working folder."""
+    """Return a file's entries with paths of neighbouring files relative to the working folder."""
     if not isinstance(layer.value, dict):
         return layer
     folder, found = Path(layer.file).parent, dict(layer.value)
@@ -213,7 +213,7 @@ def _is_relative(value: object) -> bool:
 def _merged(low: Entry, high: Entry, into: type | None = None) -> Entry:
     """Return one entry laid over another; a mapping keeps the line of the lowest file.
 
-    into: the dataclass that they make; a mapping that it has by default lies below ``high`` where
+    into: the dataclass that they make; its default mapping is below ``high`` where
         ``low`` has none, so that a character can change one rule of those every rig has
     """
     if not (isinstance(low.value, dict) and isinstance(high.value, dict)):
@@ -281,6 +281,6 @@ def _certain(
 
 
 def _as_far_as_possible(check: Check[T], value: T) -> Iterator[tuple[str, str]]:
-    """Return what a check finds until a stand-in makes it fail."""
+    """Return the findings of a check until a stand-in makes it fail."""
     with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         yield from check(value)

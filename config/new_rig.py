@@ -47,7 +47,7 @@ MECHANISMS: Mapping[str, Mechanism] = {
 
 @dataclass(frozen=True)
 class NewRig:
-    """What is to be written.
+    """The rig to write.
 
     board, camera: of BOARDS and CAMERAS
     joints: names, in the order of their ids
@@ -69,7 +69,7 @@ class NewRig:
 
 
 class _Servo(NamedTuple):
-    """How a joint is driven: its servo, what that does in it, and what else stands in its line."""
+    """The drive of a joint: its servo, its function, and the other settings in its line."""
 
     model: str
     speed_deg_s: int
@@ -78,9 +78,9 @@ class _Servo(NamedTuple):
 
 
 class _Board(NamedTuple):
-    """What a board brings.
+    """Properties of a board.
 
-    port: where it usually is; first_id: of the servos, by custom
+    port: its usual one; first_id: of the servos, by custom
     eye, lid, neck: how joints are driven; gaze: what is slower than with the fastest servos
     """
 
@@ -153,7 +153,7 @@ def rig_text(new: NewRig) -> str:
 
 
 def usual_port(board: str) -> str:
-    """Return where a board usually is."""
+    """Return the usual port of a board."""
     return _TABLE[board].port
 
 
@@ -191,13 +191,13 @@ def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
 
 
 def _scalar(text: str) -> str:
-    """Return a text as YAML, in quotes where it could be read as anything else."""
+    """Return a text as YAML, in quotes if it could be read as anything else."""
     plain = re.fullmatch(r"/?[A-Za-z][\w./-]*", text) and text.lower() not in _WORDS
     return text if plain else json.dumps(text, ensure_ascii=False)
 
 
 def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:
-    """Return where the lids are shut and open, and the pose before the torque goes off."""
+    """Return the shut and open angles of the lids, and the pose before the torque goes off."""
     lids = [name for name in joints if name in (*_UPPER, *_LOWER)]
     if lids:
         yield "lid_joints:  # deg, each lid shut and fully open"
@@ -212,7 +212,7 @@ def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:
 
 
 def _joint(name: str, board: _Board) -> str:
-    """Return what stands in a joint's line behind its id."""
+    """Return the settings in a joint's line after its id."""
     low, high = _range_deg(name, board)
     servo = board.eye
     if name.endswith("_lid"):
@@ -248,7 +248,7 @@ def _lid_ends(lid: str) -> str:
 
 
 def _seeing(new: NewRig, camera: str) -> Iterator[str]:
-    """Return where the camera sits: on the head where a neck turns it, else beside it."""
+    """Return the place of the camera: on the head if a neck turns it, else next to it."""
     if CAMERAS[camera] == CAMERAS["none"]:
         return
     where = ("head", "[20, 0, 45]") if new.has_neck else ("base", "[10, 0, 140]")

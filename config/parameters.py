@@ -4,7 +4,7 @@ A key is the dotted path of the YAML. A rig is changed by keys as a file would c
 errors have the same texts, and nothing is changed then. Pure.
 
 A changed rig shares with the old one every section in which nothing changed, and only the others
-are checked and compared: a dragged slider makes ten rigs a second beside the control loop.
+are checked and compared: a dragged slider makes ten rigs a second while the control loop runs.
 """
 
 import dataclasses
@@ -154,7 +154,7 @@ def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
 def differences(before: Rig, after: Rig) -> dict[str, Value]:
     """Return the changes that turn one rig into another: ``changed(before, ...) == after``.
 
-    Where a mapping lost an entry, that entry's value is None.
+    An entry that a mapping lost has the value None.
     """
     return dict(_differing(_root(after), before, after, ()))
 
@@ -183,7 +183,7 @@ def plain(value: Any) -> Any:
 
 
 def _parts(value: Any) -> dict[str, Any] | None:
-    """Return what stands one step below a value, None where there is nothing."""
+    """Return the values one step below a value, None if it has none."""
     if isinstance(value, Mapping):
         return {str(key): item for key, item in value.items()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):

@@ -78,7 +78,7 @@ def extended(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
         try:
             _section(group, name)
         except PluginError as error:
-            # A name that nobody brings breaks the rule of its key, which lists those there are.
+            # A name that no package registers breaks its key's rule, which lists the known ones.
             if any(one.name == name for one in registered(group)):
                 problems.append(Problem(key, str(error)))
             elif group != CAMERA:

@@ -1,6 +1,6 @@
-"""What a rig file holds: the Params of every room, in one place.
+"""Content of a rig file: the Params of every package, in one place.
 
-Bounds stand with the values, in the rooms; the rules between sections in gazerig.config.schema.
+Bounds are with the values; the rules between sections are in gazerig.config.schema.
 """
 
 from collections.abc import Mapping
@@ -56,7 +56,7 @@ class Ranges:
 
 @dataclass(frozen=True)
 class BusConfig:
-    """How the servos on one port are reached."""
+    """Connection to the servos on one port."""
 
     # fmt: off
     port: Annotated[str, "serial port or I2C bus, e.g. /dev/ttyUSB0"]
@@ -116,7 +116,7 @@ class LidJoints:
     @staticmethod
     def keys(name: str) -> tuple[str, str]:
         """Return the keys of a lid joint's shut and open angle."""
-        # "left_upper_lid" stands as left_shut_deg, "left_lower_lid" as left_lower_shut_deg.
+        # "left_upper_lid" is written as left_shut_deg, "left_lower_lid" as left_lower_shut_deg.
         lid = name.removesuffix("_lid").removesuffix("_upper")
         return f"{lid}_shut_deg", f"{lid}_open_deg"
 

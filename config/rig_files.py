@@ -1,7 +1,7 @@
 """The files of a running rig: read together, and written only if they can be loaded again.
 
-What is written starts from the text that was last read without a fault: a rig's file that
-was broken by hand meanwhile is kept beside it, and is never the base of what is saved.
+A file is written from the text that was last read without a fault: a rig's file that was broken
+by hand meanwhile is kept as a backup, and is never the base of a new file.
 """
 
 import os
@@ -22,7 +22,7 @@ _LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
 
 
 class RigLayers(NamedTuple):
-    """The files of a rig as asked for, each a shipped name or a path."""
+    """The requested files of a rig, each a shipped name or a path."""
 
     name: str
     character: str | None
@@ -72,7 +72,7 @@ def save_over(
         now: Goes into the backup's name.
 
     Returns:
-        What was written, and the files that the rig is made of now.
+        The written file, and the files that the rig is now made of.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.save.save.
@@ -145,7 +145,7 @@ def _texts(paths: tuple[Path, ...]) -> tuple[bytes, ...]:
     try:
         return tuple(read_limited(path, _LARGEST) for path in paths)
     except OSError:
-        return ()  # what is wrong is said when it is loaded
+        return ()  # its faults are reported when it is loaded
 
 
 def _copy(text: bytes, to: Path) -> None:

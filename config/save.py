@@ -1,7 +1,7 @@
 """Writing values into a user's YAML file, in one step and with a backup.
 
 The new text is checked as a file of its own before it takes the old one's place, in one
-step; the old file stays beside it under a name with the time.
+step; the old file stays in the folder under a name with the time.
 """
 
 import contextlib
@@ -59,7 +59,7 @@ def save(
     into: type,
     base: bytes | None = None,
 ) -> SavedFile:
-    """Write values at dotted key paths into a YAML file and keep the old file beside it.
+    """Write values at dotted key paths into a YAML file and keep the old file as a backup.
 
     Keys that are not there are added with a comment. Comments, order, style and anchors stay. The
     file is replaced only after ``check`` has loaded the new one and found every
@@ -117,7 +117,7 @@ def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
 def _proposal(
     target: Path, changes: Mapping[str, Value], into: type, base: bytes | None = None
 ) -> tuple[bytes | None, bytes, tuple[ParamChange, ...]]:
-    """Return the file as it is, None where there is none, as it would be, and the difference."""
+    """Return the file's text (None without a file), its new text, and the difference."""
     known = tuple(shapes_of(into))
     if base is None:
         before = read_yaml(target, known)  # refuses what is no YAML, with the line
@@ -141,7 +141,7 @@ def _proposal(
 
 
 def _held(target: Path) -> bytes | None:
-    """Return what a file holds, None where there is none."""
+    """Return a file's content, None without a file."""
     with _errors_named(target):
         try:
             return read_limited(target, _LARGEST)
@@ -173,7 +173,7 @@ def _follow(value: Any, key: str) -> Any:
 
 
 def _refuse_side_effects(before: dict[str, Any], text: str, changes: Mapping[str, Value]) -> None:
-    """Check that the new text differs in the values asked for and in nothing else.
+    """Check that the new text differs in the requested values only.
 
     An anchor lends its value to other places, which must not change unseen.
     """
@@ -199,7 +199,7 @@ def _leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 
 def _check_new(target: Path, fresh: Path, changes: Mapping[str, Value], check: Check) -> None:
-    """Load the new file and check that every value is in force."""
+    """Load the new file and check that it has every value."""
     try:
         loaded = check(str(fresh))
     except ConfigError as error:

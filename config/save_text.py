@@ -1,6 +1,6 @@
 """Changing values inside YAML text; every other byte stays as it is.
 
-The text is parsed only to learn where each value stands. Comments, order, indentation,
+The text is parsed only to find the place of each value. Comments, order, indentation,
 quotes, anchors and line ends survive because they are not rewritten.
 """
 
@@ -27,7 +27,7 @@ _NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 
 
 class EditRefused(ValueError):
-    """A value cannot be changed in place; the message says which one, why, and the remedy."""
+    """A value cannot be changed in place; the message has its key, the reason and the remedy."""
 
 
 class _Edit(NamedTuple):
@@ -44,7 +44,7 @@ def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
     into: the Params dataclass of the file; its fields' descriptions explain keys that are added
 
     Raises:
-        Unchangeable: a value cannot be written where it should stand.
+        EditRefused: a value cannot be written at its place.
     """
     root = _top(text)
     edits, absent = [], {}
@@ -67,7 +67,7 @@ def written(value: Value) -> str:
     """Return a value as YAML on one line.
 
     Raises:
-        Unchangeable: not finite, or no scalar or list.
+        EditRefused: not finite, or no scalar or list.
     """
     if value is None:
         return "null"
@@ -89,7 +89,7 @@ def written(value: Value) -> str:
 
 
 def _top(text: str) -> MappingNode:
-    """Return the top node of the text; nodes know where they stand and are not changed."""
+    """Return the top node of the text; nodes hold their places and are not changed."""
     node = composed(text)
     if not isinstance(node, MappingNode):
         raise EditRefused("the top level is no mapping; write 'key: value' lines")
@@ -100,14 +100,14 @@ def _top(text: str) -> MappingNode:
 
 
 class _KeyAndValue(NamedTuple):
-    """A value with the node (a key, or the list itself) that stands before it."""
+    """A value with the node before it (a key, or the list itself)."""
 
     before: Node
     node: Node
 
 
 def _find(root: MappingNode, steps: list[str]) -> _KeyAndValue | None:
-    """Return the value at a path, None where it or a mapping above it is missing."""
+    """Return the value at a path, None if it or a mapping above it is missing."""
     place = _KeyAndValue(root, root)
     for step in steps:
         if not isinstance(place.node, MappingNode):
@@ -122,10 +122,10 @@ def _find(root: MappingNode, steps: list[str]) -> _KeyAndValue | None:
 
 
 def _span(text: str, place: _KeyAndValue) -> tuple[int, int]:
-    """Return where a value stands: after its anchor and tag; an alias stands for the whole."""
+    """Return the span of a value: after its anchor and tag; an alias is the whole value."""
     before, node = place
     at = before.start_mark.index if isinstance(before, SequenceNode) else before.end_mark.index
-    if node.start_mark.index < at:  # the value itself stands at its anchor, further up
+    if node.start_mark.index < at:  # the value itself is at its anchor, further up
         alias = _ALIAS.match(text, at)
         if alias is None:
             raise EditRefused("stands behind an alias that cannot be followed; write it out")
@@ -139,7 +139,7 @@ def _span(text: str, place: _KeyAndValue) -> tuple[int, int]:
 
 
 def _end(text: str, place: _KeyAndValue) -> int:
-    """Return where the last character of a value stands, comments after it left out."""
+    """Return the place of a value's last character, without comments after it."""
     node = place.node
     inside = isinstance(node, MappingNode | SequenceNode) and not node.flow_style
     if not inside or node.start_mark.index < place.before.start_mark.index:
@@ -200,7 +200,7 @@ def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> 
 
 
 def _end_of_line(text: str, at: int) -> int:
-    """Return where a line ends, before its line end."""
+    """Return the end of a line, before its line break."""
     end = text.find("\n", at)
     end = len(text) if end < 0 else end
     return end - 1 if end > at and text[end - 1] == "\r" else end
@@ -216,7 +216,7 @@ def _block(steps: list[str], depth: int, indent: int, value: Value, into: type) 
 
 
 def _explained(body: str, description: str, indent: str) -> list[str]:
-    """Return a line with a comment behind it, or above it where it is too long."""
+    """Return a line with a comment behind it, or above it if it is too long."""
     line = f"{indent}{body}"
     if not description:
         return [line]
@@ -227,7 +227,7 @@ def _explained(body: str, description: str, indent: str) -> list[str]:
 
 
 def comment(into: type, steps: list[str]) -> str:
-    """Return unit, range and meaning of the key at a path; "" where there is no such key."""
+    """Return unit, range and meaning of the key at a path; "" if no such key exists."""
     shape: Shape | None = Shape("params", params=into)
     for step in steps:
         if shape is None:

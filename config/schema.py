@@ -40,7 +40,7 @@ def load_rig(
     Args:
         name_or_path: of the rig.
         character: name or path of a file with differences, laid over rig and profile.
-        profile: name or path of a style of gaze, instead of the one that the rig names.
+        profile: name or path of a style of gaze, instead of the rig's.
         further: rules besides a rig's own, such as read other files.
 
     Raises:
@@ -111,7 +111,7 @@ def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
                 "no name of a joint: small letters, digits and _, a letter first, at most 40",
             )
         elif name not in GAZE_JOINTS and (near := get_close_matches(name, absent, 1, 0.8)):
-            # A jaw may have any name; a neck that was misspelt would stand still without a word.
+            # A jaw may have any name; a misspelt neck would not move, without a message.
             yield f"joints.{name}", f"did you mean {near[0]}? Other joints need less similar names"
     for way in ("pan", "tilt"):
         own = [name for name in (f"left_eye_{way}", f"right_eye_{way}") if name in rig.joints]
@@ -183,7 +183,7 @@ def _channel(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
 
 
 def _setup(name: str, rig: Rig) -> ServoConfig:
-    """Return what the bus must know of a joint's servo, as far as the rig is right so far."""
+    """Return what the bus must know of a joint's servo, as far as the rig is right."""
     for one in rig.couplings.values():
         known = {one.first, one.second} <= rig.joints.keys() and all(
             rig.joints[joint].model in SERVOS for joint in (one.first, one.second)
@@ -195,7 +195,7 @@ def _setup(name: str, rig: Rig) -> ServoConfig:
 
 
 def _series(rig: Rig) -> Iterable[tuple[str, str]]:
-    """See that servos of one bus have their numbers the same way round."""
+    """Check that servos of one bus have the same byte order."""
     first: dict[str, str] = {}
     for name, joint in rig.joints.items():
         known, facts = SERVOS.get(first.setdefault(joint.bus, joint.model)), SERVOS.get(joint.model)
@@ -320,7 +320,7 @@ def levels(rig: Rig) -> Iterable[tuple[str, str]]:
 
 
 def _joint_fault(rig: Rig, joint: str) -> str:
-    """Return why a joint cannot be moved beside gaze, "" where it can."""
+    """Return why a joint cannot be moved independently of gaze, "" if it can."""
     free = [name for name in rig.names if name not in EYES]
     if joint in EYES:
         return f"gaze alone turns the eyes; what can be moved here is {', '.join(free)}"
@@ -330,12 +330,12 @@ def _joint_fault(rig: Rig, joint: str) -> str:
 
 
 def _range_fault(rig: Rig, joint: str, angle: float) -> str:
-    """Return why an angle cannot be added to a joint, "" where it can."""
+    """Return why an angle cannot be added to a joint, "" if it can."""
     params = rig.joints[joint]
     if joint in LIDS:
         shut, wide = rig.lid_joints.ends_deg(joint)
         if shut is None or wide is None:
-            return ""  # said where the ends are missing
+            return ""  # reported if the ends are missing
         if abs(angle) <= abs(wide - shut):
             return ""
         return (

@@ -1,4 +1,4 @@
-"""Function calls in a process of their own: rig files are read and written beside a control loop.
+"""Function calls in another process: rig files are read and written while a control loop runs.
 
 Reading a rig takes 130 ms of pure Python. In another thread of the loop's process that made
 ticks last up to 90 ms instead of 1, as every answer of a servo was waited for behind the
@@ -28,7 +28,7 @@ def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) ->
     """Return what ``work``, a function of a module, returns when called in another process.
 
     ``in_subprocess(load_rig, "my.yaml", "shy")`` blocks for half a second and leaves this process's
-    interpreter free. Paths mean the same there; values are copied both ways.
+    interpreter free. Paths mean the same there; arguments and results are copied.
 
     Raises:
         gazerig.config.load.ConfigError: as ``work`` does, or the process failed.

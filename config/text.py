@@ -1,4 +1,4 @@
-"""A configuration as one YAML text that stands for all its layers.
+"""A configuration as one YAML text that replaces all its layers.
 
 It is read back with ``gazerig.config.load.load``; values come back exactly.
 """
@@ -16,7 +16,7 @@ from gazerig.config.schema import load_walk
 
 
 def rig_text(rig: Rig) -> str:
-    """Return everything that is in force of a rig as YAML: rig, profile, character and changes."""
+    """Return all active settings of a rig as YAML: rig, profile, character and changes."""
     return "".join(_lines(plain(rig)))
 
 
@@ -35,7 +35,7 @@ def walk_text(name_or_path: str) -> str:
 
 
 def gestures_text(files: Sequence[str]) -> str:
-    """Return the gestures that a rig names itself as one YAML text, "" where it names none.
+    """Return the gestures that a rig names itself as one YAML text, "" if it names none.
 
     Raises:
         gazerig.config.load.ConfigError: one is at fault.

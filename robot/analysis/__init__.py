@@ -1,1 +1,1 @@
-"""What a run says about gaze, and what people do: measures for the page, summaries and features."""
+"""Measures of gaze in a run, and of people: for the page, summaries and features."""

@@ -1,11 +1,11 @@
-"""Which of a scene's events the gaze answered, and how fast (Mitake et al. 1 and 4).
+"""The gaze's responses to a scene's events, and their latencies (Mitake et al. 1 and 4).
 
 Judged by what was chosen to be looked at, tick by tick; so the latency of the camera, of
 perception and of the choice are in it, the flight of the eyes (50 ms and more) is not.
 An event counts when it is over. World frame, metres, seconds.
 
-The time of a hand that reaches in from outside the field of view begins where the scene
-says so: when the hand comes nearer to straight ahead than half the camera's field. A
+The time of a hand that reaches in from outside the field of view begins when the hand comes
+nearer to straight ahead than half the camera's field. A
 head that is turned a little towards it may see it earlier, one turned away later, by
 about 0.1 s for every 8 degrees.
 """
@@ -20,12 +20,12 @@ from gazerig.robot.control.tick import Tick
 
 
 class Happening(Protocol):
-    """Something that happens in every round of a scene, and what is asked of the gaze.
+    """An event of every round of a scene, and the response expected from the gaze.
 
     asks: "look": be on a thing of this kind between start and end; "return": be on it
         again by the end
     start_s, end_s: from the beginning of a round
-    place_world_m, within_m: where that thing is: looking at another of its kind elsewhere
+    place_world_m, within_m: place of that thing: looking at another of its kind elsewhere
         is no answer
     """
 
@@ -56,7 +56,7 @@ class Happening(Protocol):
 
     @property
     def place_world_m(self) -> Vec3:
-        """Return where it happens."""
+        """Return its place."""
         ...
 
     @property
@@ -66,10 +66,10 @@ class Happening(Protocol):
 
 
 class _Answer(NamedTuple):
-    """How one event went.
+    """Outcome of one event.
 
     latency_s: "look": from its start to the first look, None without one;
-        "return": time spent elsewhere, None where the gaze was never drawn away
+        "return": time spent elsewhere, None if the gaze was never drawn away
     """
 
     seen: bool
@@ -143,13 +143,13 @@ class BehaviourScore:
         """Return for each name: how many were seen, of how many, and how.
 
         latency_s: median over the events seen (away: over those that drew the gaze off)
-        share: of the events' time, the part in which what was asked for was looked at
+        share: part of the events' time in which the expected target was looked at
         """
         return {name: _figure(answers) for name, answers in self._answers.items()}
 
 
 def _looks_at(tick: Tick, event: Happening) -> bool:
-    """Return whether the target in force is what the event asks for."""
+    """Return whether the current target is the expected one."""
     target = tick.target
     if target.kind != event.kind:
         return False

@@ -1,8 +1,8 @@
-"""What the eyes do, found tick by tick as an eye tracker finds it: saccades, fixations, blinks.
+"""Saccades, fixations and blinks, detected tick by tick as an eye tracker does.
 
-All is as the servos say: the mean of both lines of sight in space, and the opening of the upper
-lids. Of servos that tell nothing it is estimated from their goals. What was commanded stands
-beside it, so that what the servos make of a saccade can be told.
+All values are those of the servos: the mean of both lines of sight in space, and the opening of
+the upper lids. Without feedback they are estimated from the goals. The commanded saccade is kept
+with the measured one, so that both can be compared.
 """
 
 from collections import Counter, deque
@@ -39,7 +39,7 @@ _EYE_JOINTS = frozenset(name for name in GAZE_JOINTS if "eye" in name)
 
 
 class Commanded(NamedTuple):
-    """A saccade as the models asked for it."""
+    """A saccade as the models commanded it."""
 
     onset_s: float
     duration_s: float
@@ -51,7 +51,7 @@ class SaccadeEvent(NamedTuple):
     """One saccade of the gaze in space.
 
     peak_at: share of the duration at which it was fastest, .5 is symmetric
-    commanded: what had been asked for, None where the eyes jumped by themselves
+    commanded: the commanded saccade, None if the eyes jumped without a command
     """
 
     onset_s: float
@@ -72,7 +72,7 @@ class FixationEvent(NamedTuple):
 
     part: the face part that the lines of sight passed nearest to, None off the parts
     on_face: whether it was on a face at all; face: that face's id, -1 without one
-    kind, wanted: kind of the target in force, and its face part
+    kind, wanted: kind of the current target, and its face part
     """
 
     start_s: float
@@ -94,7 +94,7 @@ T = TypeVar("T")
 
 
 class EventDetector:
-    """Finds events in ticks as they come; an event is told when it is over."""
+    """Finds events in ticks as they arrive; an event is reported when it is over."""
 
     def __init__(self) -> None:
         self._saccades = SaccadeFinder()
@@ -147,7 +147,7 @@ class EventDetector:
         self._rest = _Rest(None)
 
     def _note_command(self, tick: Tick) -> None:
-        """Follow the saccade that the models have under way."""
+        """Follow the current saccade of the models."""
         flying = tick.gaze.phase == "saccade"
         if not flying and self._flight is None:
             return
@@ -168,7 +168,7 @@ class EventDetector:
         for command in reversed(known):
             if -_COMMAND_AFTER_S <= onset_s - command.onset_s <= _COMMAND_BEFORE_S:
                 if command in self._commands:
-                    self._commands.remove(command)  # an eye that swings back was not told to
+                    self._commands.remove(command)  # an eye that swings back was not commanded to
                 return command
         return None
 
@@ -223,7 +223,7 @@ class _Rest:
         self._kinds[tick.target.kind, tick.target.part] += 1
 
     def over(self, end_s: float) -> FixationEvent | None:
-        """Return the fixation, None where there was none worth the name."""
+        """Return the fixation, None if it was too short."""
         if self._start_s is None or end_s - self._start_s < SHORTEST_S:
             return None
         part = _most(self._parts, None)
@@ -236,7 +236,7 @@ class _Rest:
 def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:
     """Return the face part that the measured gaze passes, and the face's id, -1 off all faces.
 
-    way: unit vector of the gaze in the world
+    direction: unit vector of the gaze in the world
     """
     if tick.percept is None:
         return None, -1

@@ -25,7 +25,7 @@ class GazeOnFace:
         self._last_s: float | None = None
 
     def update(self, tick: Tick) -> None:
-        """Add the tick's point where a face is the target and the eyes are not jumping."""
+        """Add the tick's point if a face is the target and no saccade is active."""
         before, self._last_s = self._last_s, tick.t_s
         if before is None or tick.target.kind != "face" or tick.gaze.phase == "saccade":
             return
@@ -47,9 +47,9 @@ class GazeOnFace:
 def on_face(
     p_world_eye_m: Vec3, way_world: Vec3, p_world_face_m: Vec3, R_world_face: Mat3
 ) -> tuple[float, float] | None:
-    """Return where a line of sight meets the plane of a face: (y, z) in the face's frame.
+    """Return the intersection of a line of sight with the plane of a face: (y, z) in its frame.
 
-    None where the line runs along the plane or away from it, or the face is seen from behind.
+    None if the line is parallel to the plane or points away, or the face is seen from behind.
     """
     out = (R_world_face[0][0], R_world_face[1][0], R_world_face[2][0])
     towards = dot(way_world, out)

@@ -1,8 +1,8 @@
 """Where on a face a person has looked, as an image (Nakamoto & Tsuruno 4.3, figs 8 and 9).
 
-Gaze points lie in the face's own frame, y to the owner's left and z up, in metres from the
+Gaze points are in the face's own frame, y to the owner's left and z up, in metres from the
 tip of the nose. Each is spread by a bell as wide as what is
-seen sharply from a metre away and weighted by its time; yellow is where the gaze was longest.
+seen sharply from a metre away and weighted by its time; yellow marks the longest gaze.
 """
 
 from pathlib import Path
@@ -110,7 +110,7 @@ def face_from(photo: Path) -> Image:
     faces = face_detector(FaceDetectorParams()).find(np.asarray(image, dtype=np.uint8))
     if not faces:
         raise SetupError(f"{photo}: no face found; give an image of one face from its front")
-    flat = [0, 1, 3, 4]  # without the nose, which stands out of the plane
+    flat = [0, 1, 3, 4]  # without the nose, which is in front of the plane
     there = faces[0].landmarks_px[flat]
     here = on_canvas(LANDMARKS_FACE_M[flat, 1:])
     ones = np.ones((len(flat), 1))

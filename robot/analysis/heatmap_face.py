@@ -1,4 +1,4 @@
-"""A plain frontal face drawn to measure, so that a gaze point lies on the part it was meant for.
+"""A plain frontal face drawn to measure, so that a gaze point is on the part it was meant for.
 
 The canvas shows y to the owner's left rightwards and z up upwards, as one sees a person who
 faces one; its measures are those of gazerig.robot.perception.face_pose.
@@ -15,7 +15,7 @@ from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 WIDTH_PX, HEIGHT_PX = 720, 860
 PX_PER_M = 3000.0
-# Where the tip of the nose lies.
+# Place of the tip of the nose.
 _NOSE_PX = (WIDTH_PX / 2.0, 480.0)
 
 _PAPER, _SKIN, _SHADE = (243, 244, 245), (226, 230, 234), (205, 210, 216)

@@ -1,4 +1,4 @@
-"""The colour scale of a heat map, and how long each part was looked at, beside the image."""
+"""The colour scale of a heat map and the time on each part, next to the image."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,7 @@ def with_legend(
 ) -> Image:
     """Return the image with a panel to its right.
 
-    most_s_cm2: what the top of the colour scale stands for
+    most_s_cm2: value at the top of the colour scale
     shares: of the time, per part code and "elsewhere"
     """
     panel: Image = np.full((image.shape[0], _PANEL_PX, 3), _PAPER, np.uint8)

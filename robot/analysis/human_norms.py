@@ -1,4 +1,4 @@
-"""What people do, as published: curves and tables that a trace is held against."""
+"""Published curves and tables of people, which a trace is compared with."""
 
 import numpy as np
 from numpy.typing import ArrayLike

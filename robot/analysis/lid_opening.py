@@ -1,4 +1,4 @@
-"""How far the lids of a rig are open."""
+"""Opening of the lids of a rig."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ LOWER = ("left_lower_lid", "right_lower_lid")
 def openings(
     left: float, right: float, names: Sequence[str], pair: tuple[str, str]
 ) -> tuple[float, float] | None:
-    """Return the openings of two lids, None without any; one that is alone stands for both.
+    """Return the openings of two lids, None without any; a single lid counts for both.
 
     pair: joints of the left and the right one; names: of the rig, all where empty
     """

@@ -26,7 +26,7 @@ Mask = NDArray[np.bool_]
 
 
 class HeadPlace(NamedTuple):
-    """Where one of the heads stands in their common world.
+    """Pose of one of the heads in their common world.
 
     Attributes:
         R: rotation of its neck base's frame.
@@ -70,8 +70,8 @@ class MutualGazeTrace:
     """Whether each of two heads looks at the other, tick by tick of the first.
 
     Args:
-        first: where the first head stands.
-        second: where the other one does.
+        first: pose of the first head.
+        second: pose of the other one.
     """
 
     def __init__(self, first: HeadPlace, second: HeadPlace) -> None:
@@ -94,7 +94,7 @@ class MutualGazeTrace:
         return MutualLooks(t_s, first, second)
 
     def figures(self) -> dict[str, object]:
-        """Return the statistics of ``mutual_gaze`` for the time so far."""
+        """Return the statistics of ``mutual_gaze`` until now."""
         return mutual_gaze(*self.looks())
 
 

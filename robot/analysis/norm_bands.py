@@ -1,7 +1,7 @@
-"""What is measured, between which limits people lie, and who has found that.
+"""Measures, the limits between which people are, and their sources.
 
-The limits are published means with their spread, not targets. Where a model of this robot is
-built to do something else, a note says so; the verdict stays what it is.
+The limits are published means with their spread, not targets. If a model of this robot is
+built to differ, a note explains it; the verdict stays the same.
 """
 
 from typing import NamedTuple
@@ -10,11 +10,11 @@ from typing import NamedTuple
 class NormBand(NamedTuple):
     """One measure and its pass band.
 
-    key, group: its name in code, and the section it stands in
+    key, group: its name in code, and its section
     low, high: the band; least: fewest events that allow a verdict
     source: who has measured it
     mode: mode of conversation in which alone it applies, "" in all
-    notes: (style, words) pairs shown where the run has that style, e.g. "saccade min_jerk"
+    notes: (style, words) pairs shown if the run has that style, e.g. "saccade min_jerk"
     """
 
     key: str

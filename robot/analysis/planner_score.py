@@ -1,4 +1,4 @@
-"""How well an action planner boxes: guards in time and against nothing else, attacks that are open.
+"""Score of an action planner that boxes: guards in time, false guards, attacks into open guards.
 
 Judged by ``Target.plan`` tick by tick, against what truly happened: the events "punch" of a scene,
 each with the time at which the fist arrives, and "attack", while the opponent's guard is open.
@@ -75,7 +75,7 @@ class PlannerScore:
             self._attacks.append(_Attack(start_s, looked))
 
     def figures(self) -> dict[str, float | int | None]:
-        """Return what came of it; an empty dict where nothing was ever planned.
+        """Return the score; an empty dict if nothing was planned.
 
         guards_in_time, punches: how many punches met a guard when the fist arrived, of how many
         lead_ms: median time by which those guards began before that
@@ -119,6 +119,6 @@ class PlannerScore:
     def _during(
         self, at_s: float, events: tuple[Bout, ...], before_s: float, after_s: float
     ) -> bool:
-        """Return whether a time lies within an event, or so near to one."""
+        """Return whether a time is within an event, or near one."""
         phase_s = at_s % self._round_s
         return any(e.start_s - before_s <= phase_s <= e.end_s + after_s for e in events)

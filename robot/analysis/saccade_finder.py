@@ -163,7 +163,7 @@ class SaccadeFinder:
     def _fly(self, speed: _Speed, before_deg_s: float) -> Jump | None:
         """Wait for the landing: the speed is low, or has a minimum before the eye swings back."""
         now = speed.relative_deg_s
-        # Against the peak so far: on its way up a saccade is low before it is high, too.
+        # Relative to the peak until now: a saccade is slow at its beginning, too.
         swings = before_deg_s < _SWING_SHARE * self._peak_deg_s and now > before_deg_s
         self._peak_deg_s = max(self._peak_deg_s, now)
         if now < self._foot() or swings:

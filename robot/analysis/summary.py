@@ -75,7 +75,7 @@ class Summary:
         self._waiting.clear()
 
     def figures(self) -> dict[str, object]:
-        """Return what the ticks themselves tell; the caller adds bus, loop and frames."""
+        """Return the figures of the ticks; the caller adds bus, loop and frames."""
         self._count()
         last = self._last
         return {

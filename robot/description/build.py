@@ -1,6 +1,6 @@
 """The description of a rig: a tree of links from the measures and joints of its YAML. Pure.
 
-The neck turns yaw, pitch, roll about axes through one point, on a lower neck where there is one;
+The neck turns yaw, pitch, roll about axes through one point, on a lower neck if the rig has one;
 the head carries eyes that pan and tilt about their centres, lids that turn about an axis through
 both eyes' centres, and whatever other joints the rig has. Angles are those of the rig's joints,
 with their signs (robot/model/kinematics.py).
@@ -42,7 +42,7 @@ _AXES |= {"pan": _AXES["yaw"], "tilt": UP}
 
 
 class RigShape(NamedTuple):
-    """What a description is made from: values of a rig's YAML.
+    """Values of a rig's YAML that a description is made from.
 
     lids: angles of the lid joints shut and open
     image_px: width and height of the camera's frames
@@ -96,7 +96,7 @@ class _Builder:
                 self._add_further(name)
         self._links.insert(first, self._head(neck, self._links[first:]))
         camera = self._add_camera()
-        # The links of the neck lie in each other, in the shoulders and in the head.
+        # The links of the neck overlap each other, the shoulders and the head.
         necks = [link.name for link in self._links[1:first]]
         inside = [HEAD, *(link.name for link in self._links if link.parent == HEAD)]
         touching = [*combinations((BASE, *necks), 2), *product(necks, inside)]
@@ -127,7 +127,7 @@ class _Builder:
         chain += [(name, pivot) for name in NECK if name in joints]
         head_m = (self._eyes_m[0], 0.0, pivot + self._eyes_m[2])
         first = chain[0][1] if chain else pivot
-        # A column about a yaw axis turns with it; any other stands still.
+        # A column about a yaw axis turns with it; any other does not move.
         turns = bool(chain) and chain[0][0].endswith("yaw")
         self._links.append(
             parts.base(BASE, self._measures, head_m, 0.0 if turns else first, bool(chain))
@@ -195,13 +195,13 @@ class _Builder:
         return name
 
     def _add_lid(self, name: str) -> None:
-        """Add a lid whose edge meets the other lid's where the rig says that it is shut."""
+        """Add a lid whose edge meets the other lid's at the rig's shut angle."""
         side, which, _ = name.split("_")
         shut, wide = self._rig.lids[name]
         opens = 1.0 if wide > shut else -1.0
         up = opens if which == "upper" else -opens
         meet = self._meet_rad(side)
-        # With the joint at 0 the edge is so far above the eye's equator.
+        # Height of the edge above the eye's equator with the joint at 0.
         edge = meet - up * shut
         opened = parts.awake_opening_rad(which == "upper", meet, abs(wide - shut))
         awake = shut + copysign(opened, wide - shut)
@@ -263,7 +263,7 @@ def _in_head(links: list[Link]) -> list[Inertia]:
 
 
 def _counter(rest: Inertia, whole_kg: float, at_m: Vec3) -> Vec3:
-    """Return where the rest of a mass must be, so that all of it is centred on a point."""
+    """Return the centre of the rest of a mass with which the whole is centred on a point."""
     share = rest.mass_kg / (whole_kg - rest.mass_kg)
     x, y, z = (place + share * (place - off) for place, off in zip(at_m, rest.com_m, strict=True))
     return x, y, z

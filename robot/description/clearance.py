@@ -39,7 +39,7 @@ class Collision(NamedTuple):
 
 
 def collisions(rig: RigShape) -> tuple[Collision, ...]:
-    """Return where a rig's parts meet: for every two parts the pose nearest to straight ahead.
+    """Return the collisions of a rig: for every two parts the pose nearest to straight ahead.
 
     Every joint is tried alone, and every two joints of the necks together.
     """
@@ -51,7 +51,7 @@ def _lids(rig: RigShape) -> Iterator[Collision]:
         names = [f"{side}_{which}_lid" for which in ("upper", "lower")]
         if not all(name in rig.lids and name in rig.joints for name in names):
             continue
-        # How far each can go beyond the angle at which it is shut, in degrees.
+        # Travel of each beyond the angle at which it is shut, in degrees.
         ends, beyond = {}, {}
         for name in names:
             shut, wide = rig.lids[name]
@@ -88,7 +88,7 @@ def _placed_links(description: Description, angles: Mapping[str, float]) -> dict
 def _first(
     description: Description, angles: Mapping[str, float], one: str, other: str
 ) -> dict[str, float]:
-    """Return the pose on the way to one at which two links' bodies meet."""
+    """Return the first pose on the path to another at which the bodies of two links touch."""
     free, met = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (free + met)

@@ -11,8 +11,8 @@ from gazerig.robot.description.paint import Painted
 def cut(one: Painted, outside: Floats) -> tuple[Painted, Painted]:
     """Return the part of a mesh where values at its vertices are below 0, and the rest.
 
-    Triangles that have both are divided where the value, linear between their corners, is 0;
-    both parts have the new points, with colour and normal in between.
+    Triangles that have both are divided at the line on which the value, linear between their
+    corners, is 0; both parts have the new points, with colour and normal in between.
 
     Args:
         one: with normals.

@@ -61,7 +61,7 @@ def _band(head: Solid, y: Floats, low: Floats, high: Floats, bulge: float) -> Me
     share = np.linspace(0.0, 1.0, _ROWS)[:, None]
     z = low + share * (high - low)
     points = head.front(np.tile(y, _ROWS), z.reshape(-1)).reshape(_ROWS, len(y), 3)
-    # Its edges are a little inside the skin, so that none of it stands off.
+    # Its edges are a little inside the skin, so that no gap shows.
     points[..., 0] += bulge * (np.sin(pi * share) ** 0.7 * 1.25 - 0.25) + 0.006
     return grid(points, closed=False)
 
@@ -72,10 +72,10 @@ def brow(
     """Return a brow: a tapering bow on the front of a head.
 
     Args:
-        head: on which it lies.
-        y: where it goes, from the nose outwards (n,).
+        head: the surface that carries it.
+        y: its places from the nose outwards (n,).
         z: its heights (n,).
-        thick: half its height where it is highest.
+        thick: half its greatest height.
         colour: of the hair.
         around: corners of its section.
     """

@@ -1,7 +1,7 @@
 """A description as binary glTF: a tree of nodes with meshes, for browsers and modelling programs.
 
 A joint is a node of its own between a link and its parent: its rotation is by the joint's angle
-about the axis that stands in its extras, and moves what hangs on it. y is up, as glTF wants it,
+about the axis in its extras, and moves its children. y is up, as glTF wants it,
 under a root that turns z up.
 """
 

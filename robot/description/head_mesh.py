@@ -85,7 +85,7 @@ def skin() -> HeadSkin:
 def _rims() -> tuple[Painted, Painted]:
     """Return the skin about the left and the right eye."""
     points, normals = eye_rim()
-    # Lit as if it lay a little flatter and higher: bags below the eyes look tired.
+    # Lit as if it were a little flatter and higher: bags below the eyes look tired.
     normals = normals + np.linspace(1.0, 0.0, len(points))[:, None, None] * (0.3, 0.0, 0.25)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     mesh = grid(points, closed=True)
@@ -101,7 +101,7 @@ def _jaw_side(jaw: Painted, sign: float, deep: float, within: Colour) -> Painted
     Args:
         jaw: its skin.
         sign: 1: the left side.
-        deep: share of the way from its edge to the jaw's middle.
+        deep: share of the distance from its edge to the jaw's middle.
         within: colour of its inner end.
     """
     rim = jaw.mesh.vertices[np.isclose(jaw.mesh.vertices[:, 1], sign * JAW_HALF)]
@@ -114,7 +114,7 @@ def _jaw_side(jaw: Painted, sign: float, deep: float, within: Colour) -> Painted
 
 
 def _turned_over(one: Painted) -> Painted:
-    """Return a surface that faces the other way."""
+    """Return a surface with its normals reversed."""
     mesh = Mesh(one.mesh.vertices, one.mesh.faces[:, ::-1])
     return Painted(mesh, one.colours, smooth_normals(mesh))
 
@@ -152,7 +152,7 @@ def _complexion(points: Floats, normals: Floats) -> Floats:
 def mouth() -> Painted:
     """Return the dark within an open mouth, in distances between the eyes.
 
-    A body that hides the neck, the inside of the skin, and the cheeks beside the jaw.
+    A body that hides the neck, the inside of the skin, and the cheeks next to the jaw.
     """
     ball = ellipsoid((0.52, 0.55, 0.62), 0.7)
     body = Mesh(ball.vertices + (-0.62, 0.0, -0.92), ball.faces)
@@ -173,7 +173,7 @@ def brow() -> Painted:
 @lru_cache(maxsize=1)
 def eye() -> Painted:
     """Return an eyeball of radius 1 that looks along x: white, iris, pupil under the cornea."""
-    # Close together where a colour ends: at the white, at the limbus and at the pupil.
+    # Close together at the edges of colours: the white, the limbus and the pupil.
     angles = np.radians(
         (110, 80, 60, 46, 37, 33, 31.6, 30.6, 29.6, 28.4, 27, 24.5, 21.5, 18.5, 16, 14, 13, 12, 10, 5, 0)
     )  # fmt: skip

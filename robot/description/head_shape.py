@@ -34,7 +34,7 @@ _ROWS, _COLUMNS = 52, 52
 _SOLIDS: tuple[tuple[Field, float], ...] = (
     (ellipsoid((-1.10, 0.0, 0.50), (1.30, 1.20, 1.30)), 0.1),  # skull
     (ellipsoid((-0.66, 0.0, -0.30), (0.84, 1.04, 0.96)), 0.45),  # face
-    (ellipsoid((-0.44, 0.0, -1.02), (0.60, 0.70, 0.50)), 0.36),  # mouth and what is beside it
+    (ellipsoid((-0.44, 0.0, -1.02), (0.60, 0.70, 0.50)), 0.36),  # mouth and the cheeks next to it
     (capsule((-0.98, 0.70, -0.25), (-0.84, 0.55, -0.88), 0.30, 0.26), 0.36),  # jaw, up to the ear
     (capsule((-0.84, 0.55, -0.88), (-0.14, 0.14, -1.32), 0.26, 0.26), 0.36),  # its lower edge
     (ellipsoid((-0.02, 0.0, -1.42), (0.19, 0.26, 0.18)), 0.24),  # chin
@@ -71,10 +71,10 @@ def smiling(y: Floats, z: Floats) -> Floats:
 
 
 class HeadMeasures(NamedTuple):
-    """What of a rig the shape follows.
+    """Values of a rig that the shape depends on.
 
     interocular_m: distance between the eye centres
-    pivot_m: where the neck's pitch axis is in the head frame
+    pivot_m: a point of the neck's pitch axis in the head frame
     """
 
     interocular_m: float = 0.0619
@@ -102,7 +102,7 @@ class HeadMeasures(NamedTuple):
 
     @property
     def hinge_m(self) -> Vec3:
-        """Return where a jaw turns."""
+        """Return the axis of the jaw."""
         return self.scaled(_HINGE)
 
 
@@ -153,7 +153,7 @@ def surface() -> Surface:
 
 
 def eye_rim() -> Surface:
-    """Return the left eye's surroundings: from where the lids come out to the skin about it.
+    """Return the left eye's surroundings: from the edge of the lids to the skin around it.
 
     Rows from within outwards, columns around the eye, closed.
     """
@@ -170,7 +170,7 @@ def eye_rim() -> Surface:
     skin = crossings(field, HEAD.centre, rays, HEAD.farthest)
     outwards = normals(field, skin)
     away = skin - edge
-    # It leaves the eye aside and a little ahead, and comes to the skin as the skin lies.
+    # It leaves the eye sideways and a little ahead, and meets the skin tangentially.
     begin = 0.45 * np.linalg.norm(away, axis=1, keepdims=True) * out + (0.05, 0.0, 0.0)
     end = away - (away * outwards).sum(axis=1, keepdims=True) * outwards
     share = np.linspace(0.0, 1.0, _RIM_ROWS)[:, None, None]
@@ -203,7 +203,7 @@ def _above_mouth(points: Floats) -> Floats:
 JAW_BOUNDS: tuple[Field, ...] = (
     lambda points: np.abs(points[:, 1]) - JAW_HALF,
     _above_mouth,
-    lambda points: -2.56 - 0.6 * points[:, 0] - points[:, 2],  # where the throat begins
+    lambda points: -2.56 - 0.6 * points[:, 0] - points[:, 2],  # top of the throat
     lambda points: -0.45 - points[:, 0],
 )
 """A jaw moves what of the surface is below 0 in each of these. Its sides are planes across its

@@ -1,4 +1,4 @@
-"""What a description of a rig consists of: links, joints, inertias, shapes. Values only.
+"""Links, joints, inertias and shapes of a rig's description. Values only.
 
 SI units. A link's frame is that of its joint: the joint turns it about an axis through its origin.
 World: origin at the neck base, x forward, y left, z up; all link frames are parallel to it while
@@ -33,10 +33,10 @@ class Inertia(NamedTuple):
 
 
 class CollisionShape(NamedTuple):
-    """A plain body that stands for a link in collisions.
+    """A simple body that represents a link in collisions.
 
     half_m: half axes of an ellipsoid or a box; radius of a sphere first; a capsule's radius and
-        half the length of its line, which lies along its z axis
+        half the length of its line, along its z axis
     layer: lids touch lids only, bodies everything else
     """
 
@@ -67,10 +67,10 @@ class Follows(NamedTuple):
 class LinkJoint(NamedTuple):
     """The hinge between a link and its parent.
 
-    name: as in the rig, or one of its own where it follows another joint
+    name: as in the rig, or its own if it follows another joint
     axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
     max_torque_nm: of the servo at the joint
-    awake_rad: where it is while the head is awake and looks straight ahead
+    awake_rad: its angle while the head is awake and looks straight ahead
     """
 
     name: str
@@ -145,7 +145,7 @@ class Description(NamedTuple):
 
         Args:
             names: of joints of the rig.
-            position_rad: their angles; joints that are not named stand at 0.
+            position_rad: their angles; joints that are not named are at 0.
         """
         known = dict(zip(names, position_rad, strict=True))
         found = {}

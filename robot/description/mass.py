@@ -86,7 +86,7 @@ def balanced(shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, at_m
         mass_kg: of both together.
         unit_m: distance between the eyes, which scales the content.
         middle_m: of the head; the content's centre stays near it, balanced or not.
-        at_m: where the centre of the whole should be: on the axes of the neck.
+        at_m: the wanted centre of the whole, on the axes of the neck.
     """
     rest = mass_kg - shell.mass_kg
     if rest <= 0.0:  # a very large head has a thinner shell

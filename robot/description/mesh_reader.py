@@ -18,7 +18,7 @@ _EDGE_RAD = radians(35.0)
 
 
 class MeshUnusable(ValueError):
-    """A file that cannot be shown; the message says why, and what helps."""
+    """A file that cannot be shown; the message has the reason and a remedy."""
 
 
 def read_mesh(params: MeshParams) -> Painted:

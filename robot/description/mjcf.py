@@ -93,7 +93,7 @@ def _add_assets(
         ET.SubElement(parent, "texture", name=name, type="2d", file=f"{name}.png")
         material = {"name": name, "texture": name} | _MATERIALS[visual.finish]
         ET.SubElement(parent, "material", material)
-        # A surface with holes has no inside; what it weighs stands with the body.
+        # A surface with holes has no volume; its mass is given with the body.
         ET.SubElement(parent, "mesh", name=name, file=f"{name}.obj", inertia="shell")
 
 

@@ -13,7 +13,7 @@ from gazerig.robot.description.paint import Painted
 
 @dataclass(frozen=True, eq=False)
 class OwnMesh:
-    """A mesh of the user's for a link: what the rig's file says, and what the mesh file holds.
+    """A user's mesh for a link: the rig's settings, and the content of the mesh file.
 
     painted: in metres
     """

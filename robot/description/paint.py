@@ -39,7 +39,7 @@ def mix(colours: Floats, colour: Colour, share: Floats) -> Floats:
 
 
 def step(value: Floats, width: float) -> Floats:
-    """Return 0 below and 1 above zero, with a smooth way between."""
+    """Return 0 below and 1 above zero, with a smooth transition."""
     share = np.clip(0.5 + value / (2.0 * width), 0.0, 1.0)
     return np.asarray(share * share * (3.0 - 2.0 * share))
 

@@ -48,7 +48,7 @@ _BODIES: tuple[tuple[Vec3, Vec3], ...] = (
     ((-0.66, 0.0, -0.30), (0.84, 1.04, 0.96)),  # face
 )
 _JAW_BODIES: tuple[tuple[Vec3, Vec3], ...] = (
-    ((-0.44, 0.0, -1.02), (0.60, 0.70, 0.50)),  # mouth and what is beside it
+    ((-0.44, 0.0, -1.02), (0.60, 0.70, 0.50)),  # mouth and the cheeks next to it
     ((-0.06, 0.0, -1.42), (0.20, 0.30, 0.20)),  # chin
 )
 """Ellipsoids (centre, half axes) that stand for the head in collisions."""
@@ -66,8 +66,8 @@ _BROW_HINGE: Vec3 = (-0.22, 0.54, 0.62)
 def meeting_rad(upper_span_rad: float, lower_span_rad: float) -> float:
     """Return the elevation above an eye's equator at which its lids meet.
 
-    It lies so that both lids, as far open as they are at rest, leave the pupil free. A lower lid
-    that does not move stands where they meet.
+    Its place lets both lids, as far open as they are at rest, leave the pupil free. A lower lid
+    that does not move is at the line where they meet.
 
     Args:
         upper_span_rad: travel of the upper lid from shut to open.
@@ -91,7 +91,7 @@ def awake_opening_rad(upper: bool, meet_rad: float, span_rad: float) -> float:
 
 
 def base(name: str, measures: HeadMeasures, head_m: Vec3, column_m: float, necked: bool) -> Link:
-    """Return what stands on the table: shoulders, and a neck that does not move.
+    """Return the fixed parts: shoulders, and a neck that does not move.
 
     Args:
         name: of the link.

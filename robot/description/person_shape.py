@@ -2,7 +2,7 @@
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up. In here
 the unit of length is the distance between the pupils; what leaves is in metres. Eyes, nose and
-mouth lie where those of the canonical face are (robot/model/face_geometry.py).
+mouth are at the places of the canonical face (robot/model/face_geometry.py).
 """
 
 from functools import lru_cache
@@ -111,7 +111,7 @@ _HEAD = Solid(_field, (-1.45, 0.0, 0.25), 3.4)
 
 
 class HeadParts(NamedTuple):
-    """A head in two parts, of which the second lies on the first: skin and hair; eyes and lips."""
+    """A head in two layers: skin and hair; eyes and lips on them."""
 
     solid: Painted
     features: Painted
@@ -174,13 +174,13 @@ def head_segments(look: PersonLook, fineness: float = 1.0) -> HeadSegments:
     inside = _MOUTH._replace(upper=0.03, lower=_MOUTH.lower + 0.045, half_width=0.30)
     open_mouth = moved(lips(_HEAD, inside, dark, dark).lower, (-0.004, 0.0, 0.0))
     eye, glint, lid, still = _eye_parts(look, fineness, 20)
-    # The glint lies flat on the eyeball, so that the lid goes over it.
+    # The glint is flat on the eyeball, so that the lid goes over it.
     flat = moved(glint, (-0.52 * _EYE_RADIUS, 0.022, 0.024), 0.52)
     solid = _head_solid(look, fineness)
     features = [*still, *(mirrored(part) for part in still), mouth.upper, mouth.line, open_mouth]
     back = tuple(-one / PUPIL_DISTANCE_M for one in MOUTH_FACE_M)
     size, here = PUPIL_DISTANCE_M, (0.0, 0.0, 0.0)
-    # The lower lip lies on the open mouth, which it covers while it is up.
+    # The lower lip is in front of the open mouth, which it covers while it is up.
     lower = moved(mouth.lower, (back[0] + 0.035, back[1], back[2]))
     return HeadSegments(
         merged([solid, moved(merged(features), here, size)]),
@@ -281,12 +281,12 @@ def _skin(fineness: float) -> Surface:
 
 @lru_cache(maxsize=4)
 def _crown(fineness: float, around: int) -> Surface:
-    """Return where hair grows: it ends behind the ears, and stands off the skull."""
+    """Return the surface of the hair: it ends behind the ears, outside the skull."""
     return _HEAD.beyond((-1.0, 0.0, 0.62), 1.42, round(22 * fineness), around, 0.10)
 
 
 def _hair(look: PersonLook, fineness: float) -> list[Painted]:
-    """Return a cap of hair, and where it is long two falls of it beside the neck."""
+    """Return a cap of hair, and if it is long two strands next to the neck."""
     around = round(56 * fineness)
     found = _crown(fineness, around)
     points = found.points.copy()
@@ -309,7 +309,7 @@ def _hair(look: PersonLook, fineness: float) -> list[Painted]:
 
 @lru_cache(maxsize=8)
 def torso(number: int, length_m: float) -> Painted:
-    """Return neck hole, shoulders and chest in the face frame, for a person who stands upright."""
+    """Return neck hole, shoulders and chest in the face frame, for an upright person."""
     look = LOOKS[number % len(LOOKS)]
     bottom = -length_m / PUPIL_DISTANCE_M
     # Height, half depth, half width.

@@ -1,4 +1,4 @@
-"""What a joint's servo can do at the joint, behind its gear, rods or coupling."""
+"""Speed and torque of a servo at its joint, after gear, rods or coupling."""
 
 from collections.abc import Mapping
 from math import pi

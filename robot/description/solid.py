@@ -131,7 +131,7 @@ class Solid(NamedTuple):
             offset: of the plane.
             rows: from the edge to the middle.
             columns: around.
-            out: how far the part stands off the surface.
+            out: distance of the part from the surface.
         """
         ahead = np.array(normal) / np.linalg.norm(normal)
         aside = np.array((0.0, 1.0, 0.0))

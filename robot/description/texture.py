@@ -41,7 +41,7 @@ class TexturedMesh(NamedTuple):
 
 
 class _TexturePart(NamedTuple):
-    """A rectangle of texels, and the vertices that lie in it; ``uv`` in texels."""
+    """A rectangle of texels, and the vertices in it; ``uv`` in texels."""
 
     vertices: Floats
     normals: Floats
@@ -92,7 +92,7 @@ def _pieces(painted: Painted) -> Iterator[Painted]:
 
 
 def _part(piece: Painted) -> _TexturePart:
-    """Return the texels of one part, in the plainest way that holds its colours."""
+    """Return the texels of one part, in the simplest form that holds its colours."""
     (vertices, faces), colours, normals = piece
     assert normals is not None
     if np.ptp(colours, axis=0).max() == 0.0:
@@ -178,7 +178,7 @@ def _patched_part(piece: Painted) -> _TexturePart:
 
 
 def _quadrangles(faces: NDArray[np.uint32]) -> NDArray[np.int64]:
-    """Return corners (n, 4); where the last two are the same it is one triangle only."""
+    """Return corners (n, 4); if the last two are equal it is a triangle."""
     table, at = [], 0
     rows = faces.astype(int).tolist()
     while at < len(rows):

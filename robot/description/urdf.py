@@ -1,7 +1,7 @@
 """A description as URDF, which ROS, Foxglove and most simulators read: text and its meshes. Pure.
 
 Ellipsoids are a ball of radius 1 with a scale, capsules a cylinder with a ball at either end: URDF
-knows neither. Meshes lie beside the text, their paths are relative, no package is needed.
+knows neither. Meshes are in the same folder, their paths are relative, no package is needed.
 """
 
 import xml.etree.ElementTree as ET
@@ -42,7 +42,7 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
         looks: with what can be seen.
     """
     root = ET.Element("robot", name=description.name)
-    # For MuJoCo, which otherwise drops what is only seen and looks for meshes beside the text.
+    # For MuJoCo, which otherwise drops visual shapes and looks for meshes in the text's folder.
     extension = ET.SubElement(root, "mujoco")
     ET.SubElement(
         extension, "compiler", meshdir=folder, discardvisual="false", fusestatic="false",

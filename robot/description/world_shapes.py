@@ -1,4 +1,4 @@
-"""How a simulated world looks, for another process to draw: its room, and people as they move."""
+"""Shapes of a simulated world for another process to draw: its room, and people as they move."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol
@@ -16,7 +16,7 @@ class WorldPart(NamedTuple):
     """Something of a world that is rigid: a piece of the room, or one segment of a person.
 
     name: no other part's; with "/" between the names of a thing and of its part
-    shape: its surface in the world, or in its own frame where it moves
+    shape: its surface in the world, or in its own frame if it moves
     moves: it has a pose of its own at every time
     """
 
@@ -30,7 +30,7 @@ class WorldShapes(Protocol):
     """Tells how a world looks; can be sent to another process, which alone makes the shapes."""
 
     def parts(self) -> Sequence[WorldPart]:
-        """Return everything that is to be seen but the rig itself."""
+        """Return all visible shapes except the rig itself."""
         ...
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
