@@ -19,8 +19,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.process import child_process
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
-from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus
-from gazerig.robot.guardian.guardian import HUNG_S, Guardian
+from gazerig.robot.guardian.guardian import HUNG_S, RETRY_S, GuardedBus, Guardian
 from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
@@ -92,8 +91,7 @@ def test_plans_go_through_a_command_line():
 
 def test_the_guardian_is_light():
     code = (
-        "import sys; import gazerig.robot.guardian.process;"
-        "from gazerig.robot.guardian.release_plan import *;"
+        "import sys; from gazerig.robot.guardian.process import *;"
         "[releaser(ReleasePlan(k, '', 1, ())) for k in ('feetech', 'maestro', 'dynamixel')]\n"
         "heavy = ('numpy', 'cv2', 'scipy', 'gazerig.config', 'pydantic')\n"
         "print([m for m in heavy if m in sys.modules])"

@@ -20,7 +20,8 @@ from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.cli.main import app
-from gazerig.robot.guardian.release_plan import decode, encode, releaser
+from gazerig.robot.guardian.process import releaser
+from gazerig.robot.guardian.release_plan import decode, encode
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import build, packed, unpacked
 from gazerig.sim_mock.in_process_port import InProcessPort

@@ -15,7 +15,8 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.scs import FEETECH_SCS, SCS_REGISTERS
 from gazerig.drivers.servo_bus.discovery import corrupt, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.robot.guardian.release_plan import ReleasePlan, decode, encode, releaser
+from gazerig.robot.guardian.process import releaser
+from gazerig.robot.guardian.release_plan import ReleasePlan, decode, encode
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec

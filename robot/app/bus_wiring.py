@@ -13,8 +13,7 @@ from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import setups
-from gazerig.robot.guardian.guarded_bus import GuardedBus
-from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, pickled
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling_params import pairs_of

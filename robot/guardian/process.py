@@ -13,17 +13,24 @@ any more, else after having let go. Signals to a whole group (Ctrl-C, a closed t
 the end of a service) are for the program: they do not end it.
 """
 
+import base64
 import contextlib
 import os
+import pickle
 import select
 import signal
 import sys
+from collections.abc import Callable
+from typing import Any
 
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import DriverError
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.robot.guardian.hang_detector import HangDetector
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
-from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, releaser
+from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe
 from gazerig.robot.model.clock import RealClock
 
 LOOK_S = 0.02
@@ -37,6 +44,68 @@ UNPLUGGED_S = 10.0
 
 ALONE_S = 1.0
 """From so long after the program's death another one may have taken the port: its own now."""
+
+
+Releaser = Callable[[BusPort], tuple[int, ...]]
+
+
+def releaser(plan: ReleasePlan) -> Releaser:
+    """Return what releases the servos of a plan through a port of its path.
+
+    It opens the port and returns the ids that did not confirm; it raises PortError where the
+    port cannot be opened, BusLost where it went away. All that it needs is imported here.
+    """
+    return RELEASERS.get(plan.kind, _of_package)(plan)
+
+
+def _smart(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.bus.servo_families import FAMILIES
+    from gazerig.drivers.servo_bus.torque import disable_torque
+
+    family = FAMILIES[plan.family or plan.kind]
+    return lambda port: disable_torque(port, family, plan.baud, plan.ids)
+
+
+def _maestro(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.hobby_board.release import stop_pulses
+    from gazerig.drivers.maestro.line import MaestroLink
+
+    params = MaestroParams(plan.baud, plan.protocol, plan.device, plan.crc, plan.channels)
+    return lambda port: stop_pulses(port, plan.baud, MaestroLink(port, params), plan.ids)
+
+
+def _pca9685(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.hobby_board.release import stop_pulses
+    from gazerig.drivers.pca9685.board import Pca9685Board
+    from gazerig.drivers.pca9685.params import Pca9685Params
+
+    first, *more = plan.addresses
+    params = Pca9685Params(first, tuple(more))
+    return lambda port: stop_pulses(port, params.baud, Pca9685Board(port, params), plan.ids)
+
+
+def _unpickled(text: str) -> Any:
+    """Return the parameters that ``release_plan.pickled`` wrote."""
+    return pickle.loads(base64.b85decode(text))
+
+
+def _of_package(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.plugins import BUS, BusPlugin, load
+
+    release, params = load(BUS, plan.kind, BusPlugin).release, _unpickled(plan.settings)
+    if release is None:
+        return lambda port: ()
+    wanted = release
+    return lambda port: wanted(port, params, plan.ids)
+
+
+RELEASERS: dict[BusKind, Callable[[ReleasePlan], Releaser]] = {
+    "dynamixel": _smart,
+    "feetech": _smart,
+    "maestro": _maestro,
+    "pca9685": _pca9685,
+}
+"""By the kind of bus; each imports what it needs alone."""
 
 
 class ProgramWatch:

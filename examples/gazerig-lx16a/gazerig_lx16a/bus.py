@@ -11,7 +11,7 @@ from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.bus.servo_models import ServoModelInfo
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
-from gazerig.drivers.event_log import EventLog, servo_label
+from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
@@ -114,7 +114,7 @@ class Lx16aBus(PortBus):
         self._opened = True
 
     def _find(self, setup: ServoConfig) -> None:
-        where = f"{self._port.port_name}: {servo_label(setup)}"
+        where = f"{self._port.port_name}: {setup.label()}"
         mode = self._insist(setup.id, p.MODE)
         if mode is None:
             raise ServoMissing(f"{where} does not answer: check its id, cable and supply")
@@ -156,7 +156,7 @@ class Lx16aBus(PortBus):
         setup, line = self._setups[i], self._line
         steps = line.ask(setup.id, p.POSITION)
         loaded = None if steps is None else line.ask(setup.id, p.LOADED)
-        at_s, label = self._port.now_s(), servo_label(setup)
+        at_s, label = self._port.now_s(), setup.label()
         if steps is None or loaded is None or not self._sure.one(i, steps, at_s):
             silent_s = now_s - self._heard_s[i]
             self._due_s[i] = now_s + AGAIN_S if silent_s > SILENT_S else -inf
@@ -208,7 +208,7 @@ class Lx16aBus(PortBus):
                 steps = self._insist(setup.id, p.POSITION)
                 if steps is None or not self._hold(setup, steps):
                     self.disable_torque()
-                    raise ServoMissing(f"{servo_label(setup)} does not confirm its torque: {CUT}")
+                    raise ServoMissing(f"{setup.label()} does not confirm its torque: {CUT}")
                 goals.append(min(max(steps, setup.min_steps), setup.max_steps))
         except BusLost:
             self._link.refused_release()
@@ -241,7 +241,7 @@ class Lx16aBus(PortBus):
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         for setup in setups:
             if not 0 <= setup.min_steps < setup.max_steps <= 1000:
-                raise ValueError(f"{servo_label(setup)}: its range must lie in 0..1000 steps")
+                raise ValueError(f"{setup.label()}: its range must lie in 0..1000 steps")
 
     def _check_all(self) -> None:
         self._check = [True] * len(self._setups)
@@ -251,7 +251,7 @@ class Lx16aBus(PortBus):
         return release_all(self._line, [setup.id for setup in self._setups])
 
     def _servo_label(self, servo_id: int) -> str:
-        return servo_label(next(setup for setup in self._setups if setup.id == servo_id))
+        return next(setup for setup in self._setups if setup.id == servo_id).label()
 
     def _cannot_release(self) -> str:
         return f"{self._port.port_name} is gone: torque could not be switched off: {CUT}"

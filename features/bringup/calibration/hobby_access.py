@@ -15,8 +15,7 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
-from gazerig.robot.guardian.guarded_bus import GuardedBus
-from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams
 
