@@ -295,6 +295,17 @@ def test_nothing_is_new_in_the_first_moments_but_later_after_an_empty_view() -> 
         assert model.step(bodies(FACE), (0, 0, 0), arrives).onset.tolist() == [onset]
 
 
+@pytest.mark.parametrize(("from_s", "onset"), [(0.3, 0.0), (0.7, 1.0)])
+def test_what_moves_in_the_first_moments_has_not_just_begun_to(from_s: float, onset: float) -> None:
+    model = BottomUp(BottomUpParams(smoothing_s=0.0))
+    found = []
+    for k in range(20):
+        speed = 1.0 if k / 20 >= from_s else 0.0
+        seen = bodies(body(1, "hand", (1.0, 0.0, 0.0), (0.0, speed, 0.0)))
+        found.append(float(model.step(seen, (0, 0, 0), k / 20).onset[0]))
+    assert max(found) == pytest.approx(onset)
+
+
 @pytest.mark.parametrize(("gap_s", "onset"), [(0.1, 0.0), (0.29, 0.0), (0.4, 1.0)])
 @pytest.mark.parametrize("how", ["missed", "out of the field"])
 def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset: float) -> None:

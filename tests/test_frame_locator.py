@@ -71,6 +71,18 @@ def test_the_tick_fits_no_face_that_the_camera_has_located(
     assert percept.bodies.kinds == ("face", "ball")
 
 
+@pytest.mark.parametrize(
+    ("sure", "below_px", "faces"), [(0.8, 150.0, 1), (0.95, 150.0, 2), (0.8, 20.0, 2)]
+)
+def test_hands_before_the_chest_are_no_second_face(
+    sure: float, below_px: float, faces: int
+) -> None:
+    one = replace(FACE, confidence=0.999, box_px=(300.0, 60.0, 65.0, 80.0))
+    box = (260.0, 60.0 + below_px, 140.0, 170.0)
+    other = replace(face_at((0.1, 0.25, 0.6)), confidence=sure, box_px=box)
+    assert len(LOCATOR(picture(1, faces=(one, other))).faces) == faces
+
+
 def test_places_of_another_calibration_are_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     under_way = located(picture(1, faces=(FACE,)))
     wanted = percept_of(perception(LENS), replace(under_way, located=None))

@@ -47,7 +47,7 @@ _BLINK_S = 0.3
 _MOVES, _STILL_BELOW = 0.5, 0.15
 """Sums of eq 1 from which a body moves, and below which it has come to rest."""
 _SETTLED_S = 0.5
-"""What has just come into view does not begin to move as well."""
+"""What has just come into view, as all has at the start, does not begin to move as well."""
 _NEAREST_M = 0.05
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Vec3 = (1.0, 0.0, 0.0)
@@ -235,7 +235,7 @@ class BottomUp:
         self._memory: _Memory | _Rows = self._gone
         self._at_s = t_s
         self._onset_s = -inf
-        self._started_s: float | None = None
+        self._started_s = inf
 
     def step(
         self,
@@ -321,7 +321,7 @@ class BottomUp:
                 most[i] < inf
                 and moved > _MOVES
                 and not moving[i]
-                and t_s - entered_s[i] > _SETTLED_S
+                and t_s - max(entered_s[i], self._started_s) > _SETTLED_S
             ):
                 entered_s[i] = self._onset_s = t_s
                 strength[i] = fresh
@@ -414,7 +414,8 @@ class BottomUp:
         smooth *= 1.0 - keep
         smooth += past
         moved = smooth[0] + np.abs(smooth[1]) + smooth[2]
-        begins = (moved > _MOVES) & (moves == 0.0) & (t_s - entered_s > _SETTLED_S)
+        settled = t_s - np.maximum(entered_s, self._started_s) > _SETTLED_S
+        begins = (moved > _MOVES) & (moves == 0.0) & settled
         begins &= seen & np.isfinite(most)
         if begins.any():
             entered_s[begins], strength[begins], self._onset_s = t_s, fresh, t_s
@@ -437,7 +438,7 @@ class BottomUp:
     def _pause(self, t_s: float) -> None:
         """Shift all times where no step was made for long, so that no body counts as gone."""
         paused_s = t_s - self._at_s
-        if self._started_s is not None and paused_s <= _BLINK_S:
+        if self._started_s < inf and paused_s <= _BLINK_S:
             return
         self._started_s = t_s
         if paused_s > 0.0:
@@ -450,8 +451,7 @@ class BottomUp:
 
         What the first moments show was there before: it entered long ago.
         """
-        started_s = t_s if self._started_s is None else self._started_s
-        return t_s if t_s - started_s > _BLINK_S else -np.inf
+        return t_s if t_s - self._started_s > _BLINK_S else -np.inf
 
     def _remember(self, ids: tuple[int, ...], t_s: float) -> None:
         """Rearrange the memory for other bodies, keeping those missed for a moment."""

@@ -53,6 +53,9 @@ _PALM_M, _PALM_SPREAD, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.15, 0.03, 0.07
 _EDGE = 0.02
 # A face so near to the middle of a person's head, in trunks, is theirs.
 _OWN_FACE = 0.25
+# Hands before the chest look like a face: one less sure than this, so many times less than another,
+# whose middle is so far below and aside of the other's, in heights of that.
+_DOUBTFUL, _SURER, _ON_CHEST, _ASIDE = 0.9, 10.0, (1.0, 3.0), 1.0
 # Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
 _CENTRE_PX, _CENTRE_OF_EYES = 0.4, 0.015
 # Error of its size from frame to frame, the same way. People's eyes themselves lie 6 %
@@ -120,7 +123,12 @@ class FrameLocator:
 
     def locate(self, found: Detections, intrinsics: Intrinsics) -> LocatedFrame:
         """Return what a frame of known intrinsics shows in the camera's axes."""
-        inside = [f for f in found.faces if not is_off_frame(f, found.width_px, found.height_px)]
+        inside = [
+            face
+            for face in found.faces
+            if not is_off_frame(face, found.width_px, found.height_px)
+            and not any(_is_on_chest(face, other) for other in found.faces)
+        ]
         faces = [self._face(face, found, intrinsics) for face in inside]
         faces += [
             self._person(person, found, intrinsics)
@@ -276,6 +284,17 @@ def _is_of(person: DetectedPerson, face: DetectedFace) -> bool:
     x, y = face.landmarks_px.mean(axis=0).tolist()
     apart = hypot(x - person.head_px[0], y - person.head_px[1])
     return apart < _OWN_FACE * person.trunk_px
+
+
+def _is_on_chest(face: DetectedFace, other: DetectedFace) -> bool:
+    """Return whether an unsure face is where a surer one has its chest."""
+    if face.confidence > _DOUBTFUL or 1.0 - face.confidence < _SURER * (1.0 - other.confidence):
+        return False
+    (x, y, wide, high), (its_x, its_y, its_wide, its_high) = face.box_px, other.box_px
+    aside = abs(x + 0.5 * wide - its_x - 0.5 * its_wide)
+    below = y + 0.5 * high - its_y - 0.5 * its_high
+    near, far = _ON_CHEST
+    return aside < _ASIDE * its_high and near * its_high < below < far * its_high
 
 
 def thing_in_camera(blob: MovingBlob, lens: Intrinsics | None = None) -> DetectionInCamera | None:
