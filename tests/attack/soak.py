@@ -9,6 +9,8 @@ wrong: a position that the joint did not have then, a temperature or a voltage t
 stale: a position that the joint had within the last second, and has left
 outside: a servo had a goal outside its range, or moved out of it or too fast
 off: positions estimated by the driver (hobby servos) that are more than 3.4 degrees away
+shared: a position of neither of two Feetech servos with one id. They answer together, and the AND
+    of their bytes passes a check of 8 bits now and then, twice in a row too; not a driver's fault
 """
 
 import argparse
@@ -72,7 +74,7 @@ class Struck(Machine):
 class Watch:
     """Compares every reading of a machine with its true servos, and counts.
 
-    counts: by "fresh", "wrong", "stale", "outside" and "off"
+    counts: by "fresh", "wrong", "stale", "outside", "off" and "shared"
     where: the machine and its faults, for printed lines
     """
 
@@ -86,6 +88,7 @@ class Watch:
         self._read = machine.body.read
         machine.body.read = self.read  # type: ignore[method-assign]
         self._seen: list[list[list[float]]] = []
+        self._shared: set[int] = set()
         machine.body.bus._port._tap = self._record_request  # type: ignore[attr-defined]
 
     def _record_request(self, data: bytes) -> None:
@@ -106,6 +109,8 @@ class Watch:
             servos, linkage = device.servos, machine.linkages[i]
             own = servos[place]
             others = [one for one in servos if one.id == setup.id and one is not own]
+            if others and machine.rig.bus_of(machine.names[i]).kind == "feetech":
+                self._shared.add(i)
             true[i] += [linkage.angle_rad(one.position_steps) for one in others]
             around.append([(float(one.warmth_c), 0.1 * one.voltage_01v) for one in (own, *others)])
         self._past.append((now_s, true, around))
@@ -115,6 +120,7 @@ class Watch:
 
     def read(self, t_s: float) -> JointState:
         """Read, and compare with the truth before, meanwhile and after."""
+        self._shared.clear()
         self._seen = [self._note()]
         joints = self._read(t_s)
         self._seen.append(self._note())
@@ -131,11 +137,12 @@ class Watch:
             self._counts["fresh"] += 1
             if not _between(now, seen, SEEN_RAD):
                 stale = any(abs(now - one) <= SEEN_RAD for past in self._past for one in past[1][i])
-                self._counts["stale" if stale else "wrong"] += 1
+                what = "stale" if stale else "shared" if i in self._shared else "wrong"
+                self._counts[what] += 1
                 self._report(
                     f"{t_s:.3f} s {name} at {now:.4f} rad, truly {seen}; heard "
                     f"{joints.measured_s[i] - t_s:+.4f} s, rearmed {joints.rearmed[i]}, "
-                    f"torque {joints.torque[i]}{', stale' if stale else ''}"
+                    f"torque {joints.torque[i]}, {what}"
                 )
             self._judge_around(i, joints)
         return joints
@@ -223,7 +230,8 @@ def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> 
         if seen_s / 3600.0 - printed_h >= 0.1 or seen_s >= 3600.0 * hours:
             printed_h = seen_s / 3600.0
             row = ", ".join(
-                f"{key} {counts[key]}" for key in ("fresh", "wrong", "stale", "outside", "off")
+                f"{key} {counts[key]}"
+                for key in ("fresh", "wrong", "stale", "outside", "off", "shared")
             )
             print(
                 f"== {kind} {printed_h:.2f} h, {faults} faults, {row}; {dict(ends)}; machine {nth}, "
