@@ -1,4 +1,4 @@
-"""Interface between a line and the device emulated at its end: bytes in, timed answers out."""
+"""Interface between a line and the emulated device at its end: bytes in, timed answers out."""
 
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -8,41 +8,41 @@ from gazerig.sim_mock.replies import Piece
 
 
 class DeviceReply(NamedTuple):
-    """Answer to one instruction; ``end``: position in the sent bytes behind its last byte."""
+    """Answer to one instruction; ``end``: position in the sent bytes after its last byte."""
 
     end: int
     pieces: list[Piece]
 
 
 class DeviceFaults(Protocol):
-    """The faults of one device and its line.
+    """Faults of one device and its line.
 
-    wire: those of the line
+    wire: faults of the line
     """
 
     wire: ActiveFaults
 
     def on(self, kind: str) -> bool:
-        """True if echo, babble, unplug, deny or block is on now."""
+        """Return whether echo, babble, unplug, deny or block is active."""
         ...
 
     def command(self, text: str) -> str:
-        """Carry out a line such as ``lose 3 count 2``; return what was done.
+        """Run a command such as ``lose 3 count 2``; return a description of the effect.
 
         Raises:
-            ValueError: names the word that is wrong and what would be right.
+            ValueError: the command is invalid; the message names the wrong word and valid ones.
         """
         ...
 
 
 class Device(Protocol):
-    """The device side of a serial protocol; it opens nothing, and its clock is an argument."""
+    """Device side of a serial protocol; it opens nothing, and its clock is an argument."""
 
     now_s: Callable[[], float]
 
     @property
     def check_baud(self) -> bool:
-        """True if only a client at its baud rate is heard."""
+        """Return whether the device answers only clients at its baud rate."""
         ...
 
     @property
@@ -51,7 +51,7 @@ class Device(Protocol):
         ...
 
     def at_baud(self, client_baud: int) -> bool:
-        """True if a client at this baud rate is understood."""
+        """Return whether the device understands a client at this baud rate."""
         ...
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
@@ -62,7 +62,7 @@ class Device(Protocol):
         """Choose the device's behaviour where documents and devices differ.
 
         Raises:
-            ValueError: there is no such case or value.
+            ValueError: the case or value is unknown.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""What can be chosen of each kind of emulated device."""
+"""Configurable cases of each kind of emulated device."""
 
 from collections.abc import Mapping
 
@@ -14,4 +14,4 @@ CASES: dict[BusKind, Mapping[str, str]] = {
     "maestro": maestro_settings.cases(),
     "pca9685": PCA9685_CASES,
 }
-"""Kind -> what can be chosen, and the values as they are typed."""
+"""Kind -> cases, and their values as they are typed."""

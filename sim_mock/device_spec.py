@@ -23,20 +23,20 @@ _MODELS = [name for name, facts in SERVOS.items() if facts.bus in _LINES]
 
 
 def line_of(text: str, firmware: int | None, baud: int) -> DynamixelLine | FeetechLine:
-    """Read the servos of one line; ``firmware``: of all of them, None: as delivered.
+    """Parse the servos of one line; ``firmware``: of all servos, None: as delivered.
 
     Raises:
-        SetupError: names the part that is wrong and what would be right.
+        SetupError: the text is invalid; the message names the wrong part and valid ones.
     """
     specs = parse_servos(text, DEFAULT_FIRMWARE if firmware is None else firmware)
     return _LINES[SERVOS[specs[0].model].bus](specs, baud)
 
 
 def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
-    """Read servos such as ``1-6:sts3215`` or ``7:xc330-m288@1024`` (@: start in steps).
+    """Parse servos such as ``1-6:sts3215`` or ``7:xc330-m288@1024`` (@: start in steps).
 
     Raises:
-        SetupError: names the part that is wrong and what would be right.
+        SetupError: the text is invalid; the message names the wrong part and valid ones.
     """
     specs: dict[int, ServoSpec] = {}
     for part in text.split(","):
@@ -60,20 +60,20 @@ def _read(part: str) -> tuple[range, str, int]:
     first, last = int(found[1]), int(found[2] or found[1])
     model, start = found[3].lower(), int(found[4] or MIDDLE)
     if model in SERVOS and SERVOS[model].bus == "maestro":
-        raise SetupError(f"--servos {part!r}: a hobby servo hangs on a board: --maestro 12")
+        raise SetupError(f"--servos {part!r}: a hobby servo needs a board: --maestro 12")
     highest = _HIGHEST_ID[SERVOS[model].bus] if model in SERVOS else min(_HIGHEST_ID.values())
     if not first <= last <= highest:
-        raise SetupError(f"--servos {part!r}: ids run upwards, from 0 to {highest}")
+        raise SetupError(f"--servos {part!r}: ids must increase, from 0 to {highest}")
     if model not in SERVOS:
-        raise SetupError(f"--servos {part!r}: unknown model; there is {', '.join(_MODELS)}")
+        raise SetupError(f"--servos {part!r}: unknown model; known models: {', '.join(_MODELS)}")
     return range(first, last + 1), model, start
 
 
 def _see_one_kind(specs: Iterable[ServoSpec]) -> None:
-    """Refuse servos of different protocols on one line.
+    """Reject servos of different protocols on one line.
 
     Raises:
-        SetupError: names one of each kind.
+        SetupError: the protocols differ; the message names one servo of each.
     """
     one: dict[BusKind, ServoSpec] = {}
     for spec in specs:

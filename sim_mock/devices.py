@@ -1,4 +1,4 @@
-"""Emulated devices as plain data that can be sent to another process, and how they are built."""
+"""Emulated devices as plain data that can be sent to another process, and their construction."""
 
 import base64
 import pickle
@@ -25,7 +25,7 @@ BAUDS: dict[BusKind, tuple[int, ...]] = {
     "maestro": choices_of(MaestroParams, "baud"),
     "pca9685": (BRIDGE_BAUD,),
 }
-"""Bit/s that each kind can be set to."""
+"""Bit/s to which each kind can be set."""
 CHANNELS: tuple[int, ...] = choices_of(MaestroParams, "channels")
 """Sizes of a Maestro."""
 
@@ -35,8 +35,8 @@ class _SmartServoLine:
     """Smart servos on one line.
 
     Attributes:
-        servos: one specification each.
-        baud: the servos' rate, clients at another get no answer; None: any rate works.
+        servos: specifications of the servos.
+        baud: the servos' rate; clients at another rate get no answer; None: any rate works.
     """
 
     servos: tuple[ServoSpec, ...]
@@ -60,11 +60,11 @@ class FeetechLine(_SmartServoLine):
 
 @dataclass(frozen=True, slots=True)
 class MaestroLine:
-    """A Pololu Maestro and the servos behind it.
+    """A Pololu Maestro and its servos.
 
     channels: 6, 12, 18 or 24; device: its number in the Pololu protocol
-    crc: it expects a CRC behind every command
-    servos: those that differ from the default one, by their channel
+    crc: whether it expects a CRC after every command
+    servos: servos that differ from the default, by their channel
     baud: rate of its serial pins; None: its USB port, where any rate works
     """
 
@@ -79,11 +79,11 @@ class MaestroLine:
 
 @dataclass(frozen=True, slots=True)
 class Pca9685Line:
-    """PCA9685 boards on an I2C bus behind a bridge, and the servos behind them.
+    """PCA9685 boards on an I2C bus behind a bridge, and their servos.
 
     addresses: of the boards; the channels of the second begin at 16
     oscillator_hz: of their clocks
-    servos: those that differ from the default one, by their channel
+    servos: servos that differ from the default, by their channel
     baud: of the bridge's line, if it matters
     """
 
@@ -100,7 +100,7 @@ class PluginLine:
     """The servos of a package's bus.
 
     kind: of the bus
-    settings: its parameters, pickled and written as text
+    settings: its parameters, pickled and encoded as text
     servos: in the order of the joints
     """
 
@@ -119,14 +119,14 @@ _KINDS: dict[str, type[OurLine]] = {
 
 
 class ShaftMakers(NamedTuple):
-    """What makes the shafts of servos, smart ones and hobby servos."""
+    """Factories of the shafts of smart servos and hobby servos."""
 
     make_shaft: ShaftMaker = own_shaft
     make_servo: HobbyMaker = HobbyServo
 
 
 OWN_SHAFTS = ShaftMakers()
-"""Each shaft by itself, without a world around it."""
+"""Independent shafts, without a world around them."""
 
 
 def build(
@@ -138,17 +138,17 @@ def build(
     """Build a device.
 
     Args:
-        what: to build.
+        what: the device to build.
         now_s: its clock.
         seed: of the random numbers that its faults draw.
-        shafts: make the shafts of its servos; a package's device has its own.
+        shafts: factories of its servos' shafts; a package's device has its own.
 
     Raises:
-        ValueError: it cannot exist; names what is wrong and what would be right.
+        ValueError: it cannot exist; the message names the wrong value and valid ones.
     """
     if isinstance(what, PluginLine):
         return _build_plugin(what, now_s, seed)
-    # A chain or board is imported when one is built: who starts a process for it needs none.
+    # A chain or board is imported when it is built: a process that starts a server needs none.
     if isinstance(what, MaestroLine):
         from gazerig.sim_mock.maestro.board import build_board
 
@@ -203,11 +203,11 @@ def packed(what: Emulated) -> dict[str, object]:
 
 
 def unpacked(data: Mapping[str, Any]) -> Emulated:
-    """Return the device that ``packed`` was given; servos may be as short as [1, "xl330-m077"].
+    """Return a device from the data of ``packed``; servos may be as short as [1, "xl330-m077"].
 
     Raises:
-        ValueError: there is no such kind of device.
-        TypeError: it has no such setting.
+        ValueError: the kind of device is unknown.
+        TypeError: a setting is unknown.
     """
     settings = dict(data)
     kind = settings.pop("kind", None)
@@ -215,7 +215,7 @@ def unpacked(data: Mapping[str, Any]) -> Emulated:
         servos = tuple(EmulatedJoint(**one) for one in settings.pop("servos"))
         return PluginLine(str(kind), servos=servos, **settings)
     if kind not in _KINDS:
-        raise ValueError(f"no device of kind {kind!r}: there is {', '.join(_KINDS)}")
+        raise ValueError(f"unknown device kind {kind!r}: expected {', '.join(_KINDS)}")
     read = HobbySpec._make if kind in HOBBY_KINDS else _servo
     settings["servos"] = tuple(read(spec) for spec in settings.get("servos", ()))
     return _KINDS[kind](**settings)

@@ -1,9 +1,9 @@
 """A hobby servo: pulses in, a shaft that follows them, no feedback.
 
-Widths and places are quarter microseconds of the pulse that would hold the shaft there.
-A servo gets one pulse every 20 ms and moves in steps of 10 ms: towards the pulse as fast
-as it can, with a lag near the end, and not at all within its dead band. Without pulses it
-has no torque and stays where friction leaves it. Inertia, load and noise are left out.
+Widths and positions are quarter microseconds of the pulse that holds the shaft there. A servo
+gets one pulse every 20 ms and moves in steps of 10 ms: towards the pulse at its top speed, with a
+lag near the end, and not at all within its dead band. Without pulses it has no torque and
+friction holds it. Inertia, load and noise are omitted.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,17 +14,17 @@ STEP_S = 0.01
 
 
 class HobbySpec(NamedTuple):
-    """How to build one servo, and what its channel lets through to it.
+    """Specification of one servo and its channel.
 
     channel: its channel on the board
-    start_steps: where its shaft is before the first pulse
+    start_steps: position of its shaft before the first pulse
     speed_steps_s: its own top speed; 22000 is 60 deg in 0.12 s, from data sheets of SG90
-    lag_s: time constant of the last bit of the way [A]
-    dead_steps: it does not move for less, 5 us from data sheets of MG90S
-    stop_low_steps, stop_high_steps: hard stops of the shaft or of what it moves
-    min_steps, max_steps: the board clips targets of this channel so; from the factory
+    lag_s: time constant near the end of a motion [A]
+    dead_steps: dead band, 5 us from data sheets of MG90S
+    stop_low_steps, stop_high_steps: hard stops of the shaft or of its joint
+    min_steps, max_steps: the board clips targets of this channel to them; from the factory
         992..2000 us
-    stall_torque_nm: torque that holds it still; only a world with physics asks for it. 0.18 is
+    stall_torque_nm: torque that stalls it; only a world with physics uses it. 0.18 is
         1.8 kg cm, from data sheets of SG90 and MG90S
     """
 
@@ -41,10 +41,10 @@ class HobbySpec(NamedTuple):
 
 
 class HobbyServo:
-    """One servo and the joint it moves.
+    """One servo and its joint.
 
-    place_steps: where its shaft is; stuck: nothing moves it
-    width_steps: the pulses that come; 0: none do
+    place_steps: position of its shaft; stuck: nothing moves it
+    width_steps: the present pulses; 0: none
     """
 
     def __init__(self, spec: HobbySpec | Sequence[float]) -> None:
@@ -56,12 +56,12 @@ class HobbyServo:
 
     @property
     def unpowered(self) -> bool:
-        """Return whether no pulses come: a hand can turn it."""
+        """Return whether it gets no pulses, so that a hand can turn it."""
         return self.width_steps == 0
 
     @property
     def resting(self) -> bool:
-        """Return whether it would not move in the next step."""
+        """Return whether the next step would not move it."""
         return self.place_steps == self._next_steps()
 
     @property
@@ -70,11 +70,11 @@ class HobbyServo:
         return not self._content() and self.resting
 
     def step(self) -> None:
-        """Let 10 ms pass."""
+        """Advance by 10 ms."""
         self.place_steps = self._next_steps()
 
     def turn(self, steps: float) -> None:
-        """Turn it by hand, as far as its stops allow; one with pulses goes back by itself.
+        """Turn it by hand, as far as its stops allow; a servo with pulses returns.
 
         Raises:
             ValueError: it is stuck.
@@ -117,7 +117,7 @@ def checked(spec: HobbySpec) -> HobbySpec:
 
 
 HobbyMaker = Callable[[HobbySpec], HobbyServo]
-"""Makes a servo of its specification."""
+"""Creates a servo from its specification."""
 
 
 def build_servos(
@@ -126,18 +126,18 @@ def build_servos(
     """Return one servo per channel of a board; channels without a spec have a default one.
 
     Raises:
-        ValueError: a spec's channel does not exist or has two of them.
+        ValueError: a spec's channel does not exist or has two servos.
     """
     given: dict[int, HobbySpec] = {}
     for spec in specs:
         channel = int(spec[0])
         if channel in given:
             raise ValueError(
-                f"two servos are on channel {channel}: give each a channel of its own, "
+                f"two servos are on channel {channel}: use a different channel for each, "
                 f"0 to {channels - 1}"
             )
         if not 0 <= channel < channels:
-            raise ValueError(f"servo on channel {channel}: there is 0 to {channels - 1}")
+            raise ValueError(f"servo on channel {channel}: channels are 0 to {channels - 1}")
         given[channel] = HobbySpec(*spec)
     return [make(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
 
@@ -154,4 +154,4 @@ _RANGES: dict[str, tuple[float, float]] = {
     "max_steps": (256, 13_120),
     "stall_torque_nm": (0.01, 10.0),
 }
-"""What a Maestro can be set to send: 64..3280 us, user's guide, section 4.b."""
+"""Range of a Maestro's pulses: 64..3280 us, user's guide, section 4.b."""

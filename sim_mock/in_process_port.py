@@ -1,9 +1,9 @@
-"""A serial port without a wire: over an emulated device in this process.
+"""A serial port without a wire, over an emulated device in this process.
 
 Drivers use it as a gazerig.drivers.serial.port.BusPort, ROBOTIS' SDK as its PortHandler. Time is
-the device's: an answer that does not come costs none. Where the line has wire time or
-faults make answers late, they arrive when the device's clock gets there; ``sleep_until``
-lets waiting move that clock. Baud rate: that of ``setBaudRate``.
+the device's: a missing answer costs no time. With wire time or late answers by faults, bytes
+arrive when the device's clock reaches their time; waiting advances that clock with
+``sleep_until``. The baud rate is that of ``setBaudRate``.
 """
 
 import errno
@@ -19,11 +19,11 @@ from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.wire import ServoLine
 
 KNOWN_BAUDS = frozenset((*DYNAMIXEL_BAUDS, *FEETECH_BAUDS))
-"""Rates of servos, beside those that the SDK knows of adapters."""
+"""Rates of servos, in addition to the SDK's rates of adapters."""
 
 BITS_PER_BYTE = 10
 WRITE_S = 0.25
-"""Time-out of a write to an adapter that accepts nothing."""
+"""Time-out of a write to an adapter that accepts no bytes."""
 
 
 class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
@@ -31,9 +31,9 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     Args:
         chain: a chain of servos, or a board; its clock is the port's clock.
-        tap: gets every byte string the host sends.
+        tap: receives every byte string that the host sends.
         sleep_until: advances that clock, for waiting; without it no call waits.
-        wire_time: bytes take their time on the line, return delays count.
+        wire_time: bytes take their time on the line, and return delays apply.
     """
 
     def __init__(
@@ -59,21 +59,21 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     # --- what a driver's control loop uses
 
     def write(self, data: bytes) -> None:
-        """Send bytes; what is answered waits to be read.
+        """Send bytes; answers wait to be read.
 
         Raises:
-            BusLost: unplugged, or the adapter takes nothing.
+            BusLost: unplugged, or the adapter accepts no bytes.
         """
         self._see()
         if self._tap is not None:
             self._tap(data)
         if self.faults.wire.any and self.faults.on("block"):
             self._wait(self.now_s() + WRITE_S)
-            raise BusLost(f"{self.port_name} takes no bytes: replug the adapter")
+            raise BusLost(f"{self.port_name} accepts no bytes: replug the adapter")
         self._waiting += self.line.send(data, self.baudrate)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Return up to ``length`` bytes; fewer where no more will come before the deadline.
+        """Return up to ``length`` bytes, fewer if no more arrive before the deadline.
 
         Raises:
             BusLost: unplugged.
@@ -92,10 +92,10 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Discard received bytes, send a request and read until the deadline.
 
         Returns:
-            What was read, and when the request had been sent.
+            The received bytes, and the time at which the request had been sent.
 
         Raises:
-            BusLost: unplugged, or the adapter takes nothing.
+            BusLost: unplugged, or the adapter accepts no bytes.
         """
         self.drain()
         self.write(request)
@@ -110,7 +110,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return dropped
 
     def _see(self) -> None:
-        """Fetch what has arrived by now.
+        """Fetch the bytes that have arrived by now.
 
         Raises:
             BusLost: it was unplugged after it was opened.
@@ -133,7 +133,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     # --- what the SDK uses
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate; False where neither adapters nor any device know it."""
+        """Open at a baud rate; return False if neither adapters nor devices support it."""
         known = baudrate in KNOWN_BAUDS or self.getCFlagBaud(baudrate) > 0
         return known and self.setupPort(baudrate)
 
@@ -164,7 +164,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.drain()
 
     def getBytesAvailable(self) -> int:
-        """Count the bytes that wait."""
+        """Return the number of received bytes."""
         self._see()
         return len(self._waiting)
 
@@ -183,15 +183,15 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return self.now_s() * 1000.0
 
     def setPacketTimeout(self, packet_length: int) -> None:
-        """Set how long the SDK waits, from the length of the packet."""
+        """Set the SDK's time-out from the length of the packet."""
         self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + 34.0)
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Set how long the SDK waits."""
+        """Set the SDK's time-out."""
         self._give_up_s = self.now_s() + msec / 1000.0
 
     def isPacketTimeout(self) -> bool:
-        """Whether waiting longer is useless: every answer that will come is here.
+        """Return whether further waiting is useless because no more answers will arrive.
 
         A simulated clock is advanced to the next bytes or to the end of the time-out.
         """

@@ -1,4 +1,4 @@
-"""Answers of emulated servos, and the timed pieces of bytes they are sent as."""
+"""Answers of emulated servos, and the timed pieces of bytes that carry them."""
 
 from typing import NamedTuple
 
@@ -8,8 +8,8 @@ BROADCAST = 0xFE
 class Answer(NamedTuple):
     """The answer of one servo.
 
-    delay_s: its return delay; late_s: what it waits beyond that
-    twin: the answer of another servo with the same id at the same time
+    delay_s: its return delay; late_s: additional delay
+    twin: the simultaneous answer of another servo with the same id
     """
 
     servo_id: int
@@ -21,9 +21,9 @@ class Answer(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Bytes that one servo puts on the line in one go, after waiting.
+    """Bytes that one servo sends without a pause, after its delays.
 
-    delay_s counts on a line with wire time only, late_s always.
+    delay_s applies only on a line with wire time, late_s always.
     """
 
     servo_id: int
@@ -33,6 +33,6 @@ class Piece(NamedTuple):
 
 
 def merge(one: bytes, other: bytes) -> bytes:
-    """Return the bytes of two servos that send at once: a bit is 0 where either sends 0."""
+    """Return the bytes of two servos that send simultaneously: a bit is 0 if either sends 0."""
     longer, shorter = (one, other) if len(one) >= len(other) else (other, one)
     return bytes(a & b for a, b in zip(longer, shorter, strict=False)) + longer[len(shorter) :]

@@ -1,4 +1,4 @@
-"""The gaze compared with the true position of the person, which only a simulation knows."""
+"""True gaze errors, from the true position of the person, which only a simulation has."""
 
 from gazerig.gaze.angles import add, angle_between, rotate, rotation, scale, sub, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
@@ -8,7 +8,7 @@ from gazerig.sim_mock.scenes.scene import ScenePerson
 
 
 def true_part(person: ScenePerson, part: str | None) -> Vec3:
-    """Return where a part of a person's face truly is; None: the tip of the nose."""
+    """Return the true position of a part of a person's face; None: the tip of the nose."""
     if part is None:
         return person.p_world_face_m
     R = rotation((*person.face_yaw_pitch_rad, 0.0))
@@ -21,12 +21,12 @@ def gaze_angles(pose: GazeState) -> Angles2:
 
 
 def angles_of_place(p_world_m: Vec3, pose: GazeState) -> Angles2:
-    """Return yaw and pitch in the world from the middle of the eyes to a place."""
+    """Return yaw and pitch in the world from the midpoint of the eyes to a point."""
     return yaw_pitch(sub(p_world_m, _middle(pose)))
 
 
 def gaze_off_rad(p_world_m: Vec3, pose: GazeState) -> float:
-    """Return the angle between the measured gaze and a place, from the middle of the eyes."""
+    """Return the angle between the measured gaze and a point, from the midpoint of the eyes."""
     return angle_between(_cyclopean(pose), sub(p_world_m, _middle(pose)))
 
 

@@ -1,17 +1,16 @@
 """Timing of the line between the host and an emulated device. Pure arithmetic.
 
-With wire time a byte takes 10 bits at the client's baud rate in either direction, every
-status leaves after its servo's return delay (a fast reply only after the first servo's)
-and a turnaround of the electronics, and nothing overtakes. A Maestro, with a wire for each
-direction, hears while it speaks, but sends one answer after another all the same. The
-adapter hands over what has arrived when the line falls silent, and every millisecond at
-the latest, as one with a latency timer of 1 ms does. Without wire time everything is there
-at once, except what a fault makes late. An instruction takes effect when its bytes are
-handed to the line, not when its last bit has passed.
+With wire time a byte takes 10 bits at the client's baud rate in either direction, every status
+leaves after its servo's return delay (a fast reply only after the first servo's) and a turnaround
+of the electronics, and the order of bytes is kept. A Maestro, with a wire for each direction,
+receives while it sends, but also sends one answer after another. The adapter delivers bytes when
+the line falls silent, and at least every millisecond, like one with a latency timer of 1 ms.
+Without wire time all bytes arrive immediately, except for delays by faults. An instruction takes
+effect when its bytes are put on the line, not after its last bit.
 
 Source of the formula: ROBOTIS e-Manual (8N1; return delay of the X series); the same frame
 of 10 bits in Feetech's and Pololu's manuals. The turnaround, reported as 20..50 us for
-Dynamixel servos, is 0 unless asked for.
+Dynamixel servos, is 0 by default.
 """
 
 from collections import deque
@@ -23,16 +22,16 @@ from gazerig.sim_mock.replies import Piece
 BITS_PER_BYTE = 10
 PACK_S = 0.001
 HEAD = b"\xff\xff"
-"""A status begins so, a later block of a fast reply does not; a Maestro's answers are bare."""
+"""First bytes of a status; later blocks of a fast reply and a Maestro's answers have none."""
 
 
 class ServoLine:
     """The line of one device: a chain of servos, or a board.
 
     Args:
-        wire_time: bytes take time, return delays count.
+        wire_time: bytes take time, and return delays apply.
         turnaround_s: between the end of an instruction, or of the status before, and the
-            start of a status, beyond the return delay.
+            start of a status, in addition to the return delay.
     """
 
     def __init__(self, device: Device, wire_time: bool = False, turnaround_s: float = 0.0) -> None:
@@ -45,7 +44,7 @@ class ServoLine:
 
     @property
     def busy(self) -> bool:
-        """True if bytes are in transit, or may arrive unasked."""
+        """Return whether bytes are in transit, or may arrive without a request."""
         faults = self.device.faults
         return bool(self._late) or (faults.wire.any and faults.on("babble"))
 
@@ -67,7 +66,7 @@ class ServoLine:
         return b"".join(out)
 
     def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
-        """Send the host's bytes now, or at ``now_s``; return what arrives at once."""
+        """Send the host's bytes now, or at ``now_s``; return the bytes that arrive immediately."""
         faulty = self.device.faults.wire.any
         if faulty:
             data = self.device.faults.wire.roughened(data, self.device.now_s())
@@ -85,7 +84,7 @@ class ServoLine:
         return self.arrived()
 
     def _disturbed(self, replies: list[DeviceReply]) -> list[DeviceReply]:
-        """Apply noise to the answers, and repeat the previous ones first if that fault is on."""
+        """Apply noise to the answers; put the previous ones first if that fault is active."""
         wire, now_s = self.device.faults.wire, self.device.now_s()
         said = b"".join(piece.data for reply in replies for piece in reply.pieces)
         before, self._said = self._said, said or self._said
@@ -106,7 +105,7 @@ class ServoLine:
         return False
 
     def _queue_late(self, replies: list[DeviceReply], now_s: float) -> None:
-        """Queue answers that take no time beyond the delay of a fault."""
+        """Queue answers whose only delay is a fault's."""
         due_s = max(now_s, self._late[-1][0] if self._late else now_s)
         for reply in replies:
             for piece in reply.pieces:
@@ -116,7 +115,7 @@ class ServoLine:
     def _on_the_wire(
         self, data: bytes, replies: list[DeviceReply], baud: int, now_s: float
     ) -> None:
-        """Queue answers as they pass the line."""
+        """Queue answers with their time on the line."""
         byte_s = BITS_PER_BYTE / baud
         start_s = max(now_s, self._host_free_s)
         self._host_free_s = start_s + len(data) * byte_s

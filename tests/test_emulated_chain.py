@@ -244,14 +244,14 @@ def test_faults_of_the_adapter_are_told_to_the_port(make, fault):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("explode 1", "'explode' is no command; there is lose"),
-        ("overload 9", "overload: no servo 9; there is 1; usage: overload ID"),
+        ("explode 1", "'explode' is not a command; commands: lose"),
+        ("overload 9", "overload: no servo 9; servos are 1; usage: overload ID"),
         ("voltage 1 99", "'99' is not volts from 0 to 30"),
         ("turn 254 1", "'254' is not a servo id from 0 to HIGHEST"),
-        ("set after-missing wait", "after-missing 'wait': it can be silence, skip, timeout"),
-        ("set colour red", "set 'colour': unknown; there is after-missing"),
+        ("set after-missing wait", "after-missing 'wait': expected silence, skip, timeout"),
+        ("set colour red", "set 'colour': unknown; expected after-missing"),
         ("set packet-gap-ms soon", "not a number of milliseconds"),
-        ("set baud 1000000", "it can be heed, any"),
+        ("set baud 1000000", "expected heed or any"),
     ],
 )
 def test_what_cannot_be_asked(make, text, message):

@@ -158,7 +158,7 @@ def test_a_fault_is_injected_by_name():
     assert (bench.get(70), bench.get(64)) == (0x08, 1)
     bench.servo.fail("electrical shock")
     assert (bench.get(70), bench.get(64)) == (0x18, 0)
-    with pytest.raises(ValueError, match="'cold': there is input voltage, overheating"):
+    with pytest.raises(ValueError, match="'cold': expected input voltage, overheating"):
         bench.servo.fail("cold")
 
 

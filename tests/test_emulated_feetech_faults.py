@@ -208,5 +208,5 @@ def test_faults_of_the_line_to_the_byte(fault, said):
 
 
 def test_no_shock_can_be_asked_of_it():
-    with pytest.raises(ValueError, match="'shock' is no command"):
+    with pytest.raises(ValueError, match="'shock' is not a command"):
         FeetechBench().chain.faults.command("shock 1")

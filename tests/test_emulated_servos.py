@@ -219,7 +219,7 @@ def test_factory_settings_come_back_but_for_the_id_where_that_is_asked(make):
     [(_, _, delay)] = bench.ask(5, READ, bench.span_of("return_delay_time"),
                                 baud=bench.factory_baud)  # fmt: skip
     assert delay == b"\xfa"
-    assert bench.chain.faults.command("reset 5").startswith("servo 5 is as from the factory: id 1")
+    assert bench.chain.faults.command("reset 5").startswith("servo 5 has factory settings: id 1")
     bench.wait(1.0)
     assert ids(bench.ask(1, PING, baud=bench.factory_baud)) == [1]
 
@@ -296,5 +296,5 @@ def test_a_brown_out_is_deaf_and_then_as_at_power_on(make):
 
 
 def test_an_error_that_cannot_be_is_refused_by_name(make):
-    with pytest.raises(ValueError, match="error 'rust': there is .*overload"):
+    with pytest.raises(ValueError, match="error 'rust': expected .*overload"):
         make().chain[1].fail("rust")

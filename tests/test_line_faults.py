@@ -294,7 +294,7 @@ def test_forbidden_and_blocked(world):
         world.port.setBaudRate(1_000_000)
     world.faults.command("deny off")
     world.faults.command("block on")
-    with pytest.raises(BusLost, match="takes no bytes"):
+    with pytest.raises(BusLost, match="accepts no bytes"):
         world.one()
     assert world.now_s == 0.25
     world.faults.command("block off")

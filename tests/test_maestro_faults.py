@@ -173,19 +173,19 @@ def test_status_tells_channels_errors_and_faults(world):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("lose 12", "no channel 12; there is 0 to 11"),
+        ("lose 12", "no channel 12; channels are 0 to 11"),
         ("lose x", "'x' is not a channel from 0 to 23"),
         ("error heat", "'heat' is none of signal, overrun"),
-        ("overload 1", "'overload' is no command; there is lose"),
+        ("overload 1", "'overload' is not a command; commands: lose"),
         ("script 99", "'99' is not a channel"),
         ("turn 1 far", "'far' is not quarter us"),
-        ("set mode loud", "it can be usb-dual-port, usb-chained"),
-        ("set crc maybe", "it can be on, off"),
+        ("set mode loud", "expected usb-dual-port, usb-chained"),
+        ("set crc maybe", "expected on or off"),
         ("set timeout-ms -1", "not a number of milliseconds from 0"),
         ("set timeout-ms nan", "not a number of milliseconds from 0"),
         ("set home-us 20", "not a pulse width from 64 to 3280 us"),
         ("set min-us 2400", "min-us 2400 would be above max-us 2000"),
-        ("set afterwards skip", "unknown; there is mode, crc, timeout-ms"),
+        ("set afterwards skip", "unknown; expected mode, crc, timeout-ms"),
     ],
 )
 def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
@@ -205,8 +205,8 @@ def test_help_explains_every_command_and_case(world):
     [
         (8, {}, "8 channels: a Maestro has 6, 12, 18, 24"),
         (6, {"device": 128}, "0 to 127"),
-        (6, {"servos": [HobbySpec(6)]}, "there is 0 to 5"),
-        (6, {"servos": [(1,), (1,)]}, "channel 1: give each a channel of its own"),
+        (6, {"servos": [HobbySpec(6)]}, "channels are 0 to 5"),
+        (6, {"servos": [(1,), (1,)]}, "channel 1: use a different channel for each"),
     ],
 )
 def test_boards_that_do_not_exist(channels, options, says):

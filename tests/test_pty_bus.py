@@ -195,7 +195,7 @@ def test_faults_by_command(strict, client):
     assert strict.command("lose 1 count 1") == "servo 1 does not answer 1 times"
     assert unheard(client)
     assert found(client)
-    with pytest.raises(ValueError, match="'lsoe' is no command"):
+    with pytest.raises(ValueError, match="'lsoe' is not a command"):
         strict.command("lsoe 1")
     servos = json.loads(strict.command("status"))["servos"]
     assert [servo["position"] for servo in servos] == [2048, 1000, 3000]

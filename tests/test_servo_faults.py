@@ -199,6 +199,6 @@ def test_lost_writes_while_the_torque_comes_on_and_goes(make):
 def test_a_blocked_write(rig):
     rig.command("block on for 0.6")
     assert rig.heard() == [False] * 4
-    assert "takes no bytes" in rig.bus.events()[0]
+    assert "accepts no bytes" in rig.bus.events()[0]
     rig.until_all()
     assert rig.longest_s < 0.3

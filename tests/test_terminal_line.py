@@ -130,12 +130,15 @@ def test_answers_to_commands_carry_the_name(bench):
     one = bench(BOARD, name="eyes")
     assert json.loads(one.line.obey("status"))["bus"] == "eyes"
     assert json.loads(one.line.obey("lose 9"))["bus"] == "eyes"
-    assert "no channel 9; there is 0 to 5" in json.loads(one.line.obey("lose 9"))["error"]
+    assert "no channel 9; channels are 0 to 5" in json.loads(one.line.obey("lose 9"))["error"]
 
 
 def test_a_choice_that_is_none_leaves_no_link_behind(tmp_path):
     link = tmp_path / "board"
-    for choices, says in (({"mode": "usb"}, "it can be"), ({"bad-crc": "reply"}, "there is mode")):
+    for choices, says in (
+        ({"mode": "usb"}, "expected usb"),
+        ({"bad-crc": "reply"}, "expected mode"),
+    ):
         settings = BusSettings(BOARD, choices=choices, link=str(link))
         with pytest.raises(ValueError, match=says):
             TerminalLine(settings, lambda: 0.0, print)

@@ -1,7 +1,7 @@
-"""Rendering of flat pieces of the world as a camera sees them.
+"""Rendering of flat pieces of the world in a camera's view.
 
-Whatever is drawn later covers what was drawn before, so the farthest comes first. The lens
-does not distort. World frame, metres; camera frame optical, x right, y down, z forward.
+Later drawing covers earlier drawing, so the farthest piece is drawn first. The lens does not
+distort. World frame, metres; camera frame optical, x right, y down, z forward.
 """
 
 from typing import NamedTuple
@@ -18,14 +18,14 @@ Bytes = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 """Blue, green, red."""
 
-# Nearer than this nothing is drawn: a lens does not see its own cap.
+# Nothing nearer is drawn: a lens does not see its own cap.
 _NEAREST_M = 0.03
-# OpenCV draws polygons to a part of a pixel: 1/16.
+# OpenCV draws polygons with a resolution of 1/16 pixel.
 _SHIFT = 4
 
 
 class TexturedQuad(NamedTuple):
-    """A flat textured piece: from a corner along two edges; texture rows go along ``down_m``."""
+    """A flat textured rectangle: a corner and two edges; texture rows go along ``down_m``."""
 
     corner_m: Vec3
     right_m: Vec3
@@ -34,14 +34,14 @@ class TexturedQuad(NamedTuple):
 
 
 class Canvas:
-    """The image of one camera at one position: colours and distances along its axis.
+    """Image of one camera at one position: colours, and distances along its axis.
 
     Args:
         seen_by: the camera.
-        depth: whether distances are wanted, which take as long as the colours.
+        depth: whether to compute distances, which take as long as the colours.
 
     image: (h, w, 3) BGR
-    depth_m: (h, w) float32, infinite where nothing was drawn, and everywhere if not wanted
+    depth_m: (h, w) float32, infinite where nothing was drawn, and everywhere without ``depth``
     """
 
     def __init__(self, seen_by: PinholeView, depth: bool = True) -> None:
@@ -60,14 +60,14 @@ class Canvas:
         return seen
 
     def polygon(self, points_world_m: ArrayLike, colour: Colour) -> None:
-        """Fill a polygon (n, 3) with a colour; distances stay as they are."""
+        """Fill a polygon (n, 3) with a colour; the distances do not change."""
         points = self.seen(points_world_m)
         if points[:, 2].min() > _NEAREST_M:
             fixed = np.rint((self._pixels(points)) * (1 << _SHIFT)).astype(np.int32)
             cv2.fillPoly(self.image, [fixed], colour, cv2.LINE_AA, _SHIFT)
 
     def sheet(self, sheet: TexturedQuad) -> None:
-        """Draw a textured sheet; texture with a fourth channel is opaque by that."""
+        """Draw a textured rectangle; the fourth channel of a texture is its opacity."""
         right, down, corner = (
             self.R_world_camera.T @ np.array(v) - offset
             for v, offset in (
@@ -88,7 +88,7 @@ class Canvas:
         moved = self.lens.matrix - np.array([(0, 0, left), (0, 0, top), (0, 0, 0)])
         rows, columns = sheet.texture.shape[:2]
         scaled = np.stack((right / columns, down / rows, corner), axis=1)
-        # The middle of a texture's first pixel lies half a pixel within the sheet.
+        # The centre of a texture's first pixel is half a pixel within the sheet.
         scaled[:, 2] += 0.5 * (scaled[:, 0] + scaled[:, 1])
         drawn = cv2.warpPerspective(
             sheet.texture,
@@ -109,7 +109,7 @@ class Canvas:
         self._deepen(window, np.asarray(mask, np.uint8), normal / float(normal @ corner))
 
     def ellipsoid_depth(self, centre_m: Vec3, R_world_body: Floats, half_m: Vec3) -> None:
-        """Set the distances of an ellipsoid's front where it is seen; colours stay."""
+        """Set the distances of the visible front of an ellipsoid; the colours do not change."""
         if not self._depth:
             return
         A = self.R_world_camera.T @ R_world_body / np.array(half_m)
@@ -132,13 +132,13 @@ class Canvas:
         np.copyto(part, t.astype(np.float32), where=(root > 0.0) & (t < part))
 
     def _pixels(self, points: Floats) -> Floats:
-        """Project points of the camera frame that are before the lens."""
+        """Project points of the camera frame that are in front of the lens."""
         i = self.lens
         pixels: Floats = points[:, :2] / points[:, 2:] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
         return pixels
 
     def _window(self, pixels: Floats) -> tuple[int, int, int, int] | None:
-        """Return x, y, width, height of the part of the image that points span."""
+        """Return x, y, width, height of the part of the image that the points span."""
         height, width = self.depth_m.shape
         low = np.floor(np.clip(pixels.min(axis=0), -2.0, 1e6)).astype(int)
         high = np.ceil(np.clip(pixels.max(axis=0), -2.0, 1e6)).astype(int) + 1
@@ -159,7 +159,7 @@ class Canvas:
         return ray
 
     def _blend(self, window: tuple[int, int, int, int], drawn: Bytes, mask: Bytes) -> None:
-        """Lay what was drawn over the image as far as the mask is opaque."""
+        """Blend a drawing into the image with the opacity of the mask."""
         left, top, width, height = window
         part = self.image[top : top + height, left : left + width]
         cv2.copyTo(drawn, cv2.inRange(mask, 255, 255), part)
@@ -183,7 +183,7 @@ class Canvas:
 
 
 def _before_lens(corners: Floats) -> Floats:
-    """Cut a convex polygon (n, 3) of the camera frame off at the nearest distance."""
+    """Clip a convex polygon (n, 3) of the camera frame at the nearest distance."""
     kept: list[Floats] = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if a[2] >= _NEAREST_M:

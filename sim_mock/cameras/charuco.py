@@ -1,7 +1,7 @@
 """A camera in front of a ChArUco board whose pose is known exactly.
 
-Its frames are like those of a camera: the lens distorts, edges are soft, the light falls
-off to one side, pixels have noise. Not modelled: motion blur, rolling shutter, glare,
+Frames are like those of a camera: the lens distorts, edges are soft, the light decreases
+to one side, pixels have noise. Not modelled: motion blur, rolling shutter, glare,
 paper that is not flat.
 """
 
@@ -23,7 +23,7 @@ from gazerig.robot.model.intrinsics import rays
 
 Floats = NDArray[np.float64]
 
-# Each pixel is the mean of so many by so many looks at the board.
+# Samples per pixel along each axis; a pixel is their mean.
 _LOOKS = 2
 _TEXTURE_PX_PER_MM = 2.0
 _PAPER_EDGE_MM = 12.0
@@ -32,7 +32,7 @@ _WALL = 90.0
 
 @dataclass(frozen=True)
 class BoardCameraParams:
-    """How good the frames are."""
+    """Quality of the frames."""
 
     width_px: Annotated[int, Bounds(64, 4096)] = 640
     height_px: Annotated[int, Bounds(64, 4096)] = 400
@@ -44,7 +44,7 @@ class BoardCameraParams:
 
 
 class BoardCamera:
-    """Draws the board from where a camera is."""
+    """Draws the board as a camera sees it from a given pose."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class BoardCamera:
             grey, edge, edge, edge, edge, cv2.BORDER_CONSTANT, value=params.white
         )
         per_m = 1e3 * _TEXTURE_PX_PER_MM
-        # Metres on the board to pixels of the texture, whose centres are at whole numbers.
+        # Metres on the board to pixels of the texture, whose centres are at integers.
         self._from_board = np.array(
             [(per_m, 0.0, edge - 0.5), (0.0, per_m, edge - 0.5), (0.0, 0.0, 1.0)]
         )
@@ -85,7 +85,7 @@ class BoardCamera:
             borderMode=cv2.BORDER_CONSTANT,
             borderValue=_WALL,
         )
-        # Looks that run away from the board's plane would meet it behind the camera.
+        # Rays that point away from the board's plane would meet it behind the camera.
         ends = self._rays[:: len(self._rays) - 1, :: self._rays.shape[1] - 1]
         if (ends @ back[2, :2] + back[2, 2]).min() <= 0.0:
             looked[self._rays @ back[2, :2] + back[2, 2] <= 0.0] = _WALL
@@ -98,7 +98,7 @@ class BoardCamera:
 
 
 def true_lens(width_px: int, height_px: int, horizontal_field_deg: float = 69.0) -> Intrinsics:
-    """Return a plausible lens that is not quite what its data sheet says."""
+    """Return a plausible lens that differs a little from its data sheet."""
     focal = 0.5 * width_px / np.tan(radians(0.5 * horizontal_field_deg)) * 1.03
     return Intrinsics(
         float(focal),
@@ -111,7 +111,7 @@ def true_lens(width_px: int, height_px: int, horizontal_field_deg: float = 69.0)
 
 @lru_cache(maxsize=4)
 def _fine_rays(width_px: int, height_px: int, lens: Intrinsics) -> NDArray[np.float32]:
-    """Return where sampled rays of all pixels meet the plane z = 1: (looks * h, looks * w, 2)."""
+    """Return the rays of all pixels' samples at z = 1: (looks * h, looks * w, 2)."""
     steps = (np.arange(_LOOKS) + 0.5) / _LOOKS - 0.5
     x = (np.arange(width_px)[:, None] + steps).ravel()
     y = (np.arange(height_px)[:, None] + steps).ravel()

@@ -1,8 +1,8 @@
-"""The board in front of an emulated head: held by hand at first, hanging still after that.
+"""The board in front of an emulated head: first held by hand, then at rest.
 
 The hand moves it everywhere, near and far, and tilts it to all sides, as the calibration
-asks for. The camera's true lens and mount
-are a little off those of the rig file, so that there is something to find.
+requires. The camera's true lens and mount differ a little from the rig file, so that the
+calibration has an error to find.
 """
 
 from dataclasses import replace
@@ -20,20 +20,20 @@ from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
 
-# The board's own axes are optical ones, so this is a board that hangs upright before a
-# head that looks along the world's x axis.
+# The board has optical axes, so this board hangs upright in front of a head that looks along
+# the world's x axis.
 _R_WORLD_BOARD: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 _AWAY_M = 0.7
-# By how much the camera sits elsewhere than the rig file says.
+# Offset of the camera's true mount from the rig file.
 _OFF_MM: Vec3 = (6.0, -4.0, 5.0)
 _OFF_DEG: Angles3 = (2.0, -3.0, 1.5)
 
 
 class BoardScene:
-    """Frames of the board, taken when they are asked for.
+    """Frames of the board, taken on request.
 
-    head_rad: angles of the emulated head; to be set whenever it moves
-    mount, lens: the camera as it truly is
+    head_rad: angles of the emulated head; the caller sets them whenever it moves
+    mount, lens: true mount and lens of the camera
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class BoardScene:
         self._number = 0
 
     def hang(self) -> None:
-        """Hang the board up, upright and 0.7 m before the head."""
+        """Hang the board up, upright and 0.7 m in front of the head."""
         self._hanging = True
 
     def look(self, now_s: float) -> Shot:
@@ -80,7 +80,7 @@ class BoardScene:
 
 
 def elsewhere(camera: CameraParams) -> CameraParams:
-    """Return a mount a little off the one of the rig file."""
+    """Return a mount a little off the mount of the rig file."""
     x, y, z = (mm + off for mm, off in zip(camera.position_mm, _OFF_MM, strict=True))
     return replace(
         camera,
@@ -94,11 +94,11 @@ def elsewhere(camera: CameraParams) -> CameraParams:
 def held_pose(
     number: int, params: BoardCameraParams, lens: Intrinsics, board: CharucoBoard
 ) -> tuple[Mat3, Vec3]:
-    """Return R_camera_board and p_camera_board_m of the number-th way to hold the board, from 0.
+    """Return R_camera_board and p_camera_board_m of the number-th pose in the hand, from 0.
 
-    Everywhere in the frame, near and far, tilted to all sides; no two alike.
+    The poses are everywhere in the frame, near and far, tilted to all sides, and all different.
     """
-    # Golden ratios spread any count of samples evenly.
+    # Golden ratios spread any number of samples evenly.
     a, b, c = ((number + 0.5) * g % 1.0 for g in (0.7548776662, 0.5698402910, 0.6180339887))
     fills = 0.38 + 0.34 * c
     tilt, about = radians(12.0 + 26.0 * ((number * 0.41) % 1.0)), 2.0 * pi * c + number * pi / 2
@@ -107,7 +107,7 @@ def held_pose(
     R = turn @ spin
     wide, high = board.size_m
     away = lens.fx_px * wide / (fills * params.width_px)
-    # Now and then a part of it is out of the frame.
+    # Sometimes a part of it is out of the frame.
     fills_height = fills * (params.width_px / params.height_px) * high / wide
     u = params.width_px * (0.5 + (0.5 - 0.4 * fills) * (2.0 * a - 1.0))
     v = params.height_px * (0.5 + (0.5 - 0.4 * fills_height) * (2.0 * b - 1.0))

@@ -1,8 +1,8 @@
-"""A camera that looks into a simulated scene from where the emulated head is.
+"""A camera in a simulated scene, at the pose of the emulated head.
 
-Its output is what a detector would find, not pixels: landmarks with noise, hands and things
-with a place in depth; late by its latency, at its own rate, inside its own field, and
-now and then nothing. Not modelled: motion blur, light, occlusion, false detections.
+Its output is a detector's, not pixels: landmarks with noise, hands and things with their
+distance. Detections arrive after a latency, at the camera's rate, inside its field of view, and
+some are missed. Not modelled: motion blur, light, occlusion, false detections.
 """
 
 from collections import deque
@@ -33,7 +33,7 @@ _LANDMARKS_FACE_M: tuple[Vec3, ...] = tuple((x, y, z) for x, y, z in LANDMARKS_F
 
 @dataclass(frozen=True)
 class SceneCameraParams:
-    """How good the camera and its detector are."""
+    """Quality of the camera and its detector."""
 
     width_px: Annotated[int, Bounds(32, 4096)] = 640
     height_px: Annotated[int, Bounds(32, 4096)] = 400
@@ -50,12 +50,12 @@ class SceneCamera:
 
     Args:
         params: resolution, rate and noise of the camera.
-        scene: what is in front of it.
-        mount: where the camera sits on the head.
+        scene: the scene in front of it.
+        mount: pose of the camera on the head.
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
         rng: for the noise.
-        locate: locates what is found in the camera's axes, None for none.
-        begins_s: when the scene begins; None: at the first look.
+        locate: converts detections from pixels to the camera's axes; None: no conversion.
+        begins_s: start of the scene; None: at the first call of ``latest``.
     """
 
     def __init__(
@@ -82,11 +82,11 @@ class SceneCamera:
 
     @property
     def start_s(self) -> float | None:
-        """Return when the scene begins or began; None where that is at the first look to come."""
+        """Return the start of the scene; None: at the first call of ``latest`` to come."""
         return self._start_s
 
     def open(self) -> None:
-        """Start: the first frame is taken at the first look."""
+        """Start; the first frame is taken at the first call of ``latest``."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
         self._start_s = self._begins_s
@@ -99,7 +99,7 @@ class SceneCamera:
         if now_s >= self._due_s:
             if self._start_s is None:
                 self._start_s = now_s
-            # A late look skips the frames it missed, as a real camera's slot does.
+            # A late call skips the frames that it missed, as a real camera's buffer does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
             self._on_the_way.append(self._expose(now_s))
@@ -111,25 +111,25 @@ class SceneCamera:
         return self._arrived
 
     def _arrival_s(self) -> float:
-        """Return when the oldest frame under way arrives."""
+        """Return the arrival time of the oldest frame in transit."""
         if not self._on_the_way:
             return inf
         return self._on_the_way[0].captured_s + self._params.latency_ms / 1e3 - 1e-9
 
     def retune(self, locate: Locate) -> bool:
-        """Locate by another calibration from the next frame on; always possible."""
+        """Use another calibration from the next frame on; always possible."""
         self._locate = locate
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Return no events: nothing can happen to it."""
+        """Return no events: none can happen."""
         return ()
 
     def close(self) -> None:
         """Stop; there is nothing to free."""
 
     def _expose(self, t_s: float) -> Detections:
-        """Return what one frame from the camera's present pose shows."""
+        """Return the detections in one frame from the camera's present pose."""
         assert self._start_s is not None
         R, p = self._mount.pose(*self._head_pose(t_s))
         faces: list[DetectedFace] = []
@@ -152,7 +152,7 @@ class SceneCamera:
         return found.located_by(self._locate)
 
     def _face(self, person: ScenePerson, R: Mat3, p: Vec3) -> DetectedFace | None:
-        """Project the landmarks; no detector finds what is cut off, far or turned away."""
+        """Project the landmarks; a face that is cut off, far or turned away is not detected."""
         noise = self._rng.normal(0.0, self._params.landmark_noise_px, (5, 2))
         missed = self._rng.random() < self._params.missed_share
         yaw, pitch = person.face_yaw_pitch_rad
@@ -177,13 +177,13 @@ class SceneCamera:
         return DetectedFace(box, np.array(pixels) + noise, 0.98)
 
     def _pixel(self, p_camera_m: Vec3) -> tuple[float, float]:
-        """Return where a point before the camera appears."""
+        """Return the pixel of a point in front of the camera."""
         x, y, z = p_camera_m
         lens = self._lens
         return (x / z * lens.fx_px + lens.cx_px, y / z * lens.fy_px + lens.cy_px)
 
     def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
-        """Place a hand or thing by depth; nothing where it is behind or outside the frame."""
+        """Project a hand or thing; nothing if it is behind the camera or outside the frame."""
         noise = self._rng.normal(0.0, self._params.depth_noise_mm / 1e3)
         point = rotate_back(R, sub(thing.p_world_m, p))
         if point[2] < 0.1:
@@ -202,7 +202,7 @@ class SceneCamera:
 def _landmarks_before(R: Mat3, p: Vec3, R_world_face: Mat3, p_world_face_m: Vec3) -> list[Vec3]:
     """Return the landmarks of a face in the axes of a camera.
 
-    R, p: rotation and place of the camera in the world
+    R, p: rotation and position of the camera in the world
     """
     (a, b, c), (d, e, f), (g, h, i) = R_world_face
     (k, l, m), (n, o, q), (r, s, t) = R  # noqa: E741

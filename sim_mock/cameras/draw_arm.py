@@ -1,6 +1,6 @@
-"""A person's arm as a camera sees it: a sleeve from shoulder to elbow, a forearm to the hand.
+"""A person's arm in a camera's view: a sleeve from shoulder to elbow, a forearm to the hand.
 
-Two links of true lengths, the elbow hanging; a hand farther away than they reach stretches them.
+Two links of true lengths, with the elbow at the bottom; a hand beyond their reach stretches them.
 Not drawn: arms that hang down, fingers.
 """
 
@@ -22,7 +22,7 @@ _UPPER_WIDTH_M, _FOREARM_WIDTH_M = 0.10, 0.075
 def draw_arm(
     canvas: Canvas, p_world_face_m: Vec3, p_world_hand_m: Vec3, sleeve: Colour, skin: Colour
 ) -> None:
-    """Draw the arm between the shoulder on the hand's side and the hand."""
+    """Draw the arm from the shoulder on the hand's side to the hand."""
     camera = float(canvas.p_m[0]), float(canvas.p_m[1]), float(canvas.p_m[2])
     shoulder = shoulder_m(p_world_face_m, p_world_hand_m, camera)
     elbow = elbow_m(shoulder, p_world_hand_m)
@@ -31,7 +31,7 @@ def draw_arm(
 
 
 def shoulder_m(face: Vec3, hand: Vec3, camera: Vec3) -> Vec3:
-    """Return the shoulder on the hand's side of a trunk that is turned to the camera."""
+    """Return the shoulder on the hand's side of a trunk that faces the camera."""
     away = unit((face[0] - camera[0], face[1] - camera[1], 0.0))
     aside = (-away[1], away[0], 0.0)
     rel = sub(hand, face)
@@ -56,7 +56,7 @@ def elbow_m(shoulder: Vec3, hand: Vec3) -> Vec3:
 
 
 def _limb(canvas: Canvas, start: Vec3, end: Vec3, width_m: float, colour: Colour) -> None:
-    """Draw one link as a patterned strip that is turned to the camera."""
+    """Draw one link as a patterned strip that faces the camera."""
     way = np.subtract(end, start)
     across = np.cross(way, np.add(start, end) * 0.5 - canvas.p_m)
     length = float(np.linalg.norm(across))

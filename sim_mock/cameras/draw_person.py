@@ -1,9 +1,9 @@
-"""A person as a camera sees one: a drawn face of true size and pose, and a body below it.
+"""A person in a camera's view: a face of true size and pose, and a body below it.
 
-The face is that of gazerig.robot.perception.face_pose: its eyes, nose and mouth lie where the
-landmarks are, in three dimensions, so that a face detector that was made for people finds them
-there. Arms are drawn where their hands are raised. Not drawn: arms that hang, expression, blinks;
-the eyes look straight ahead.
+Eyes, nose and mouth of the face are at the landmarks of gazerig.robot.perception.face_pose, in
+three dimensions, so that a face detector made for people finds them there. Arms are drawn if
+their hands are raised. Not drawn: arms that hang, expression, blinks; the eyes look straight
+ahead.
 """
 
 from functools import lru_cache
@@ -36,7 +36,7 @@ PERSON_COLOURS = (
 )
 
 _RIGHT_EYE, _LEFT_EYE, _, _MOUTH_RIGHT, _MOUTH_LEFT = LANDMARKS_FACE_M
-# Head as an ellipsoid: its middle and half axes in the face frame.
+# The head is an ellipsoid: its centre and half axes in the face frame.
 HEAD_MIDDLE_M: Vec3 = (-0.103, 0.0, 0.0)
 HEAD_HALF_M: Vec3 = (0.088, 0.074, 0.112)
 _HAIR_MIDDLE_M: Vec3 = (-0.118, 0.0, 0.018)
@@ -46,7 +46,7 @@ _TORSO_TOP_M, _TORSO_HEIGHT_M, _TORSO_WIDTH_M, _TORSO_BEHIND_M = -0.075, 0.80, 0
 
 
 def draw_person(canvas: Canvas, person: ScenePerson, number: int) -> None:
-    """Draw a person; people with the same number look the same."""
+    """Draw a person; people with equal numbers look equal."""
     looks = PERSON_COLOURS[number % len(PERSON_COLOURS)]
     yaw, pitch = person.face_yaw_pitch_rad
     R = np.array(rotation((yaw, pitch, 0.0)))
@@ -55,7 +55,7 @@ def draw_person(canvas: Canvas, person: ScenePerson, number: int) -> None:
 
 
 def draw_arm_of(canvas: Canvas, person: ScenePerson, number: int, p_world_hand_m: Vec3) -> None:
-    """Draw the arm of a person that ends at a hand."""
+    """Draw a person's arm to a hand."""
     looks = PERSON_COLOURS[number % len(PERSON_COLOURS)]
     draw_arm(canvas, person.p_world_face_m, p_world_hand_m, looks.shirt, looks.skin)
 
@@ -63,7 +63,7 @@ def draw_arm_of(canvas: Canvas, person: ScenePerson, number: int, p_world_hand_m
 def draw_head(
     canvas: Canvas, p_world_face_m: Vec3, R_world_face: Floats, looks: PersonColours
 ) -> None:
-    """Draw head and face with the face's axes at the tip of the nose."""
+    """Draw head and face; the face frame is at the tip of the nose."""
 
     def world(points_face_m: Floats) -> Floats:
         out: Floats = points_face_m @ R_world_face.T + np.array(p_world_face_m)
@@ -82,7 +82,7 @@ def draw_head(
 
 
 def draw_body(canvas: Canvas, p_world_face_m: Vec3, looks: PersonColours, number: int) -> None:
-    """Draw shoulders and trunk, turned to the camera."""
+    """Draw shoulders and trunk, facing the camera."""
     x, y, z = p_world_face_m
     away = np.array((x - canvas.p_m[0], y - canvas.p_m[1]))
     away /= max(1e-6, float(np.linalg.norm(away)))
@@ -95,7 +95,7 @@ def draw_body(canvas: Canvas, p_world_face_m: Vec3, looks: PersonColours, number
 
 
 def draw_thing(canvas: Canvas, thing: Thing) -> None:
-    """Draw a thing as a patterned ball; of hands, the colour of skin."""
+    """Draw a thing as a patterned ball; hands have the colour of skin."""
     way = np.array(thing.p_world_m) - canvas.p_m
     aside = np.cross(way, (0.0, 0.0, 1.0))
     aside /= max(1e-6, float(np.linalg.norm(aside)))
@@ -108,7 +108,7 @@ def draw_thing(canvas: Canvas, thing: Thing) -> None:
 
 
 def _hull(canvas: Canvas, points_world_m: Floats, colour: Colour) -> None:
-    """Fill the outline of a round body given by points on it."""
+    """Fill the outline of a round body that is given by points on it."""
     seen = canvas.seen(points_world_m)
     flat = (seen[:, :2] / seen[:, 2:]).astype(np.float32)
     order = cv2.convexHull(flat, returnPoints=False)[:, 0]
@@ -116,7 +116,7 @@ def _hull(canvas: Canvas, points_world_m: Floats, colour: Colour) -> None:
 
 
 def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
-    """Return points all over an ellipsoid."""
+    """Return points spread over an ellipsoid."""
     up = np.linspace(-1.0, 1.0, 13)[:, None]
     level = np.sqrt(1.0 - up * up)
     x, y = level * np.cos(_AROUND), level * np.sin(_AROUND)
@@ -126,7 +126,7 @@ def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
 
 @lru_cache(maxsize=8)
 def _features(looks: PersonColours) -> tuple[tuple[Floats, Colour], ...]:
-    """Return the outlines of a face's features, in the order in which they are drawn."""
+    """Return the outlines of a face's features in drawing order."""
     skin = looks.skin
     shade, deep = _darker(skin, 0.86), _darker(skin, 0.68)
     drawn: list[tuple[Floats, Colour]] = [
@@ -165,13 +165,13 @@ def _features(looks: PersonColours) -> tuple[tuple[Floats, Colour], ...]:
 
 
 def _nose_side(side: float) -> Floats:
-    """Return the flank of the nose on the owner's left (1) or right (-1)."""
+    """Return the flank of the nose on the person's left (1) or right (-1)."""
     root, wing = (-0.022, 0.006 * side, 0.028), (-0.004, 0.014 * side, -0.008)
     return np.array([root, wing, (0.0, 0.0, -0.010), (0.0, 0.0, 0.0)])
 
 
 def _mouth(above_m: float, below_m: float) -> Floats:
-    """Return lips between the corners of the mouth, so far above and below their line."""
+    """Return lips between the corners of the mouth, with their heights above and below the line."""
     a, b = _MOUTH_RIGHT, _MOUTH_LEFT
     share = np.linspace(0.0, 1.0, 13)[:, None]
     line = a + share * (b - a)
@@ -184,7 +184,7 @@ def _mouth(above_m: float, below_m: float) -> Floats:
 
 
 def _ellipse(middle: tuple[float, float, float], half_y: float, half_z: float) -> Floats:
-    """Return an upright ellipse at a place."""
+    """Return an upright ellipse at a position."""
     x, y, z = middle
     t = _AROUND[::2]
     return np.stack((np.full(len(t), x), y + half_y * np.cos(t), z + half_z * np.sin(t)), axis=1)
@@ -193,7 +193,7 @@ def _ellipse(middle: tuple[float, float, float], half_y: float, half_z: float) -
 def _arc(
     middle: tuple[float, float, float], half_y: float, rise_m: float, thick_m: float
 ) -> Floats:
-    """Return a band that bends down by ``rise_m`` to its ends, thinner there."""
+    """Return a band that bends down by ``rise_m`` towards its ends and is thinner there."""
     x, y, z = middle
     share = np.linspace(-1.0, 1.0, 9)
     base = z - rise_m * share * share
@@ -205,7 +205,7 @@ def _arc(
 
 
 def _on_head(y: Floats, z: Floats) -> Floats:
-    """Return points of the head's front above given places of the face's plane."""
+    """Return points on the front of the head at given positions in the face's plane."""
     cx, cy, cz = HEAD_MIDDLE_M
     a, b, c = HEAD_HALF_M
     inside = np.maximum(0.0, 1.0 - ((y - cy) / b) ** 2 - ((z - cz) / c) ** 2)
@@ -214,7 +214,7 @@ def _on_head(y: Floats, z: Floats) -> Floats:
 
 @lru_cache(maxsize=8)
 def _trunk(looks: PersonColours, number: int) -> Bytes:
-    """Return a neck, sloping shoulders and a checked shirt: (h, w, 4), opaque where they are."""
+    """Return a neck, sloping shoulders and a checked shirt: (h, w, 4) with opacity."""
     width, height = 138, 225
     shirt = np.zeros((height, width, 4), np.uint8)
     rng = np.random.default_rng(1000 + number)

@@ -1,6 +1,6 @@
-"""A room with something on its walls, so that a turning camera sees it move.
+"""A room with patterned walls, so that a turning camera sees them move.
 
-World frame: the neck base stands on a table, the floor is 0.9 m below it.
+World frame: the neck base is on a table, the floor is 0.9 m below it.
 """
 
 from functools import lru_cache
@@ -17,19 +17,19 @@ _PX_PER_M = 70.0
 _CEILING: Colour = (215, 218, 220)
 _FLOOR: Colour = (95, 120, 150)
 _WALLS: tuple[Colour, ...] = ((190, 200, 196), (196, 190, 178), (182, 196, 204), (200, 196, 190))
-# Patches of these sizes, and how much they differ from the wall.
+# Sizes of the patches, and their contrast with the wall.
 _PATCHES_M, _CONTRAST = (0.07, 0.2, 0.6), (26.0, 30.0, 24.0)
 
 
 def draw_room(canvas: Canvas, seed: int = 0) -> None:
-    """Draw the walls, the floor and the ceiling that the camera sees."""
+    """Draw the visible walls, floor and ceiling."""
     for sheet in _room(seed):
         canvas.sheet(sheet)
 
 
 @lru_cache(maxsize=4)
 def _room(seed: int) -> tuple[TexturedQuad, ...]:
-    """Return the six sides; textures are the same for the same seed."""
+    """Return the six sides; equal seeds give equal textures."""
     rng = np.random.default_rng(seed)
     (x0, y0, z0), (x1, y1, z1) = _LOW, _HIGH
     wide, long, tall = y1 - y0, x1 - x0, z1 - z0

@@ -1,8 +1,8 @@
-"""What a lens and the time it takes make of an ideal picture: distortion, blur, slanting rows.
+"""Effects of lens, exposure and read-out on an ideal picture: distortion, blur, slanting rows.
 
-A ``SceneView`` draws what a pinhole without faults sees at an instant. A real lens bends straight
-lines, the exposure lasts, and most sensors read one row after another while the head goes on
-turning. All of that is done here by drawing more than once, or more than is shown, whatever draws.
+A ``SceneView`` draws the picture of an ideal pinhole at an instant. A real lens bends straight
+lines, the exposure takes time, and most sensors read row after row while the head turns. This
+module draws more than once, or a larger picture, to add these effects to any view.
 """
 
 from collections.abc import Iterator
@@ -23,12 +23,12 @@ from gazerig.robot.model.intrinsics import rays
 from gazerig.robot.model.scene_view import PinholeView, Rendered, SceneView
 
 _BORDER_PX = 1.0
-_MOST_PIXELS = 4.0  # of an ideal picture, as a multiple of what the lens shows of it
+_MOST_PIXELS = 4.0  # of an ideal picture, as a multiple of the visible part
 
 
 @dataclass(frozen=True)
 class OpticsParams:
-    """How long a picture takes, and how sharp the lens is."""
+    """Exposure, read-out and sharpness."""
 
     # fmt: off
     exposure_ms: Annotated[float, Bounds(0, 100), "how long light is collected"] = 8.0
@@ -43,10 +43,11 @@ class OpticsParams:
 
 
 class CameraMotion(NamedTuple):
-    """A camera's pose at an instant, and where it was before.
+    """A camera's pose at an instant, and its pose before.
 
-    R, R_before: rotation in the world, axes optical; span_s: time between, 0 where nothing is known
-    of before
+    R, R_before: rotation in the world, optical axes; span_s: time between them, 0 if the pose
+        before
+    is unknown
     """
 
     R: Mat3
@@ -56,7 +57,7 @@ class CameraMotion(NamedTuple):
     span_s: float
 
     def pose(self, after_s: float) -> tuple[Mat3, Vec3]:
-        """Return rotation and position some time later, or earlier below 0, moving on as it did."""
+        """Return rotation and position after a time (before, if negative) at constant velocity."""
         if after_s == 0.0 or self.span_s <= 0.0:
             return self.R, self.p_m
         share = after_s / self.span_s
@@ -68,7 +69,7 @@ class CameraMotion(NamedTuple):
         return (a, b, c), (x, y, z)
 
     def smear_px(self, exposure_s: float, lens: Intrinsics) -> tuple[float, float]:
-        """Return how far the frame's middle moves during an exposure."""
+        """Return how far the centre of the frame moves during an exposure."""
         if self.span_s <= 0.0:
             return 0.0, 0.0
         ahead = np.array(self.R_before).T @ np.array(self.R)[:, 2]
@@ -93,12 +94,12 @@ def expose(
 
     Args:
         view: draws the scene.
-        params: how long it takes.
-        t_s: time since the scene began, seconds.
+        params: exposure and read-out.
+        t_s: time since the start of the scene, seconds.
         lens: of the camera, for pictures of this size, with its distortion.
         size_px: width and height.
-        motion: where the camera is at that time and how it moves.
-        depth: with distances, as of the middle of each row's exposure.
+        motion: pose and motion of the camera at that time.
+        depth: with distances, at the middle of each row's exposure.
     """
     bands = [
         _averaged(view, params, t_s, lens, size_px, motion, late_s, rows, depth)
@@ -112,7 +113,7 @@ def expose(
 
 
 def _blurred(image: ImageArray, blur_px: float) -> ImageArray:
-    """Blur a frame as a lens does that is not quite sharp."""
+    """Blur a frame as a slightly soft lens does."""
     if blur_px <= 0.0:
         return image
     side = 2 * ceil(2.0 * blur_px) + 1 if blur_px > 0.8 else 3
@@ -121,7 +122,7 @@ def _blurred(image: ImageArray, blur_px: float) -> ImageArray:
 
 
 def _bands(params: OpticsParams, height: int) -> Iterator[tuple[float, tuple[int, int] | None]]:
-    """Yield how late bands of rows are exposed, and which rows; None: all."""
+    """Yield the delay of each band of rows, and its rows; None: all."""
     if params.read_out_ms <= 0.0:
         yield 0.0, None
         return
@@ -143,7 +144,7 @@ def _averaged(
     rows: tuple[int, int] | None,
     depth: bool,
 ) -> Rendered:
-    """Return rows as the mean of what is seen during their exposure."""
+    """Return rows as the mean of the view during their exposure."""
     count, exposure_s = params.sub_exposures, params.exposure_ms / 1e3
     total: NDArray[np.float32] | None = None
     seen = None
@@ -169,7 +170,7 @@ def through_lens(
     depth: bool = False,
     rows: tuple[int, int] | None = None,
 ) -> Rendered:
-    """Return what is seen through a lens that may distort; see ``SceneView.draw``."""
+    """Return the view through a lens that may distort; see ``SceneView.draw``."""
     lens, size_px = seen_by.lens, seen_by.size_px
     if not lens.distorts:
         return view.draw(seen_by, depth=depth, rows=rows)
@@ -186,13 +187,13 @@ def through_lens(
     image = bent.astype(np.uint8, copy=False)
     if drawn.depth_m is None:
         return Rendered(image, None)
-    # Distances are not mixed: between two things there is none.
+    # Distances are not interpolated: a mean of two objects' distances is at neither.
     metres = cv2.remap(drawn.depth_m, columns, lines, cv2.INTER_NEAREST, borderMode=edge)
     return Rendered(image, metres.astype(np.float32, copy=False))
 
 
 def widest_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
-    """Return width and height of what must be drawn for a picture through a lens."""
+    """Return width and height of the ideal picture that a picture through a lens needs."""
     return _undistorting(lens, size_px)[1] if lens.distorts else size_px
 
 
@@ -200,7 +201,7 @@ def widest_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
 def _undistorting(
     lens: Intrinsics, size_px: tuple[int, int]
 ) -> tuple[Intrinsics, tuple[int, int], NDArray[np.float32], NDArray[np.float32]]:
-    """Return an ideal lens and its picture that hold all that a lens shows, and where.
+    """Return an ideal lens and picture size that cover a lens's field, and the pixel map.
 
     The two arrays (h, w) are column and row in the ideal picture of every pixel.
     """
@@ -225,7 +226,7 @@ def smeared(image: ImageArray, way_px: tuple[float, float]) -> ImageArray:
         return image
     half = int(np.ceil(0.5 * length))
     kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
-    # Looks spread evenly over the way, each shared among the four pixels around it.
+    # Samples spread evenly over the displacement, each shared among the four pixels around it.
     for share in np.linspace(-0.5, 0.5, 4 * half + 1).tolist():
         x, y = half + share * way_px[0], half + share * way_px[1]
         i, j = min(int(x), 2 * half - 1), min(int(y), 2 * half - 1)

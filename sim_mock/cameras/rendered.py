@@ -1,10 +1,10 @@
-"""A camera that renders the view from the emulated head and runs the real detectors on it.
+"""A camera that renders the emulated head's view and runs the real detectors on it.
 
-gazerig.sim_mock.cameras.detections simulates what a detector would find; here the real
-detectors work on pixels: a room with texture, people with faces and arms, things, distances.
-Frames come late, at their own rate, noisy, and smeared by the camera's turn during the
-exposure; a depth frame has the noise of stereo and holes at edges. What a lens and a sensor
-that is read row by row add is off unless asked for. A world with physics is drawn by another view.
+gazerig.sim_mock.cameras.detections simulates a detector's output; here the real detectors work on
+pixels: a room with texture, people with faces and arms, things, distances. Frames arrive after a
+latency, at the camera's rate, with noise, and blurred by the camera's turn during the exposure; a
+depth frame has the noise of stereo and holes at edges. The effects of a lens and of a sensor that
+is read row by row are off by default. A world with physics is drawn by another view.
 """
 
 from collections import deque
@@ -37,14 +37,14 @@ from gazerig.sim_mock.scenes.scene import Scene, Thing
 
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
-_BEHIND_HAND_M = 1e-3  # an arm is drawn right before its hand
+_BEHIND_HAND_M = 1e-3  # an arm is drawn just before its hand
 
 
 class Exposure(NamedTuple):
     """One frame as taken.
 
-    image: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without
-    R_world_camera, p_world_camera_m: where the camera truly was
+    image: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without depth
+    R_world_camera, p_world_camera_m: true pose of the camera
     """
 
     captured_s: float
@@ -56,12 +56,12 @@ class Exposure(NamedTuple):
 
 
 FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
-"""Finds what moves since the exposure before."""
+"""Finds motion since the exposure before."""
 
 
 @dataclass(frozen=True)
 class PixelCameraParams(SensorParams, OpticsParams):
-    """How good the camera is."""
+    """Quality of the camera."""
 
     width_px: Annotated[int, Bounds(32, 4096)] = 640
     height_px: Annotated[int, Bounds(32, 4096)] = 400
@@ -77,16 +77,16 @@ class PixelCamera:
 
     Args:
         params: resolution, rate and noise of the camera.
-        scene: what is in front of it.
-        mount: where the camera sits on the head.
+        scene: the scene in front of it.
+        mount: pose of the camera on the head.
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
         detector: finds the faces.
         rng: for the noise.
-        find_motion: finds what moves, besides the faces.
-        locate: locates what is found in the camera's axes, None for none.
-        view: draws the scene; None: as people, things and a room are drawn by hand.
+        find_motion: finds motion, in addition to the faces.
+        locate: converts detections from pixels to the camera's axes; None: no conversion.
+        view: draws the scene; None: flat people and things in a room.
         lens: of the camera, for frames of its size; None: by its field of view.
-        begins_s: when the scene begins; None: at the first look.
+        begins_s: start of the scene; None: at the first call of ``latest``.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class PixelCamera:
         self.open()
 
     def open(self) -> None:
-        """Start: the first frame is taken at the first look."""
+        """Start; the first frame is taken at the first call of ``latest``."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
         self._start_s = self._begins_s
@@ -128,7 +128,7 @@ class PixelCamera:
 
     @property
     def rate_hz(self) -> float:
-        """Return how many frames it takes a second."""
+        """Return the frames per second."""
         return self._params.rate_hz
 
     def latest(self, now_s: float) -> Detections | None:
@@ -137,7 +137,7 @@ class PixelCamera:
             self._start_s = now_s
         R, p = self._mount.pose(*self._head_pose(now_s))
         if now_s >= self._start_s + self._number / self._params.rate_hz - 1e-9:
-            # A late look skips the frames it missed, as a real camera's slot does.
+            # A late call skips the frames that it missed, as a real camera's buffer does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
             self._on_the_way.append(self._looked_at(self._expose(now_s, R, p)))
@@ -156,12 +156,12 @@ class PixelCamera:
         """Change detectors and calibration from the next frame on; always possible.
 
         Args:
-            detector: makes another one; None: no change.
+            detector: creates another one; None: no change.
             motion: returns a motion detector from the present one; None: no change.
-            locate: locates by another calibration; None: no change.
+            locate: uses another calibration; None: no change.
 
         Raises:
-            SetupError: the detector cannot be made; the old one goes on.
+            SetupError: the detector cannot be created; the old one stays.
         """
         if locate is not None:
             self._locate = locate
@@ -172,12 +172,12 @@ class PixelCamera:
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Return what the detector has to tell since the last call: nothing else can happen."""
+        """Return the detector's events since the last call; the camera itself has none."""
         events = getattr(self._detector, "events", None)
         return events() if events is not None else ()
 
     def close(self) -> None:
-        """Stop, and free what draws."""
+        """Stop, and free the view."""
         self._view.close()
 
     def _looked_at(self, shot: Exposure) -> Detections:
@@ -206,12 +206,12 @@ class PixelCamera:
             self._view, par, t_s - self._start_s, self.lens, size, motion, depth=par.depth
         )
         image = self._sensor.image(seen.image)
-        image.setflags(write=False)  # as those of real cameras
+        image.setflags(write=False)  # like the frames of real cameras
         depth = None if seen.depth_m is None else self._sensor.stereo(seen.depth_m)
         return Exposure(t_s, self._number, image, depth, R, p)
 
     def _motion(self, t_s: float, R: Mat3, p: Vec3) -> CameraMotion:
-        """Return where the camera is and where it was at the look before."""
+        """Return the camera's pose now and at the previous call."""
         if self._before is None or t_s <= self._before[0]:
             return CameraMotion(R, p, R, p, 0.0)
         before_s, R_before, p_before = self._before
@@ -219,7 +219,7 @@ class PixelCamera:
 
 
 class DrawnScene(NamedTuple):
-    """Draws a scene by hand: flat people and things in a room."""
+    """Draws a scene from flat people and things in a room."""
 
     scene: Scene
     room_seed: int = 0
@@ -238,7 +238,7 @@ class DrawnScene(NamedTuple):
 
 
 def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0) -> None:
-    """Draw a room and who and what is in it, the farthest first."""
+    """Draw a room with people and things, the farthest first."""
     draw_room(canvas, room_seed)
     eye = (float(canvas.p_m[0]), float(canvas.p_m[1]), float(canvas.p_m[2]))
     drawn: list[tuple[float, Callable[[], None]]] = []
@@ -260,5 +260,5 @@ def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0)
 
 
 def _later(draw: Callable[..., None], *what: Any) -> Callable[[], None]:
-    """Return a call to be made later."""
+    """Return a deferred call."""
     return lambda: draw(*what)

@@ -1,6 +1,6 @@
-"""A picture of a simulated scene: a calm room with people, drawn from where the camera is.
+"""A picture of a simulated scene for the page: a calm room with people.
 
-The people are those of the page's 3-D view. It is for people's eyes alone: no detector sees it
+The people are those of the page's 3-D view. No detector uses the picture
 (gazerig.sim_mock.cameras.rendered draws for those).
 """
 
@@ -32,12 +32,12 @@ _SHIFT = 4
 _WALL_TOP, _WALL_LOW = (214, 218, 214), (236, 236, 230)  # BGR
 _TABLE_FAR, _TABLE_NEAR = (150, 172, 190), (118, 142, 166)
 _TABLE_M = -0.55
-"""Height of the edge where wall and floor meet, seen far away."""
+"""Height of the distant edge between wall and floor."""
 _BALL_BGR = (190, 150, 110)
 
 
 def draw_picture(scene: Scene, seen_by: PinholeView) -> ImageArray:
-    """Return what a camera sees of a scene, BGR."""
+    """Return the camera's view of a scene, BGR."""
     canvas, p_m = Canvas(seen_by), seen_by.p_m
     _draw_room(canvas)
     people = scene.people(seen_by.t_s)
@@ -55,7 +55,7 @@ def draw_picture(scene: Scene, seen_by: PinholeView) -> ImageArray:
 
 
 class _Placed(NamedTuple):
-    """A painted shape somewhere in the world."""
+    """A painted shape with its pose in the world."""
 
     shape: Painted
     R: Floats
@@ -70,7 +70,7 @@ def _placed(shape: Painted, R: Floats, p_m: Vec3, eye_m: Vec3, scale: float = 1.
 
 
 def _person(person: ScenePerson, number: int, eye_m: Vec3) -> list[_Placed]:
-    """Return head, chest and, where a hand is raised, the arm of a person."""
+    """Return a person's head and chest, and the arm of a raised hand."""
     face = person.p_world_face_m
     yaw, pitch = person.face_yaw_pitch_rad
     R_head = np.array(rotation((yaw, pitch, 0.0)))
@@ -80,7 +80,7 @@ def _person(person: ScenePerson, number: int, eye_m: Vec3) -> list[_Placed]:
     skull = _placed(solid, R_head, face, eye_m)
     solids = [
         skull,
-        # Behind the head in any case: the neck is in its collar.
+        # The chest is drawn before the head in any case: the neck is in its collar.
         _placed(torso(number, _CHEST_M), R_chest, face, eye_m)._replace(
             away_m=float(np.linalg.norm(away)) + 0.01
         ),
@@ -105,7 +105,7 @@ def _arm(person: ScenePerson, number: int, p_hand_m: Vec3, eye_m: Vec3) -> list[
 
 
 def _hand(p_m: Vec3, number: int, radius_m: float, eye_m: Vec3) -> _Placed:
-    """Return an open hand that shows the camera its palm."""
+    """Return an open hand whose palm faces the camera."""
     to_eye = np.subtract(eye_m, p_m)
     R = np.array(rotation((atan2(to_eye[1], to_eye[0]), 0.0, 0.0)))
     return _placed(hand(number), R, p_m, eye_m, radius_m)
@@ -113,7 +113,7 @@ def _hand(p_m: Vec3, number: int, radius_m: float, eye_m: Vec3) -> _Placed:
 
 @lru_cache(maxsize=8)
 def _limb(number: int, sleeve: bool) -> Painted:
-    """Return an arm's link of length 1 along z; the radius is in metres already."""
+    """Return an arm's link of length 1 along z; the radius is already in metres."""
     look = LOOKS[number % len(LOOKS)]
     thick, thin = (_SLEEVE_M, 0.9 * _SLEEVE_M) if sleeve else (0.9 * _SLEEVE_M, _WRIST_M)
     mesh = turned(
@@ -123,7 +123,7 @@ def _limb(number: int, sleeve: bool) -> Painted:
 
 
 def _between(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _Placed:
-    """Lay a link from one point to another."""
+    """Place a link from one point to another."""
     way = np.subtract(end, start)
     length = max(float(np.linalg.norm(way)), 1e-6)
     up = way / length
@@ -136,7 +136,7 @@ def _between(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _Placed:
 
 
 def _draw_solid(canvas: Canvas, solid: _Placed) -> None:
-    """Draw a shape face by face, the farthest first, each as bright as it faces the light."""
+    """Draw a shape face by face, the farthest first, with diffuse shading."""
     mesh = solid.shape.mesh
     seen = canvas.seen(solid.scale * mesh.vertices @ solid.R.T + solid.p_m)
     if seen[:, 2].min() < _NEAREST_M:
@@ -186,11 +186,11 @@ def _draw_ball(canvas: Canvas, p_m: Vec3, radius_m: float) -> None:
 
 
 def _draw_room(canvas: Canvas) -> None:
-    """Draw a wall and a floor, both fading, that turn with the camera."""
+    """Draw a wall and a floor, both with gradients, that turn with the camera."""
     height, width = canvas.depth_m.shape
     lens = canvas.lens
     R = canvas.R_world_camera
-    # The horizon's height in the image's middle, and how it leans, from the world's up.
+    # Height and tilt of the horizon at the image's centre, from the world's up.
     up = R.T @ np.array((0.0, 0.0, 1.0))
     rows = (np.arange(height) - lens.cy_px) / lens.fy_px
     columns = (np.arange(width) - lens.cx_px) / lens.fx_px
@@ -206,7 +206,7 @@ def _draw_room(canvas: Canvas) -> None:
 
 
 def _draw_window(canvas: Canvas) -> None:
-    """Hang two calm pictures on the wall, so that the head's turns can be seen."""
+    """Draw two calm pictures on the wall, which make the head's turns visible."""
     for y, z, half_y, half_z, colour in (
         (1.15, 0.72, 0.34, 0.26, (206, 178, 150)),
         (-1.25, 0.66, 0.24, 0.32, (150, 176, 206)),

@@ -1,4 +1,4 @@
-"""What a sensor makes of the light: brightness, noise, and distances as stereo measures them."""
+"""Effects of a sensor on a picture: brightness, noise, and distances measured by stereo."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import ImageArray
 from gazerig.params import Bounds
 
-# A second of noise would cost more than the drawing; a piece of one stock is as good.
+# Fresh noise would cost more than the drawing; slices of one stock look the same.
 _NOISE_STOCK = 1 << 21
-# Stereo is blind beside edges: over so many pixels, where the distance jumps by this share.
+# Stereo measures nothing next to edges: width in pixels, and share of the jump in distance.
 _BLIND_PX, _JUMP = 5, 0.08
 
 
 @dataclass(frozen=True)
 class SensorParams:
-    """How true the picture is to the light."""
+    """Fidelity of the picture to the light."""
 
     # fmt: off
     noise_grey: Annotated[float, Bounds(0, 60), "standard deviation of the noise of reading, grey values"] = 3.0
@@ -34,7 +34,7 @@ class Sensor:
     """Adds noise to pictures and distances.
 
     Args:
-        params: how true the picture is to the light.
+        params: fidelity of the picture to the light.
         rng: for the noise.
     """
 
@@ -47,11 +47,11 @@ class Sensor:
         self._tone = np.clip(np.rint(255.0 * light), 0, 255).astype(np.uint8)
         self._has_tone = bool((self._tone != grey).any())
         shot = params.shot_noise_grey * np.sqrt(grey / 255.0)
-        # In multiples of what is in the stock.
+        # In multiples of the deviation of the stock.
         self._deviation = (np.hypot(params.noise_grey, shot) / self._unit).astype(np.float32)
 
     def image(self, light: ImageArray) -> ImageArray:
-        """Return a picture as it is read, for one that shows the light."""
+        """Return the picture that the sensor reads for given light."""
         params = self._params
         image = self._tone[light] if self._has_tone else light
         if params.noise_grey <= 0.0 and params.shot_noise_grey <= 0.0:
@@ -63,7 +63,7 @@ class Sensor:
         return out
 
     def stereo(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return distances as stereo measures them: error with the square, blind beside edges."""
+        """Return distances as stereo measures them: quadratic error, blind next to edges."""
         noise = self._piece(depth_m.size).reshape(depth_m.shape)
         noise = noise * (self._params.depth_noise_1_m / self._unit)
         seen = depth_m * (1.0 + depth_m * noise)
@@ -74,7 +74,7 @@ class Sensor:
         return out
 
     def _piece(self, size: int) -> NDArray[np.float32]:
-        """Return a slice of the prepared noise, another one each time."""
+        """Return a slice of the prepared noise, different in each call."""
         start = int(self._rng.integers(0, _NOISE_STOCK))
         piece = self._stock[start : start + size]
         if len(piece) == size:

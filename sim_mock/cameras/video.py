@@ -1,6 +1,6 @@
-"""A film seen as a camera in simulated time: the same calls give the same detections.
+"""A film as a camera in simulated time: the same calls return the same detections.
 
-It does not blur, distort, drop or reorder frames, and its delay is constant.
+Frames are not blurred, distorted, dropped or reordered, and the delay is constant.
 """
 
 from collections.abc import Callable
@@ -24,11 +24,11 @@ class Film(Protocol):
         ...
 
     def shot(self, number: int) -> Shot:
-        """Read a frame with what belongs to it; numbers never run back."""
+        """Read a frame and its data; numbers never decrease."""
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Return what the user should know of the film, one line each, once."""
+        """Return messages about the film for the user, one line each, once."""
         ...
 
     def close(self) -> None:
@@ -37,21 +37,21 @@ class Film(Protocol):
 
 
 class FilmCamera:
-    """A film that starts at a simulated time and is watched for faces.
+    """A film that starts at a simulated time, with face detection.
 
-    Every frame is analysed exactly once and in order, however far time jumps, so that
-    the counts are those of any other run to the same time.
+    Every frame is analysed exactly once and in order, however far time jumps, so that the counts
+    equal those of any other run to the same time.
 
     Args:
         video: the film.
         detector: finds faces.
         delay_s: time from exposure to detections, at least 0.
         start_s: simulated time of the first exposure.
-        motion: finds motion, None for none.
-        locate: locates what is found in the camera's axes, None for none.
-        orientation: how frames are turned upright.
+        motion: finds motion; None: no motion.
+        locate: converts detections from pixels to the camera's axes; None: no conversion.
+        orientation: turns frames upright.
 
-    frames, frames_with_face: counts of frames looked at since open
+    frames, frames_with_face: counts of frames analysed since ``open``
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class FilmCamera:
         orientation: FrameOrientation = AS_DELIVERED,
     ) -> None:
         if not delay_s >= 0.0:
-            raise ValueError(f"detections cannot come before their frame: delay {delay_s} s")
+            raise ValueError(f"detections cannot arrive before their frame: delay {delay_s} s")
         self._video = video
         self._frames = FrameAnalyzer(detector, motion, locate, orientation.rotation)
         self._orientation = orientation
@@ -86,7 +86,7 @@ class FilmCamera:
         self.frames = self.frames_with_face = 0
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return the newest detections that have come through by ``now_s``.
+        """Return the newest detections that have arrived by ``now_s``.
 
         Raises:
             CameraError: the film cannot be read any more.
@@ -106,7 +106,7 @@ class FilmCamera:
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Return what had to be assumed about film and lens, one line each, once."""
+        """Return the assumptions about film and lens, one line each, once."""
         return (*self._video.events(), *self._frames.events())
 
     def close(self) -> None:
@@ -118,7 +118,7 @@ class FilmCamera:
         return self._start_s + self._video.due_s(number)
 
     def _look(self, number: int) -> None:
-        """Find the faces of one frame, and what moves in it."""
+        """Find the faces and the motion of one frame."""
         shot = self._orientation.upright(self._video.shot(number))
         shot = shot._replace(captured_s=self._captured_s(number))
         found = self._frames.look(shot)

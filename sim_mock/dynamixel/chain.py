@@ -1,4 +1,4 @@
-"""The device side of Dynamixel Protocol 2.0: bytes in, bytes out, nothing opened.
+"""Device side of Dynamixel Protocol 2.0: bytes in, bytes out, nothing opened.
 
 Sources: ROBOTIS e-Manual, Protocol 2.0 and X series.
 """
@@ -50,7 +50,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
             self._framing.strict = strict
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
-        """Let expired bus watchdogs trip, reset the others, then carry out the instruction."""
+        """Trip expired bus watchdogs, reset the others, then execute the instruction."""
         if instruction.code < 0:
             return self._reject(instruction.servo_id)
         if self._now_ms - self._fed_ms >= MIN_WATCHDOG_MS:
@@ -60,7 +60,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         return super()._execute(instruction)
 
     def _reject(self, servo_id: int) -> list[Piece]:
-        """Answer an instruction with a wrong CRC, as the quirks say."""
+        """Answer an instruction with a wrong CRC, depending on the quirks."""
         servo = self._by_id.get(servo_id)
         if servo is None or not servo.advance(self._now_ms, self._fed_ms):
             return []
@@ -89,7 +89,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         return self._fast_with_faults(rows, length)
 
     def _fast_with_faults(self, rows: Sequence[GroupRead], length: int) -> list[Piece]:
-        """Build the same block by block: some are missing, damaged or sent by two servos."""
+        """Build the packet block by block: some are missing, damaged or sent by two servos."""
         answers: list[Answer] = []
         for servo_id, address, size in rows:
             servo = self._by_id.get(servo_id)

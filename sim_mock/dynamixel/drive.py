@@ -30,7 +30,7 @@ from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 TRIPPED = 255
-"""Bus Watchdog (98) reads so after it has stopped the servo."""
+"""Value of Bus Watchdog (98) after it has stopped the servo."""
 
 HOMING_ACTS_STEPS = 1024
 """Part of the homing offset that counts in position mode."""
@@ -43,7 +43,7 @@ ARRIVED, RUNNING, ASTRAY = 1, 2, 8
 
 IN_POSITION_STEPS = 12
 FOLLOWING_STEPS = 100
-"""Distances that decide over in position and following error; not documented them."""
+"""Thresholds of in position and following error; the maker does not document them."""
 
 _WATCHDOG_AT = 98
 _SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
@@ -51,10 +51,10 @@ _RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 
 
 class DynamixelDrive(Drive):
-    """What turns the shaft of a Dynamixel servo.
+    """Drives the shaft of a Dynamixel servo.
 
     Attributes:
-        follows: whether a goal position is followed at once.
+        follows: whether a goal position is followed immediately.
     """
 
     memory: DynamixelMemory
@@ -92,7 +92,7 @@ class DynamixelDrive(Drive):
 
     @property
     def joint_steps(self) -> float:
-        """Return the position of the joint behind the play, in the registers' terms."""
+        """Return the position of the joint behind the play, in the registers' unit."""
         return self._side * self.shaft.joint + self._shift
 
     def sensed(self, now_ms: int) -> tuple[int, int, int]:
@@ -125,7 +125,7 @@ class DynamixelDrive(Drive):
         return moving, status, round(self._side * shaft.u * PWM_FULL)
 
     def reference(self) -> tuple[int, int]:
-        """Return the velocity and position that the profile asks for, in register units."""
+        """Return the profile's velocity and position, in register units."""
         shaft, side, profile = self.shaft, self._side, self.shaft.profile
         place = shaft.x if isinstance(profile, SpeedProfile) else profile.r
         return round(side * profile.v / _SPEED_UNIT), round(side * place + self._shift)
@@ -133,7 +133,7 @@ class DynamixelDrive(Drive):
     # --- goals
 
     def set_goal(self, goal: int) -> None:
-        """Plan the profile to a goal position; the same goal again changes nothing."""
+        """Plan the profile to a goal position; an equal goal changes nothing."""
         shaft = self.shaft
         profile, to = shaft.profile, float(self._side * (goal - self._shift))
         if isinstance(profile, PositionProfile) and to != profile.goal:
@@ -152,7 +152,7 @@ class DynamixelDrive(Drive):
             self.shaft.resume()
 
     def halt(self) -> None:
-        """Stop at the present position under torque until a new goal comes."""
+        """Stop at the present position under torque until a new goal arrives."""
         shaft = self.shaft
         if isinstance(shaft.profile, SpeedProfile):
             shaft.profile.set_goal(0.0, 0.0)
@@ -164,7 +164,7 @@ class DynamixelDrive(Drive):
     # --- torque and mode
 
     def switch(self, on: bool) -> None:
-        """Switch the torque; a goal that was kept is followed at once."""
+        """Switch the torque; a stored goal is followed immediately."""
         was, self.torque = self.torque, on
         if on and not was:
             self._start()
@@ -204,10 +204,10 @@ class DynamixelDrive(Drive):
         self.reset_goals()
 
     def reset_goals(self) -> None:
-        """Set the goals to the limits, the goal position to where it is.
+        """Set the goals to the limits, and the goal position to the present position.
 
-        The goal that turns the shaft by itself starts at 0: not documented, and a servo
-        that ran away as its torque comes on would be known for it.
+        Goals that drive the shaft continuously start at 0. This is not documented, but owners would
+        have reported servos that run away when the torque is switched on.
         """
         for name in ("goal_pwm", "goal_current", "goal_velocity"):
             if self.memory.has(name):
@@ -218,7 +218,7 @@ class DynamixelDrive(Drive):
     # --- origin
 
     def wrap_to_one_turn(self) -> None:
-        """Bring the position into one turn, as power-on and a change of mode do."""
+        """Wrap the position into one turn, as power-on and a change of mode do."""
         self._side = -1 if self.memory.get("drive_mode") & REVERSE else 1
         self._offset = self._homing()
         turns = int(self._side * self.shaft.x // STEPS_PER_TURN)
@@ -241,7 +241,7 @@ class DynamixelDrive(Drive):
         return max(-HOMING_ACTS_STEPS, min(HOMING_ACTS_STEPS, offset))
 
     def clear_turns(self) -> bool:
-        """Bring a multi-turn position back into one turn; return False while moving."""
+        """Wrap a multi-turn position into one turn; return False while moving."""
         if self.shaft.v or (self.torque and self.shaft.profile.running):
             return False
         turns = int(self.position_steps // STEPS_PER_TURN)

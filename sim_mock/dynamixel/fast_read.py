@@ -1,7 +1,7 @@
 """Fast sync read in one tight loop, for unique ids and a line without faults.
 
 It returns the same bytes as gazerig.sim_mock.dynamixel.packets.fast_pieces in half the time; a
-test compares the two.
+test compares them.
 """
 
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,7 @@
 """Framing of Protocol 2.0 instructions in a stream of bytes.
 
-An instruction is framed by its length, so one whose parameters should have been stuffed
-and were not is still understood; ``strict`` servos drop it instead.
+The length frames an instruction, so an instruction without its byte stuffing is still
+understood; ``strict`` servos drop it instead.
 """
 
 from fastcrc.crc16 import umts
@@ -11,7 +11,7 @@ from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
 
 
 class DynamixelFraming(Framing):
-    """Finds instructions; ``strict``: drop packets that should have been stuffed and were not."""
+    """Finds instructions; ``strict``: drop packets whose byte stuffing is missing."""
 
     strict = False
 
@@ -45,5 +45,5 @@ def _intact(packet: bytes) -> bool:
 
 
 def _unstuffed(packet: bytes) -> bool:
-    """True if a header stands among the parameters."""
+    """Return whether there is a header among the parameters."""
     return RAW in packet[7:-2].replace(STUFFED, b"")

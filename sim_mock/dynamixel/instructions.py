@@ -1,4 +1,4 @@
-"""Instructions that Dynamixel servos alone have, and those of the groups of Protocol 2.0.
+"""Instructions of Dynamixel servos only, and group instructions of Protocol 2.0.
 
 Source: ROBOTIS e-Manual, Protocol 2.0.
 """
@@ -31,25 +31,25 @@ _ROW = struct.Struct("<BHH")
 
 
 def touches_eeprom(code: int, params: bytes) -> bool:
-    """True if an instruction may change id, baud rate, return delay or secondary id."""
+    """Return whether an instruction may change id, baud rate, return delay or secondary id."""
     if code in (WRITE, REG_WRITE):
         return INSTRUCTIONS.address_of(params) < EEPROM_END
     return code in (ACTION, FACTORY_RESET, BACKUP)
 
 
 def obeys_broadcast(servo: DynamixelServo, code: int, params: bytes) -> bool:
-    """True if a servo carries out an instruction that goes to all."""
+    """Return whether a servo executes a broadcast instruction."""
     reset = code == FACTORY_RESET and params == RESET_ALL
     return not reset or servo.firmware < NO_BROADCAST_RESET_SINCE
 
 
 def bulk_rows(params: bytes) -> tuple[GroupRead, ...]:
-    """Read the parameters of a bulk read."""
+    """Parse the parameters of a bulk read."""
     return tuple(_ROW.iter_unpack(params)) if len(params) % _ROW.size == 0 else ()
 
 
 def bulk_writes(params: bytes) -> list[GroupWrite]:
-    """Read the parameters of a bulk write: id, address and data of each servo."""
+    """Parse the parameters of a bulk write: id, address and data of each servo."""
     out, at = [], 0
     while len(params) - at > _ROW.size:
         servo_id, address, length = _ROW.unpack_from(params, at)

@@ -1,7 +1,7 @@
 """The control table of an emulated servo as bytes: access, ranges, indirect windows.
 
-Knows the rules that follow from the table alone; what needs the servo's state (EEPROM
-lock, limit registers, watchdog) is asked by gazerig.sim_mock.dynamixel.servo.
+It applies the rules that follow from the table alone. gazerig.sim_mock.dynamixel.servo applies
+those that need the servo's state (EEPROM lock, limit registers, watchdog).
 """
 
 import struct
@@ -31,18 +31,18 @@ ACCESS = 7
 NOT_STORED = (
     "torque_enable", "bus_watchdog", "goal_pwm", "goal_current", "goal_velocity", "goal_position",
 )  # fmt: skip
-"""A backup (instruction 0x20) leaves out what moves the servo [assumed: not documented]."""
+"""A backup (instruction 0x20) omits registers that move the servo [assumed: not documented]."""
 
 Fields = tuple[tuple[DynamixelRegister, int], ...]
-"""Registers with the values to be written to them."""
+"""Registers with the values to write."""
 
 
 class ResolvedRange(NamedTuple):
-    """Real addresses behind a range, resolved through the indirect windows.
+    """Real addresses of a range, resolved through the indirect windows.
 
     runs: first address and end of each run of neighbours
     fetch: returns the bytes of all real addresses, in runs of neighbours
-    sensed, surroundings, profiled: whether any of them holds sensor values, voltage or
+    sensed, surroundings, profiled: whether the range contains sensor values, voltage or
         temperature, or the state of the profile
     """
 
@@ -54,10 +54,10 @@ class ResolvedRange(NamedTuple):
 
 
 class SensedWindow(NamedTuple):
-    """Current, velocity and position amid registers that change seldom, as a block is packed.
+    """Current, velocity and position among registers that rarely change, as a block is packed.
 
     layout: error, id, ``before``, current, velocity, position, ``after``
-    surroundings: whether voltage or temperature are among the others
+    surroundings: whether the others include voltage or temperature
     """
 
     layout: struct.Struct
@@ -84,9 +84,9 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         self._window_low = min(low for low, _, _ in self._windows)
         self._pointers_low = min(pointers for _, _, pointers in self._windows)
         self.windows: dict[tuple[int, int, int], SensedWindow | None] = {}
-        """Windows by what asks for them, until anything else in them changes."""
+        """Windows by their request, valid until any other byte in them changes."""
         self.gathers: dict[tuple[int, int], ResolvedRange] = {}
-        """Ranges that were read, until a window points elsewhere."""
+        """Ranges that were read, valid until an indirect address changes."""
         self._defined = bytearray(size)
         for register in registers:
             end = register.address + register.size
@@ -94,7 +94,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         self.restore(lambda register: True)
 
     def restore(self, chosen: Callable[[DynamixelRegister], bool]) -> None:
-        """Put the initial values back into the chosen registers."""
+        """Restore the initial values of the chosen registers."""
         for register in self._by_address.values():
             if register.initial is not None and chosen(register):
                 self.put(register, register.initial)
@@ -104,7 +104,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         self.restore(lambda register: not in_eeprom(register))
 
     def writable(self) -> Iterator[DynamixelRegister]:
-        """Return the writable registers but indirect data, which stands for other registers."""
+        """Yield the writable registers except indirect data, which refers to other registers."""
         for register in self._by_address.values():
             if register.access == "rw" and not register.name.startswith("indirect_data"):
                 yield register
@@ -120,11 +120,11 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         return int.from_bytes(data, "little", signed=register.signed)
 
     def _encode(self, register: DynamixelRegister, value: int) -> bytes:
-        """Return two's complement where the value is negative."""
+        """Return the value's bytes, in two's complement if it is negative."""
         return (value & ((1 << 8 * register.size) - 1)).to_bytes(register.size, "little")
 
     def read(self, address: int, length: int) -> bytes | None:
-        """Return bytes as they are on the wire, None where an address is not defined."""
+        """Return bytes as they are on the wire, None if an address is not defined."""
         gather = self.gather(address, length)
         return None if gather is None else self.collect(gather)
 
@@ -133,9 +133,9 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         return b"".join(gather.fetch(self.bytes))
 
     def gather(self, address: int, length: int) -> ResolvedRange | None:
-        """Return the real addresses behind a range, None where an address is not defined.
+        """Return the real addresses of a range, None if an address is not defined.
 
-        It is kept, as a control loop reads the same ranges again and again.
+        The result is cached, because a control loop reads the same ranges repeatedly.
         """
         found = self.gathers.get((address, length))
         if found is None:
@@ -146,7 +146,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         return found
 
     def window(self, wanted: tuple[int, int, int]) -> "SensedWindow | None":
-        """Return how a servo's part of a fast read is made, None if that is not so simple.
+        """Return the layout of a servo's part of a fast read, None if it is not that simple.
 
         Args:
             wanted: id, address, length.
@@ -177,7 +177,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
             return any(low < end and high > at for low, high in runs for at, end in spans)
 
         slices = [slice(low, high) for low, high in runs]
-        # With a single slice itemgetter would return the bytes themselves.
+        # With a single slice, itemgetter would return the bytes themselves.
         return ResolvedRange(
             tuple((low, high) for low, high in runs),
             itemgetter(*slices, slice(0, 0)),
@@ -187,7 +187,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         )
 
     def real(self, address: int) -> int:
-        """Return the address an indirect data byte stands for, others unchanged."""
+        """Return the address to which an indirect data byte refers, and others unchanged."""
         for low, high, pointers in self._windows:
             if low <= address < high:
                 at = pointers + 2 * (address - low)
@@ -195,7 +195,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         return address
 
     def fields(self, address: int, data: bytes) -> Fields | int:
-        """Split bytes to be written into registers, or the error number."""
+        """Split bytes to write into registers, or return the error number."""
         if address + len(data) > self._window_low and any(
             self.real(a) != a for a in range(address, address + len(data))
         ):
@@ -250,7 +250,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
 
 
 def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[DynamixelRegister]:
-    """Return the registers of the indirect windows; each starts as its own data byte."""
+    """Yield the registers of the indirect windows; each starts as its own data byte."""
     for block in blocks:
         for i in range(block.entries):
             at, data = block.address_base + 2 * i, block.data_base + i
@@ -261,19 +261,19 @@ def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[DynamixelRe
 
 
 def in_eeprom(register: DynamixelRegister) -> bool:
-    """True if a register is kept without power."""
+    """Return whether a register keeps its value without power."""
     return register.address < EEPROM_END
 
 
 class Backup:
-    """The stored copy of a control table; it survives restarts and is empty at first."""
+    """A stored copy of a control table; it survives restarts and is empty at first."""
 
     def __init__(self) -> None:
         self._stored: dict[str, int] = {}
 
     @property
     def ready(self) -> bool:
-        """True if there is something to restore."""
+        """Return whether a copy is stored."""
         return bool(self._stored)
 
     def store(self, memory: DynamixelMemory) -> None:
@@ -282,7 +282,7 @@ class Backup:
         self._stored = {name: memory.get(name) for name in names if name not in NOT_STORED}
 
     def recall(self, memory: DynamixelMemory, eeprom: bool) -> None:
-        """Put one area back, the EEPROM's or the RAM's."""
+        """Restore one area, the EEPROM's or the RAM's."""
         for name, value in self._stored.items():
             if in_eeprom(memory.named(name)) == eeprom:
                 memory.set(name, value)

@@ -1,9 +1,9 @@
-"""Operating modes of an emulated servo: from registers to what its controller does.
+"""Operating modes of an emulated servo: from registers to its controller.
 
-Gains are divided as the ROBOTIS e-Manual says (P 128, D 16, I 65536, feed-forward 4). On
-which units they act is not documented; assumed here: positions in steps, speeds in steps/ms,
-accelerations in steps/ms2, sums per ms, in the velocity mode units of 0.229 rev/min; what
-comes out is in units of PWM (885 are 100 %).
+Gains are divided as the ROBOTIS e-Manual documents (P 128, D 16, I 65536, feed-forward 4). Their
+units are not documented. Assumed here: positions in steps, speeds in steps/ms, accelerations in
+steps/ms2, sums per ms, in the velocity mode units of 0.229 rev/min; the output is in units of PWM
+(885 are 100 %).
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ MODES = (CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM)
 MODES_WITHOUT_CURRENT = (VELOCITY, POSITION, EXTENDED, PWM)
 
 DRIVEN_BY = {CURRENT: "goal_current", VELOCITY: "goal_velocity", PWM: "goal_pwm"}
-"""Goal that turns the shaft in the modes without a position."""
+"""Goal that drives the shaft in modes without a position."""
 
 REVERSE, BY_TIME, TORQUE_ON_BY_GOAL = 1, 4, 8
 """Bits of Drive Mode (10)."""
@@ -30,13 +30,13 @@ PWM_SLOPE_V_MS = 0.001977, 0.003955
 """Unit of PWM Slope (62) of the models for 5 V and for 12 V."""
 
 FAR_BEYOND = 2.0
-"""More than full PWM: the current limit decides."""
+"""Above full PWM, so that the current limit decides."""
 
 Get = Callable[[str], int]
 
 
 def modes_of(model: DynamixelModel) -> tuple[int, ...]:
-    """Return the operating modes a model has."""
+    """Return a model's operating modes."""
     return MODES_WITHOUT_CURRENT if model.current_limit is None else MODES
 
 

@@ -1,4 +1,4 @@
-"""Packets of Dynamixel Protocol 2.0 as servos send them, and as they look for them on the line.
+"""Packets of Dynamixel Protocol 2.0 as servos send them, and constants to find them on the line.
 
 Source: ROBOTIS e-Manual, Protocol 2.0. Fast replies are one packet of blocks that several
 servos send one after another; each block ends with the CRC over all bytes before it.
@@ -16,7 +16,7 @@ RAW, STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
 STATUS = 0x55
 SHORTEST = 10
 LONGEST = 1024
-"""No packet is longer; a larger length is noise."""
+"""Longest packet; a larger length is noise."""
 
 HEAD = struct.Struct("<4sBHB")
 CRC = struct.Struct("<H")
@@ -31,7 +31,7 @@ def status(servo_id: int, error: int, params: bytes) -> bytes:
 
 
 def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
-    """Send answers as blocks of one packet whose length field says ``length``.
+    """Send answers as blocks of one packet whose length field is ``length``.
 
     The first servo sends the head. A missing block ends the packet.
     """
@@ -47,7 +47,7 @@ def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
 
 
 def _block(answer: Answer, crc: int) -> bytes:
-    """Build a servo's part of a fast reply behind bytes whose CRC is ``crc``."""
+    """Build a servo's part of a fast reply after bytes whose CRC is ``crc``."""
     body = bytes((answer[1], answer[0])) + answer[2]
     block = body + CRC.pack(umts(body, crc))
     return block if answer[5] is None else merge(block, _block(answer[5], crc))

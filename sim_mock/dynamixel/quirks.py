@@ -1,4 +1,4 @@
-"""Behaviour of Dynamixel servos where documents and devices are silent or differ.
+"""Behaviour of Dynamixel servos that is undocumented or differs between documents and devices.
 
 Sources: ROBOTIS e-Manual, Protocol 2.0; the device side of ROBOTIS' Dynamixel2Arduino
 (silent on a wrong CRC).
@@ -15,10 +15,10 @@ Stuffing = Literal["accept", "strict"]
 
 @dataclass(frozen=True, kw_only=True)
 class DynamixelQuirks(ChainQuirks):
-    """The choices.
+    """Choices of behaviour.
 
-    bad_crc: a wrong CRC is met with silence or with error number 3
-    stuffing: an instruction with FF FF FD among its parameters that was not stuffed is
+    bad_crc: reply to a wrong CRC: silence, or error number 3
+    stuffing: an instruction with FF FF FD among its parameters that lacks byte stuffing is
         understood by its length, or dropped
     """
 

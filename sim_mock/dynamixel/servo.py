@@ -1,9 +1,8 @@
-"""One emulated Dynamixel X servo: what may be written when, errors, watchdog, restarts.
+"""One emulated Dynamixel X servo: permitted writes, errors, watchdog, restarts.
 
 The control table is in gazerig.sim_mock.dynamixel.memory, modes, profiles and gains in its
-neighbours.
-What it does not do: play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols of
-register 13.
+neighbours. Not emulated: play inside the gear, a blinking LED, the RC, S.Bus and iBus protocols
+of register 13.
 """
 
 import struct
@@ -54,7 +53,7 @@ STARTS_WITH_TORQUE, RESTORES_RAM = 1, 2
 """Bits of Startup Configuration (60)."""
 
 KEPT_BY_RESET: dict[int, tuple[str, ...]] = {0xFF: (), 1: ("id",), 2: ("id", "baud_rate")}
-"""What each option of Factory Reset leaves alone."""
+"""Registers that each option of Factory Reset keeps."""
 
 _IDENTITY = struct.Struct("<HB")
 
@@ -90,7 +89,7 @@ class DynamixelServo(EmulatedServo):
         super().__init__(spec, now_ms)
 
     def _load_limits(self) -> tuple[float, ...]:
-        """Return overload share and time from the physics: no register holds them."""
+        """Return overload share and time from the physics, because no register holds them."""
         return self._physics.overload_share, self._physics.overload_s
 
     def identity(self) -> bytes:
@@ -98,7 +97,7 @@ class DynamixelServo(EmulatedServo):
         return _IDENTITY.pack(self.model.number, self.firmware)
 
     def _boot(self) -> None:
-        """Reset to power-on, with torque if Startup Configuration asks for it."""
+        """Reset to power-on, with torque if Startup Configuration requires it."""
         self._around: tuple[int, int] | None = None
         super()._boot()
         self.memory.set("backup_ready", self._backup.ready)
@@ -132,11 +131,11 @@ class DynamixelServo(EmulatedServo):
 
     @property
     def joint_steps(self) -> float:
-        """Return the position of the joint behind the play, in the registers' terms."""
+        """Return the position of the joint behind the play, in the registers' unit."""
         return self.drive.joint_steps
 
     def read(self, address: int, length: int) -> bytes | None:
-        """Return bytes of the control table, None where an address is not defined."""
+        """Return bytes of the control table, None if an address is not defined."""
         memory = self.memory
         gather = memory.gathers.get((address, length)) or memory.gather(address, length)
         if gather is None:
@@ -154,7 +153,7 @@ class DynamixelServo(EmulatedServo):
         return b"".join(fetch(into))
 
     def window(self, wanted: tuple[int, int, int]) -> SensedWindow | None:
-        """Return how its part of a fast read is packed, None where ``read`` has to do it.
+        """Return the layout of its part of a fast read, None if ``read`` must do it.
 
         Args:
             wanted: id, address, length.
@@ -180,7 +179,7 @@ class DynamixelServo(EmulatedServo):
     # --- writing
 
     def write(self, address: int, data: bytes) -> int:
-        """Write bytes as an instruction does; return the error number, 0 when done."""
+        """Write bytes as an instruction does; return the error number, 0 on success."""
         if address == GOAL_AT and len(data) == GOAL_END - GOAL_AT and self.drive.follows:
             return self._take_goal(data)
         fields = self._rules.permitted(address, data)
@@ -192,7 +191,7 @@ class DynamixelServo(EmulatedServo):
         return 0
 
     def _take_goal(self, data: bytes) -> int:
-        """Write a goal position under torque without the general path: this happens every tick."""
+        """Write a goal position under torque by a shortcut, because it happens every tick."""
         value = int.from_bytes(data, "little", signed=True)
         low, high = self._rules.goal_range
         if not low <= value <= high or self.memory.bytes[WATCHDOG_AT] == TRIPPED:
@@ -240,7 +239,7 @@ class DynamixelServo(EmulatedServo):
     # --- instructions
 
     def register(self, address: int, data: bytes) -> int:
-        """Keep a write for Action if it is permitted now; return the error number."""
+        """Store a write for Action if it is permitted now; return the error number."""
         fields = self._rules.permitted(address, data)
         return fields if isinstance(fields, int) else super().register(address, data)
 
@@ -260,7 +259,7 @@ class DynamixelServo(EmulatedServo):
         return self.factory_reset(0xFF)
 
     def clear_turns(self) -> int:
-        """Bring a multi-turn position back into one turn; refused while moving."""
+        """Wrap a multi-turn position into one turn; refused while moving."""
         return 0 if self.drive.clear_turns() else RESULT_FAIL
 
     def backup(self) -> int:
@@ -274,7 +273,7 @@ class DynamixelServo(EmulatedServo):
         return 0
 
     def restore(self) -> int:
-        """Put the stored control table back and restart; return the error number."""
+        """Restore the stored control table and restart; return the error number."""
         if not self._new:
             return INSTRUCTION_ERROR
         if self.torque or not self._backup.ready:
@@ -288,7 +287,7 @@ class DynamixelServo(EmulatedServo):
     # --- errors
 
     def _latch(self, bits: int) -> None:
-        """Set bits of Hardware Error Status; those of Shutdown take the torque."""
+        """Set bits of Hardware Error Status; those of Shutdown switch the torque off."""
         self.errors |= bits
         self.memory.set("hardware_error_status", self.errors)
         if self.errors & self.memory.get("shutdown"):
@@ -297,5 +296,5 @@ class DynamixelServo(EmulatedServo):
 
     @property
     def error_flag(self) -> int:
-        """Return the alert bit as it stands on every status."""
+        """Return the alert bit of every status."""
         return ALERT if self.errors else 0

@@ -1,4 +1,4 @@
-"""Which writes an emulated servo permits now: EEPROM lock, modes, limits, tripped watchdog."""
+"""Writes that an emulated servo permits: EEPROM lock, modes, limits, tripped watchdog."""
 
 from gazerig.drivers.dynamixel.control_table import EEPROM_END, DynamixelModel, DynamixelRegister
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
@@ -17,9 +17,9 @@ WATCHDOG_AT = 98
 
 
 class WriteRules:
-    """Decides which writes are permitted, by table and state; changes nothing.
+    """Decides which writes are permitted, from table and state; changes nothing.
 
-    goal_range: positions that a goal may have now
+    goal_range: permitted goal positions
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class WriteRules:
             self.goal_range = get("min_position_limit"), get("max_position_limit")
 
     def permitted(self, address: int, data: bytes) -> Fields | int:
-        """Return the registers that bytes would be written to, or the error number."""
+        """Return the registers of a write, or the error number."""
         fields = self._memory.fields(address, data)
         if isinstance(fields, int):
             return fields
@@ -49,7 +49,7 @@ class WriteRules:
         return fields
 
     def goal_error(self, goal: int) -> int:
-        """Return the error number for a goal position, 0 where it may be written."""
+        """Return the error number for a goal position, 0 if it may be written."""
         if self._memory.bytes[WATCHDOG_AT] == TRIPPED:
             return DATA_RANGE
         low, high = self.goal_range

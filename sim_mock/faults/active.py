@@ -1,6 +1,6 @@
 """Effects of faults on the bytes between servos and host. Values in, values out.
 
-A ``Fault`` lasts for a number of answers, for a time, or until it is cleared.
+A ``LineFault`` lasts for a number of answers, for a time, or until it is cleared.
 """
 
 from collections.abc import Sequence
@@ -15,16 +15,16 @@ NO_DEVICE = -1
 
 BABBLE_BYTES_S = 20_000
 BABBLE_MOST = 2000
-"""Most bytes of a babbling node at once, however long ago the last call was."""
+"""Most bytes of a babbling node per call, however long ago the last call was."""
 
 
 @dataclass
 class LineFault:
-    """One fault in force.
+    """One active fault.
 
-    servo_id: whose answers; None for those of all servos
-    numbers, data: what the kind needs (milliseconds, byte counts, ids; noise bytes)
-    left: for so many answers, until_s: until then; None for no such end
+    servo_id: the servo whose answers it affects; None: all servos
+    numbers, data: parameters of the kind (milliseconds, byte counts, ids; noise bytes)
+    left: remaining answers, until_s: end time; None: no such end
     """
 
     kind: str
@@ -35,15 +35,15 @@ class LineFault:
     until_s: float | None = None
 
     def lasts(self, now_s: float) -> bool:
-        """True if it is not over."""
+        """Return whether it is not over."""
         return self.left != 0 and (self.until_s is None or now_s < self.until_s)
 
 
 class ActiveFaults:
-    """The faults in force, and what they do to answers and bytes.
+    """The active faults, and their effects on answers and bytes.
 
-    ``any`` is False while no fault is in force, which saves further calls.
-    header: what packets on this line begin with
+    ``any`` is False while no fault is active, which saves further calls.
+    header: first bytes of packets on this line
     """
 
     def __init__(self, seed: int, header: bytes) -> None:
@@ -54,12 +54,12 @@ class ActiveFaults:
         self.any = False
 
     def add(self, fault: LineFault) -> None:
-        """Let a fault begin."""
+        """Start a fault."""
         self._faults.append(fault)
         self.any = True
 
     def remove(self, kind: str | None = None, servo_id: int | None = None) -> int:
-        """End faults of a kind (None: all kinds) and servo (None: all); return how many."""
+        """End faults of a kind (None: all kinds) and servo (None: all); return their number."""
         before = len(self._faults)
         self._faults = [
             fault
@@ -71,16 +71,16 @@ class ActiveFaults:
         return before - len(self._faults)
 
     def listed(self, now_s: float) -> tuple[LineFault, ...]:
-        """Return the faults in force, oldest first."""
+        """Return the active faults, oldest first."""
         self._forget(now_s)
         return tuple(self._faults)
 
     def on(self, kind: str, now_s: float) -> bool:
-        """True if a fault of this kind is in force."""
+        """Return whether a fault of this kind is active."""
         return self.any and any(f.kind == kind and f.lasts(now_s) for f in self._faults)
 
     def take(self, kind: str, servo_id: int | None, now_s: float) -> LineFault | None:
-        """Find a fault that hits this servo now and count it as used once."""
+        """Find a fault that affects this servo now and count one use of it."""
         if not self.any:
             return None
         for fault in self._faults:
@@ -100,17 +100,17 @@ class ActiveFaults:
     # --- electrical noise, in both directions
 
     def roughened(self, data: bytes, now_s: float) -> bytes:
-        """Return bytes after a noisy line: some changed, lost or added.
+        """Return bytes after a noisy line: some changed, lost or inserted.
 
-        The fault's number is how many of a hundred bytes are hit; of four that are hit two are
-        changed, one is lost, and one has another put before it.
+        The fault's number is the percentage of bytes that are hit. Of four such bytes two are
+        changed, one is lost, and one gets another byte inserted before it.
         """
         noise = next((f for f in self._faults if f.kind == "static" and f.lasts(now_s)), None)
         if noise is None:
             return data
         rng, out, share, at = self._rng, bytearray(), noise.numbers[0] / 100.0, 0
         while True:
-            # The distance to the next byte hit, instead of a draw for each byte.
+            # One draw for the distance to the next byte hit, instead of a draw for each byte.
             ahead = int(log(1.0 - rng.random()) / log(1.0 - share)) if share < 1.0 else 0
             out += data[at : at + ahead]
             at += ahead
@@ -123,10 +123,10 @@ class ActiveFaults:
                 out += bytes((rng.randrange(256), data[at]))
             at += 1
 
-    # --- what the servos say
+    # --- answers before their checksums
 
     def spoil_answers(self, answers: Sequence[Answer], fast: bool, now_s: float) -> list[Answer]:
-        """Change answers before their checksums are made: ids, errors, lengths and order."""
+        """Change answers before their checksums are computed: ids, errors, lengths and order."""
         said = [self._misspoken(answer, fast, now_s) for answer in answers]
         if len(said) > 1 and self.take("reorder", None, now_s):
             said.reverse()
@@ -137,7 +137,7 @@ class ActiveFaults:
         refused = self.take("refuse", servo_id, now_s)
         if refused is not None:
             error = answer.error | int(refused.numbers[0])
-            # A block of a fast reply keeps its place: it is filled with zeros.
+            # A block of a fast reply keeps its position: it is filled with zeros.
             answer = answer._replace(error=error, params=bytes(len(params)) if fast else b"")
         short = self.take("short", servo_id, now_s)
         if short is not None:
@@ -148,10 +148,10 @@ class ActiveFaults:
         other = self.take("wrong_id", servo_id, now_s)
         return answer if other is None else answer._replace(servo_id=int(other.numbers[0]))
 
-    # --- what arrives
+    # --- received bytes
 
     def spoil_pieces(self, pieces: Sequence[Piece], fast: bool, now_s: float) -> list[Piece]:
-        """Change what arrives; ``fast``: the pieces are blocks of one packet."""
+        """Change received pieces; ``fast``: the pieces are blocks of one packet."""
         out: list[Piece] = []
         repeat = False
         for piece in pieces:
@@ -184,7 +184,7 @@ class ActiveFaults:
         return piece._replace(data=bytes(data)), cut is not None
 
     def _late(self, piece: Piece, now_s: float) -> list[Piece]:
-        """Return a piece later than it should be, or in two halves with a gap."""
+        """Return a piece after a delay, or in two halves with a gap."""
         late = self.take("delay", piece.servo_id, now_s)
         if late is not None:
             piece = piece._replace(late_s=piece.late_s + late.numbers[0] / 1000.0)
@@ -196,7 +196,7 @@ class ActiveFaults:
         return [piece._replace(data=piece.data[:half]), rest]
 
     def _amid_noise(self, out: list[Piece], pieces: Sequence[Piece], now_s: float) -> list[Piece]:
-        """Put noise, pieces of headers and a babbling node around what arrives."""
+        """Put noise, pieces of headers and a babbling node around received pieces."""
         if not pieces:
             return out
         if self.take("fragment", pieces[0].servo_id, now_s):
@@ -213,7 +213,7 @@ class ActiveFaults:
         return self._rng.randbytes(8) if fault.data is None else fault.data
 
     def babble(self, now_s: float) -> bytes:
-        """Return what a babbling node has sent since the last call: headers and noise."""
+        """Return the bytes of a babbling node since the last call: headers and noise."""
         if not self.on("babble", now_s):
             self._babbled_s = now_s
             return b""

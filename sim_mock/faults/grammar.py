@@ -1,7 +1,7 @@
 """Fault commands as lines of text: ``lose 3 count 2``, ``unplug for 0.5``, ``help``.
 
-The grammar of every emulated device: a table of verbs, each of which takes words of named
-kinds and calls the method of the device's faults that does it.
+The grammar of every emulated device is a table of verbs. Each verb parses its arguments and calls
+a method of the device's faults.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +13,7 @@ TIME = ("for",)
 
 
 class Argument(NamedTuple):
-    """One word of a command: how it is shown, and how it is understood."""
+    """One word of a command: its name in the help, and its parser."""
 
     shown: str
     read: Callable[[str], Any]
@@ -32,8 +32,8 @@ class Verb(NamedTuple):
 class CommandTable(NamedTuple):
     """All fault commands of one kind of device.
 
-    cases: what ``set`` can choose, and the values as they are typed
-    ids: what the word ID stands for, e.g. "a servo's id"
+    cases: the cases of ``set``, and their values as they are typed
+    ids: meaning of the word ID, e.g. "a servo's id"
     """
 
     verbs: Mapping[str, Verb]
@@ -41,10 +41,10 @@ class CommandTable(NamedTuple):
     ids: str
 
     def obey(self, faults: object, text: str) -> str:
-        """Carry out one line; return what was done.
+        """Run one command; return a description of the effect.
 
         Raises:
-            ValueError: names the word that is wrong and what would be right.
+            ValueError: the command is invalid; the message names the wrong word and valid ones.
         """
         arguments = text.split()
         if not arguments or arguments[0] == "help":
@@ -53,7 +53,7 @@ class CommandTable(NamedTuple):
         verb = self.verbs.get(name)
         if verb is None:
             raise ValueError(
-                f"{arguments[0]!r} is no command; there is {', '.join(self.verbs)}, help"
+                f"{arguments[0]!r} is not a command; commands: {', '.join(self.verbs)}, help"
             )
         try:
             rest, lasting = _lasting(verb, rest)
@@ -62,14 +62,14 @@ class CommandTable(NamedTuple):
             raise ValueError(f"{name}: {error.args[0]}; usage: {self.usage(name)}") from None
 
     def usage(self, name: str) -> str:
-        """Show how a command is typed."""
+        """Return the syntax of a command."""
         verb = self.verbs[name]
         shown = [f"[{w.shown}]" if w.optional else w.shown for w in verb.arguments]
         ends = {"count": "[count N]", "for": "[for SECONDS]"}
         return " ".join([name, *shown, *(ends[word] for word in verb.lasting)])
 
     def help(self, name: str | None = None) -> str:
-        """Explain one command or all of them, one a line."""
+        """Describe one command or all of them, one per line."""
         if name is not None and name in self.verbs:
             return f"{self.usage(name)}: {self.verbs[name].description}"
         lines = [f"{self.usage(verb):46} {self.verbs[verb].description}" for verb in self.verbs]
@@ -86,7 +86,7 @@ def _lasting(verb: Verb, arguments: Sequence[str]) -> tuple[list[str], dict[str,
     while len(left) >= 2 and left[-2] in BOTH:
         value, word = left.pop(), left.pop()
         if word not in verb.lasting:
-            raise ValueError(f"{word!r} has no meaning here")
+            raise ValueError(f"{word!r} is not expected here")
         if word == "count":
             found["count"] = count(value)
         else:
@@ -99,7 +99,7 @@ def _arguments(verb: Verb, arguments: Sequence[str]) -> list[Any]:
     if len(arguments) < len(needed):
         raise ValueError(f"{needed[len(arguments)].shown} is missing")
     if len(arguments) > len(verb.arguments):
-        raise ValueError(f"{arguments[len(verb.arguments)]!r} is too much")
+        raise ValueError(f"{arguments[len(verb.arguments)]!r} is one argument too many")
     return [word.read(text) for word, text in zip(verb.arguments, arguments, strict=False)]
 
 
@@ -107,7 +107,7 @@ def _arguments(verb: Verb, arguments: Sequence[str]) -> list[Any]:
 
 
 def number(low: float, high: float, what: str) -> Callable[[str], float]:
-    """Make a reader of numbers; ``what`` and the range are in the error of a word that is none."""
+    """Return a parser of numbers; ``what`` and the range are part of its error message."""
 
     def read(text: str) -> float:
         try:
@@ -122,7 +122,7 @@ def number(low: float, high: float, what: str) -> Callable[[str], float]:
 
 
 def whole(low: int, high: int, what: str) -> Callable[[str], int]:
-    """Make a reader of whole numbers, also as 0x1F."""
+    """Return a parser of integers, also written as 0x1F."""
 
     def read(text: str) -> int:
         try:
@@ -137,12 +137,12 @@ def whole(low: int, high: int, what: str) -> Callable[[str], int]:
 
 
 def or_all(read: Callable[[str], int]) -> Callable[[str], int | None]:
-    """Make a reader of ids that also takes ``all``, which is None."""
+    """Return a parser of ids that also accepts ``all``, which is None."""
     return lambda text: None if text in ALL_DEVICES else read(text)
 
 
 def one_of(*values: str) -> Callable[[str], str]:
-    """Make a reader of words from a short list."""
+    """Return a parser of words from a short list."""
 
     def read(text: str) -> str:
         if text not in values:
@@ -158,12 +158,12 @@ def _none_of(values: Sequence[str]) -> str:
 
 
 def on_off(text: str) -> bool:
-    """Read on or off."""
+    """Parse on or off."""
     return one_of("on", "off")(text) == "on"
 
 
 def hex_bytes(text: str) -> bytes | None:
-    """Read bytes as FFFF00; None for random ones."""
+    """Parse bytes written as FFFF00; None for random ones."""
     if text == "random":
         return None
     try:

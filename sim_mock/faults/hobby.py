@@ -1,4 +1,4 @@
-"""Faults of the hobby servos behind an emulated board of any kind."""
+"""Faults of the hobby servos on any kind of emulated board."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -20,7 +20,7 @@ from gazerig.sim_mock.hobby_servo import HobbyServo
 class HobbyBody(Protocol):
     """A board's body: its servos, their supply, and time.
 
-    servo_power: the servos have their supply
+    servo_power: whether the servos have their supply
     """
 
     servo_power: bool
@@ -31,12 +31,12 @@ class HobbyBody(Protocol):
         ...
 
     def advance(self) -> None:
-        """Let time pass up to now."""
+        """Advance to the present time."""
         ...
 
 
 class HobbyBoard(FaultTarget, Protocol):
-    """A board with hobby servos behind it."""
+    """A board with hobby servos."""
 
     @property
     def body(self) -> HobbyBody:
@@ -44,20 +44,20 @@ class HobbyBoard(FaultTarget, Protocol):
         ...
 
     def here(self, servo_id: int, /) -> HobbyServo:
-        """Return the servo of a channel, brought up to now."""
+        """Return the servo of a channel, advanced to the present time."""
         ...
 
     def restart(self) -> None:
-        """Restart as a dip of the supply makes it."""
+        """Restart as after a dip of the supply."""
         ...
 
     def channel_report(self, channel: int) -> dict[str, object]:
-        """Return what a channel sends."""
+        """Return the status of a channel's output."""
         ...
 
 
 class HobbyFaults(LineFaults):
-    """The faults of a line, a board and its servos; an id is a channel. Args: as LineFaults."""
+    """Faults of a line, a board and its servos; an id is a channel. Args: as LineFaults."""
 
     noun = "channel"
 
@@ -66,18 +66,18 @@ class HobbyFaults(LineFaults):
         self._hobby = board
 
     def brown_out(self) -> str:
-        """Let the board restart as after a dip of the supply, which no answer shows."""
+        """Restart the board as after a dip of the supply, which no answer shows."""
         self._hobby.restart()
         return "the board restarts"
 
     def power(self, on: bool = True) -> str:
-        """Switch the servos' supply on or off; the board does not notice."""
+        """Switch the servos' supply on or off, which the board does not detect."""
         self._hobby.body.advance()
         self._hobby.body.servo_power = on
         return f"the servos have {'their' if on else 'no'} supply"
 
     def stick(self, channel: int | None) -> str:
-        """Jam a servo where it is."""
+        """Jam a servo at its position."""
         for servo in self._servos(channel):
             servo.stuck = True
         return f"{self.label(channel)} is stuck"
@@ -99,14 +99,14 @@ class HobbyFaults(LineFaults):
         return f"{self.label(channel)} was turned by {steps:g} quarter us"
 
     def _servos(self, channel: int | None) -> Sequence[HobbyServo]:
-        """Return a servo, or all (None), brought up to now."""
+        """Return a servo, or all (None), advanced to the present time."""
         if channel is not None:
             return [self._hobby.here(channel)]
         self._hobby.body.advance()
         return self._hobby.body.servos
 
     def reports(self) -> list[dict[str, object]]:
-        """Return what every channel sends and where its servo truly is."""
+        """Return every channel's output and true servo position."""
         self._hobby.body.advance()
         return [
             {
@@ -120,7 +120,7 @@ class HobbyFaults(LineFaults):
 
 
 def channel_word(highest: int) -> Argument:
-    """Return the word that names a channel."""
+    """Return the argument that names a channel."""
     return Argument("ID", whole(0, highest, "a channel"))
 
 
@@ -129,8 +129,8 @@ def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str
     """Return the fault commands of a board of hobby servos.
 
     Args:
-        one: reads a channel.
-        writes: what is sent to it without an answer, for "lose-writes".
+        one: parses a channel.
+        writes: name of data sent without an answer, for "lose-writes".
         own: further commands of this make of board.
     """
     label = Argument(one.shown, or_all(one.read))
@@ -143,11 +143,11 @@ def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str
         "brown-out": Verb(HobbyFaults.brown_out, (),
                           "the board restarts as a dip of its supply makes it"),
         "power": Verb(HobbyFaults.power, (SWITCH,),
-                      "supply of the servos; the board notices nothing"),
-        "stick": Verb(HobbyFaults.stick, (label,), "jam the servo where it is"),
-        "free": Verb(HobbyFaults.free, (label,), "let a jammed servo go"),
+                      "supply of the servos; the board does not detect it"),
+        "stick": Verb(HobbyFaults.stick, (label,), "jam the servo at its position"),
+        "free": Verb(HobbyFaults.free, (label,), "free a jammed servo"),
         "turn": Verb(HobbyFaults.turn, (label, Argument("STEPS", number(-1e5, 1e5, "quarter us"))),
-                     "turn the servo by hand; with pulses it goes back"),
+                     "turn the servo by hand; with pulses it returns"),
         **closing_verbs(one),
     }
 # fmt: on

@@ -1,8 +1,8 @@
-"""Faults of an emulated line with any device at its other end.
+"""Faults of an emulated line with any device at its end.
 
-A command is a line of text (gazerig.sim_mock.faults.verbs). A fault of answers lasts
-for ``count`` of them, for ``seconds`` of the device's time, or until ``clear``; the id None stands
-for every servo.
+A command is a line of text (gazerig.sim_mock.faults.verbs). A fault of answers lasts for
+``count`` of them, for ``seconds`` of the device's time, or until ``clear``; the id None means
+every servo.
 """
 
 import json
@@ -17,35 +17,35 @@ from gazerig.sim_mock.replies import Piece
 
 
 class FaultTarget(Protocol):
-    """The interface of a device to its faults."""
+    """Interface of a device to its faults."""
 
     now_s: Callable[[], float]
 
     def here(self, servo_id: int) -> object:
-        """Return what has this id, brought up to now.
+        """Return the servo or channel with this id, advanced to the present time.
 
         Raises:
-            KeyError: nothing has it; the message lists those that there are.
+            KeyError: the id does not exist; the message lists the existing ones.
         """
         ...
 
     def choose(self, case: str, value: str) -> None:
-        """Choose what the device does where documents and devices differ."""
+        """Choose the device's behaviour where documents and devices differ."""
         ...
 
 
 class LineFaults(ABC):
-    """The faults of a line and the device behind it; a device adds its own.
+    """Faults of a line and the device at its end; a device adds its own.
 
     Args:
         chain: the device.
-        commands: what can be asked for as text.
+        commands: its fault commands.
         seed: of the random numbers that faults draw.
-        header: what its packets begin with: ``fragment`` and ``babble`` send it.
+        header: first bytes of its packets; ``fragment`` and ``babble`` send them.
     """
 
     noun = "servo"
-    """What an id belongs to, for messages."""
+    """Name of the object of an id, for messages."""
 
     def __init__(
         self, chain: FaultTarget, commands: CommandTable, seed: int, header: bytes
@@ -59,14 +59,14 @@ class LineFaults(ABC):
         """Return the state of every servo, for ``status``."""
 
     def board(self) -> dict[str, object]:
-        """Return further entries of ``status`` of devices that are more than servos."""
+        """Return further entries of ``status``, for devices that are more than servos."""
         return {}
 
     def command(self, text: str) -> str:
-        """Carry out a line such as ``lose 3 count 2``; return what was done.
+        """Run a command such as ``lose 3 count 2``; return a description of the effect.
 
         Raises:
-            ValueError: names the word that is wrong and what would be right.
+            ValueError: the command is invalid; the message names the wrong word and valid ones.
         """
         return self.commands.obey(self, text)
 
@@ -84,19 +84,19 @@ class LineFaults(ABC):
         numbers: tuple[float, ...] = (),
         data: bytes | None = None,
     ) -> str:
-        """Start a fault; return what was done.
+        """Start a fault; return a description of the effect.
 
         Args:
-            kind: its name among the faults in force.
-            servo_id: whose answers; None for those of all servos.
-            text: what is done, for the reply.
-            count: for so many answers.
-            seconds: for so long.
-            numbers: what the kind needs.
-            data: what the kind needs, too.
+            kind: its name among the active faults.
+            servo_id: the servo whose answers it affects; None: all servos.
+            text: the description, for the reply.
+            count: number of answers.
+            seconds: duration.
+            numbers: parameters of the kind.
+            data: bytes of the kind, such as noise.
 
         Raises:
-            KeyError: there is no such servo.
+            KeyError: the servo does not exist.
         """
         if servo_id is not None:
             self._chain.here(servo_id)
@@ -107,7 +107,7 @@ class LineFaults(ABC):
         return text + (span or " until cleared")
 
     def switch(self, kind: str, on: bool, text: str, seconds: float | None = None) -> str:
-        """Start or end a fault of the whole line; return what was done."""
+        """Start or end a fault of the whole line; return a description of the effect."""
         self.wire.remove(kind)
         if on:
             return self.begin(kind, None, text, None, seconds)
@@ -116,24 +116,24 @@ class LineFaults(ABC):
     # --- all
 
     def on(self, kind: str) -> bool:
-        """True if echo, babble, unplug, deny or block is on now."""
+        """Return whether echo, babble, unplug, deny or block is active."""
         return self.wire.on(kind, self._chain.now_s())
 
     def choose(self, case: str, value: str) -> str:
-        """Choose what servos do where documents and devices differ.
+        """Choose the servos' behaviour where documents and devices differ.
 
         Raises:
-            ValueError: there is no such case or value.
+            ValueError: the case or value is unknown.
         """
         self._chain.choose(case, value)
         return f"{case} is {value}"
 
     def clear(self, servo_id: int | None = None) -> str:
-        """End every fault of the line (of one servo's answers); faults of servos stay."""
+        """End every fault of the line (or of one servo's answers); faults of servos stay."""
         return f"{self.wire.remove(None, servo_id)} faults cleared"
 
     def status(self) -> str:
-        """Return all servos and the faults in force as one line of JSON."""
+        """Return all servos and the active faults as one line of JSON."""
         faults = [
             f"{fault.kind} {'all' if fault.servo_id is None else fault.servo_id}"
             for fault in self.wire.listed(self._chain.now_s())

@@ -58,7 +58,7 @@ def everything(kind: str, text: str) -> Do:
 
 
 def times(kind: str, text: str) -> Do:
-    """Return a command that hits the next so many, or all."""
+    """Return a command that affects the next N, or all."""
 
     def do(faults: LineFaults, count: int | None = None, seconds: float | None = None) -> str:
         return faults.begin(kind, None, text, count, seconds)
@@ -93,41 +93,41 @@ def _plug(faults: LineFaults) -> str:
 
 # fmt: off
 def line_verbs(one: Argument) -> dict[str, Verb]:
-    """Return the commands of any line; ``one`` reads an id."""
+    """Return the commands of any line; ``one`` parses an id."""
     target = Argument(one.shown, or_all(one.read))
     return {
         "lose": Verb(answers("lose", "{label} does not answer"), (target,),
-                     "stay silent though it obeys", BOTH),
+                     "stay silent but obey", BOTH),
         "delay": Verb(answers("delay", "{label} answers {:g} ms late"), (target, MS),
-                      "answer late; in a group those behind wait as well", BOTH),
-        "truncate": Verb(answers("truncate", "only {} bytes arrive of what {label} answers"),
+                      "answer late; in a group the following servos wait, too", BOTH),
+        "truncate": Verb(answers("truncate", "only {} bytes of answers of {label} arrive"),
                          (target, _BYTES), "only the first BYTES of an answer arrive", BOTH),
-        "duplicate": Verb(answers("duplicate", "what {label} answers arrives twice"), (target,),
+        "duplicate": Verb(answers("duplicate", "answers of {label} arrive twice"), (target,),
                           "answers arrive twice", BOTH),
-        "corrupt": Verb(answers("corrupt", "a bit flips in what {label} answers"),
+        "corrupt": Verb(answers("corrupt", "a bit flips in answers of {label}"),
                         (target, Argument("BIT", whole(0, 8191, "a bit"), True)),
-                        "a bit flips, at random where none is named", BOTH),
-        "drop": Verb(answers("drop", "byte {} is lost of what {label} answers"),
+                        "a bit flips, a random one by default", BOTH),
+        "drop": Verb(answers("drop", "byte {} is lost in answers of {label}"),
                      (target, Argument("BYTE", whole(-1024, 1023, "a byte"))),
                      "byte BYTE of an answer is lost; -1 the last", BOTH),
         "stall": Verb(answers("stall", "{label} stops for {:g} ms half-way through its answer"),
                       (target, MS), "stop half-way through an answer", BOTH),
         "noise": Verb(_noise, (Argument("before|after", one_of("before", "after")),
                                Argument("HEX|random", hex_bytes, True)),
-                      "bytes around whatever is answered", BOTH),
-        "static": Verb(everything("static", "noise hits {:g} % of all bytes, to and fro"),
+                      "bytes around every answer", BOTH),
+        "static": Verb(everything("static", "noise hits {:g} % of all bytes, both directions"),
                        (Argument("PERCENT", number(0.0, 100.0, "a percentage")),),
-                       "so much of all bytes is hit by noise, to and fro", TIME),
-        "repeat": Verb(everything("repeat", "the answers of before arrive again before the next"),
-                       (), "the last answers come again first", BOTH),
+                       "noise hits this share of all bytes, both directions", TIME),
+        "repeat": Verb(everything("repeat", "the previous answers arrive again before the next"),
+                       (), "the last answers arrive again first", BOTH),
     }
 
 
 def packet_verbs(one: Argument) -> dict[str, Verb]:
-    """Return the commands of lines with many servos; ``one`` reads an id."""
+    """Return the commands of lines with many servos; ``one`` parses an id."""
     target = Argument(one.shown, or_all(one.read))
     return {
-        "fragment": Verb(answers("fragment", "a loose header before what {label} answers"),
+        "fragment": Verb(answers("fragment", "a loose header before answers of {label}"),
                          (target._replace(optional=True),),
                          "a loose header before the real one", BOTH),
         "reorder": Verb(everything("reorder", "groups answer in reverse order"), (),
@@ -146,7 +146,7 @@ def packet_verbs(one: Argument) -> dict[str, Verb]:
 
 
 def lost(kind: str, what: str) -> Verb:
-    """Return the command that loses data on its way to the device, which no answer shows."""
+    """Return the command that loses data to the device, which no answer shows."""
     return Verb(times(kind, f"{what} are lost"), (_TIMES,), f"the next N {what} are lost", TIME)
 
 
@@ -158,11 +158,11 @@ def adapter_verbs() -> dict[str, Verb]:
         "babble": Verb(switched("babble", "a broken node babbles"), (SWITCH,),
                        "a broken node sends headers and noise all the time", TIME),
         "unplug": Verb(switched("unplug", "unplugged"), (), "pull the adapter out", TIME),
-        "plug": Verb(_plug, (), "put the adapter back under its name"),
+        "plug": Verb(_plug, (), "reconnect the adapter under its name"),
         "deny": Verb(switched("deny", "opening is forbidden"), (SWITCH,),
                      "opening the port is forbidden", TIME),
-        "block": Verb(switched("block", "the adapter takes no bytes"), (SWITCH,),
-                      "the adapter takes no bytes", TIME),
+        "block": Verb(switched("block", "the adapter accepts no bytes"), (SWITCH,),
+                      "the adapter accepts no bytes", TIME),
     }
 
 
@@ -173,6 +173,6 @@ def closing_verbs(one: Argument) -> dict[str, Verb]:
                     "choose where documents and devices differ: see below"),
         "status": Verb(LineFaults.status, (), "all servos and faults as JSON"),
         "clear": Verb(LineFaults.clear, (one._replace(optional=True),),
-                      "end faults of answers and line; what servos suffered stays"),
+                      "end faults of answers and line; effects on servos stay"),
     }
 # fmt: on

@@ -1,4 +1,4 @@
-"""The device side of a bus of Feetech servos: bytes in, bytes out, nothing opened.
+"""Device side of a bus of Feetech servos: bytes in, bytes out, nothing opened.
 
 Source: Feetech, communication protocol of the STS/SMS series.
 """
@@ -29,7 +29,7 @@ class FeetechChain(ServoChain[FeetechServo, FeetechQuirks]):
             servo.apply_quirks(quirks)
 
     def _ping_all(self) -> list[Answer]:
-        """Return the answers to a ping to all, by the quirks: in order, mixed, or none."""
+        """Return the answers to a broadcast ping, by the quirks: in order, mixed, or none."""
         policy = self.quirks.broadcast_ping
         answers = [] if policy == "silence" else super()._ping_all()
         if policy == "answer" or not answers:

@@ -1,11 +1,11 @@
 """Modes, goals and origin of an emulated Feetech servo, between its registers and its shaft.
 
-The registers' position is ``shaft.x + shift``;
-where turns are not counted it is within one turn. Shaft and motor are those of
-gazerig.sim_mock.smart_servo.motor. What is not documented of the controller is assumed, so that a
-servo with factory gains needs all its duty at 50 steps of error and does not overshoot:
-owners measure 20-30 steps at half the stall torque. Left out: the starting force (24) and the
-dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as it does in fact.
+The registers' position is ``shaft.x + shift``, within one turn unless turns are counted. Shaft
+and motor are those of gazerig.sim_mock.smart_servo.motor. Undocumented properties of the
+controller are assumed such that a servo with factory gains reaches full duty at 50 steps of error
+and does not overshoot: owners measure 20-30 steps at half the stall torque. Omitted: the starting
+force (24) and the dead zones (26, 27); without them friction keeps it up to 2 steps from its
+goal, as on a real servo.
 """
 
 import struct
@@ -36,7 +36,7 @@ COARSE_STEPS_S = 50
 
 GOALS_AT = 41
 GOALS = {"little": struct.Struct("<BHHH"), "big": struct.Struct(">BHHH")}
-"""Acceleration, goal position, goal time, goal speed: written together ever again."""
+"""Acceleration, goal position, goal time, goal speed: written together in every tick."""
 
 SIGN = 1 << 15
 """Bit of the sign of most words."""
@@ -47,7 +47,7 @@ DAMPED = 2
 BRAKED = Loop(u_max=0.0)
 P_SHARE, I_SHARE, D_SHARE = 1 / 1600, 1 / 1.6e6, 1 / 64
 SPEED_P_SHARE, SPEED_I_SHARE = 1 / 50, 1 / 40_000
-"""What a unit of each gain makes of steps, steps times ms, and steps/ms: shares of full duty."""
+"""Duty per unit of each gain for steps, steps times ms, and steps/ms, as shares of full duty."""
 
 
 MotionWords = tuple[int, int, int, int, int, bool]
@@ -55,7 +55,7 @@ MotionWords = tuple[int, int, int, int, int, bool]
 
 
 class FeetechDrive(Drive):
-    """What turns the shaft of a Feetech servo.
+    """Drives the shaft of a Feetech servo.
 
     Attributes:
         most: share of the duty that a protection leaves.
@@ -104,7 +104,7 @@ class FeetechDrive(Drive):
         return (at if goes_on else at % TURN) * self._scale
 
     def motion_words(self, now_ms: int) -> MotionWords:
-        """Return what the registers say of position, speed, load, current, target, moving."""
+        """Return the register words of position, speed, load, current, target, moving."""
         shaft, scale, profile = self.shaft, self._scale, self.shaft.profile
         at = round((shaft.x + self._shift) * scale)
         if self._last is not None:
@@ -119,7 +119,7 @@ class FeetechDrive(Drive):
         led = self.torque and isinstance(profile, PositionProfile)
         goal = round((profile.goal + self._shift) * scale) if led else self._goal_register()
         load = round(shaft.u * FULL)
-        # Half of them have no sign: their words are themselves.
+        # Half of them have no sign: the word is the value.
         return (
             at if 0 <= at < SIGN else unsigned(at, 15),
             speed if 0 <= speed < SIGN else unsigned(speed, 15),
@@ -156,7 +156,7 @@ class FeetechDrive(Drive):
         self.apply_gains()
 
     def _wanted_mode(self) -> int:
-        """Return the mode by its register, or by the limits for a series without that register."""
+        """Return the mode from its register, or from the limits for a series without it."""
         get = self.memory.get
         if self._last is not None and get("min_position_limit") == get("max_position_limit") == 0:
             return PWM
@@ -194,7 +194,7 @@ class FeetechDrive(Drive):
     # --- torque
 
     def switch(self, value: int, from_here: bool) -> None:
-        """Switch the torque: 0 off, 1 on, 2 off and braked; ``from_here``: without an old goal."""
+        """Switch the torque: 0 off, 1 on, 2 off and braked; ``from_here``: drop the old goal."""
         self.followed = None
         was, self.torque = self.torque, value not in (0, DAMPED)
         self.damped = value == DAMPED
@@ -224,7 +224,7 @@ class FeetechDrive(Drive):
         self._timed = obeyed
 
     def follow(self, new_goal: bool = False) -> None:
-        """Follow the goal registers; ``new_goal``: the goal position was written just now."""
+        """Follow the goal registers; ``new_goal``: the goal position has just been written."""
         if not self.torque:
             return
         asked = self._goals.unpack_from(self.memory.bytes, GOALS_AT)
@@ -256,7 +256,7 @@ class FeetechDrive(Drive):
         if cruise == 0.0 and self._stops_at_zero:
             return
         if time_ms and self._timed and self.mode == SERVO:
-            # No faster than it can: the next path begins at the speed of this one.
+            # No faster than possible: the next path begins at the speed of this one.
             profile.by_time(to, max(time_ms, abs(to - profile.r) / self._top), 0.0)
         else:
             profile.by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
@@ -265,12 +265,12 @@ class FeetechDrive(Drive):
     # --- origin
 
     def _wrap_to_one_turn(self) -> None:
-        """Bring the position into one turn, as power-on does."""
+        """Wrap the position into one turn, as power-on does."""
         turns = 0 if self._last is not None else (self.shaft.x - self._offset) // TURN
         self._shift = -self._offset - int(turns) * TURN
 
     def calibrate(self, to: int) -> None:
-        """Make the present position ``to``; the offset is kept without power."""
+        """Set the present position to ``to``; the offset is stored permanently."""
         if self._last is not None:
             return
         offset = (round(self.shaft.x) - to + TURN // 2) % TURN - TURN // 2
@@ -279,7 +279,7 @@ class FeetechDrive(Drive):
         self._set_goal_here()
 
     def forget_turns(self) -> None:
-        """Reset the count of turns; under torque the shaft stays where it is."""
+        """Reset the count of turns; under torque the shaft does not move."""
         self._wrap_to_one_turn()
         self._set_goal_here()
         if self.torque:

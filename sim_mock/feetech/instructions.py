@@ -1,6 +1,6 @@
-"""Instructions that Feetech servos alone have.
+"""Instructions of Feetech servos only.
 
-What is not understood is met with silence [assumed: not documented].
+An unknown instruction gets no answer [assumed: not documented].
 Source: Feetech, communication protocol of the STS/SMS series.
 """
 

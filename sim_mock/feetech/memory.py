@@ -1,8 +1,8 @@
-"""The memory of an emulated Feetech servo as bytes: what may be written, and what is kept.
+"""The memory of an emulated Feetech servo as bytes: permitted writes, permanent values.
 
-Nothing is ever refused: a write to what cannot be written, or of an id, baud rate or mode that
-does not exist, is answered like any other and changes nothing. While Lock is 1 a write to the
-EEPROM area counts until the power goes; only what is written while it is 0 is kept.
+Nothing is ever refused: a write to a read-only register, or of an id, baud rate or mode that
+does not exist, is answered like any other and changes nothing. While Lock is 1, a write to the
+EEPROM area lasts until power-off; only writes while it is 0 are permanent.
 Source: Feetech, memory table of the STS series.
 """
 
@@ -14,7 +14,7 @@ from gazerig.sim_mock.feetech.tables import STS, EmulatedFeetechRegister, Table
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 
 SIZE = 256
-"""What is not a register reads 0."""
+"""Addresses without a register read 0."""
 ABSENT_SIZE = 32
 SPEED_UNIT_STEPS_S = 50
 """Unit of the register of the highest speed."""
@@ -25,7 +25,7 @@ def _bytes_of(registers: Iterable[EmulatedFeetechRegister]) -> frozenset[int]:
 
 
 class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
-    """One servo's memory; ``bytes`` is what is read, the EEPROM's own content stands apart."""
+    """One servo's memory; ``bytes`` holds what is read; the permanent EEPROM is separate."""
 
     def __init__(
         self, model: FeetechModel, servo_id: int, firmware: int, table: Table = STS
@@ -49,7 +49,7 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
         return raw if register.sign is None else signed(raw, register.sign)
 
     def _encode(self, register: EmulatedFeetechRegister, value: int) -> bytes:
-        """Return sign and magnitude where the register has a sign."""
+        """Return sign and magnitude if the register has a sign."""
         raw = value if register.sign is None else unsigned(value, register.sign)
         return raw.to_bytes(register.size, self.table.order)
 
@@ -60,7 +60,7 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
         self._kept[address : address + size] = self.bytes[address : address + size]
 
     def factory_settings(self) -> None:
-        """Put everything in the EEPROM as it left the factory, except the id."""
+        """Restore the factory settings of the EEPROM, except the id."""
         model = self._model
         own = {
             "temperature_limit": model.temperature_limit,
@@ -73,7 +73,7 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
                 self.keep(register.name, own.get(register.name, register.initial))
 
     def power_up(self) -> None:
-        """Set the start values of the RAM, and what was kept of the EEPROM."""
+        """Set the start values of the RAM, and the permanent values of the EEPROM."""
         for address in self._kept_at:
             self.bytes[address] = self._kept[address]
         for register in (*self.table.ram, self.named("registered_instruction")):
@@ -81,11 +81,11 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
         self.set("torque_limit", self.get("max_torque"))
 
     def read(self, address: int, length: int) -> bytes:
-        """Return bytes as they are on the wire; what is no register is 0."""
+        """Return bytes as they are on the wire; addresses without a register are 0."""
         return bytes(self.bytes[address : min(SIZE, address + length)]).ljust(length, b"\0")
 
     def write(self, address: int, data: bytes, changed: Callable[[int], None]) -> None:
-        """Write what can be written; ``changed`` is called with every address that was."""
+        """Write the writable bytes; call ``changed`` with each address that was written."""
         keeps, highest = self.bytes[self.table.lock_at] == 0, self.table.highest
         for at, byte in enumerate(data, address):
             if at not in self._writable or byte > highest.get(at, 0xFF):

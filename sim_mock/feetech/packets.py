@@ -1,10 +1,10 @@
-"""Packets of the Feetech STS servos as they send them, and as they look for them on the line.
+"""Packets of Feetech STS servos as they send them, and constants to find them on the line.
 
 An instruction is FF FF, id, length, instruction, parameters, checksum; a status has the error
-byte in the place of the instruction. The length counts parameters + 2, the checksum is the
-inverse of the sum of all between header and itself. Nothing is stuffed, so a header may stand
-among parameters. Numbers with a sign are sign and magnitude. Source: Feetech, communication
-protocol of the STS/SMS series.
+byte in place of the instruction. The length is the number of parameters + 2, the checksum the
+inverse of the sum of all bytes between header and checksum. There is no byte stuffing, so
+parameters may contain a header. Signed numbers are sign and magnitude. Source: Feetech,
+communication protocol of the STS/SMS series.
 """
 
 from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
@@ -15,7 +15,7 @@ SHORTEST = 6
 
 
 def checksum(body: bytes) -> int:
-    """Return the checksum of all between header and checksum."""
+    """Return the checksum of all bytes between header and checksum."""
     return ~sum(body) & 0xFF
 
 
@@ -26,13 +26,13 @@ def status(servo_id: int, error: int, params: bytes) -> bytes:
 
 
 def signed(raw: int, bit: int) -> int:
-    """Read sign and magnitude; the sign stands in ``bit``, the magnitude below it."""
+    """Decode sign and magnitude; the sign is in ``bit``, the magnitude below it."""
     magnitude = raw & (1 << bit) - 1
     return -magnitude if raw >> bit & 1 else magnitude
 
 
 def unsigned(value: int, bit: int) -> int:
-    """Write sign and magnitude; what does not fit below ``bit`` becomes the largest that does."""
+    """Encode sign and magnitude; a magnitude that does not fit below ``bit`` is clipped."""
     largest = (1 << bit) - 1
     if value >= 0:
         return value if value <= largest else largest
@@ -48,7 +48,7 @@ class FeetechFraming(Framing):
         while True:
             at = data.find(HEADER, at)
             if at < 0:
-                # The first byte of a header may be the last one that came.
+                # The last byte may be the first byte of a header.
                 return found, data[-1:] if data.endswith(HEADER[:1]) else b""
             head = data[at + 2 : at + 4]
             if head[:1] == b"\xff":

@@ -1,8 +1,8 @@
-"""Behaviour of Feetech servos where documents and devices are silent or differ.
+"""Behaviour of Feetech servos that is undocumented or differs between documents and devices.
 
-Sources: Feetech, memory table and communication protocol of the STS series; reports of
-people who build arms with them. Defaults are the choice that is hardest on a client, where no
-report decides; they are assumed.
+Sources: Feetech, memory table and communication protocol of the STS series; reports of people who
+build arms with them. If no report decides, the default is the choice that is hardest on a client,
+and is assumed.
 """
 
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ Reboot = Literal["mute", "answer"]
 
 @dataclass(frozen=True, kw_only=True)
 class FeetechQuirks(ChainQuirks):
-    """The choices.
+    """Choices of behaviour.
 
-    broadcast_ping: all answer in the order of their ids, all at once (the bytes mix), or none
+    broadcast_ping: all answer in the order of their ids, all at the same time (the bytes mix), or
+        none
     goal: a goal position written without torque waits for it, or switches the torque on; the
         maker's own examples never switch it on and move all the same [R]
-    torque_on: as the torque comes on the old goal is followed, or the goal becomes the present
-        position
-    goal_time: Goal Time (44) decides how long a move takes where it is not 0, or means nothing
-    overload_ends: what ends the overload protection: a goal other than before, a goal that
-        leads away from what it pushed against, none but torque off, or (all the others as
-        well) a restart
+    torque_on: when the torque is switched on, the servo follows the old goal, or the goal becomes
+        the present position
+    goal_time: Goal Time (44) sets the duration of a move unless it is 0, or has no effect
+    overload_ends: the overload protection ends with a different goal, with a goal away from the
+        obstacle, only with torque off, or (in addition to all of these) with a restart
     reboot: a reboot instruction is not answered, or is
     """
 

@@ -1,8 +1,8 @@
-"""One emulated Feetech servo: what a write does, errors, restarts.
+"""One emulated Feetech servo: effects of writes, errors, restarts.
 
-Memory is in gazerig.sim_mock.feetech.memory, what turns the shaft in its motor, what documents
-leave open in its quirks. What it does not do: reversed phases, angle resolution (30), a blinking
-LED, backup (09).
+The memory is in gazerig.sim_mock.feetech.memory, the drive of the shaft in its drive,
+undocumented behaviour in its quirks. Not emulated: reversed phases, angle resolution (30), a
+blinking LED, backup (09).
 """
 
 import struct
@@ -25,10 +25,10 @@ from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 MIDDLE = 2048
 TIME_UNIT_S = 0.01
 TOO_HOT_C = 5.0
-"""A motor that a fault has overheated is so much above its limit."""
+"""Temperature above the limit of a motor that a fault has overheated."""
 
 ANGLE = 2
-"""Bit of Status (65) of a broken angle sensor; the others are those of its protection."""
+"""Bit of Status (65) of a broken angle sensor; the other bits are its protection's."""
 
 FACTORY_AT = 78
 TORQUE_AT, GOAL_AT, GOAL_END, GOALS_END, LIMIT_END = 40, 42, 44, 48, 50
@@ -40,12 +40,12 @@ _SENSED = {"little": struct.Struct("<HHHBBBBBHH"), "big": struct.Struct(">HHHBBB
 class FeetechServo(EmulatedServo):
     """One Feetech servo on the chain.
 
-    The spec's ``firmware`` is the number behind 3; its ``quirks`` are those of Dynamixel
-    servos and are ignored, as are ``overload_share`` and ``overload_s`` of its physics: these
-    are registers here.
+    The spec's ``firmware`` is the number after 3. Its ``quirks`` are those of Dynamixel servos and
+    are ignored, as are ``overload_share`` and ``overload_s`` of its physics: here they are
+    registers.
 
     Raises:
-        ValueError: there is no such model, or the spec's physics cannot exist.
+        ValueError: the model is unknown, or the spec's physics cannot exist.
     """
 
     restart_ms = 800
@@ -65,7 +65,7 @@ class FeetechServo(EmulatedServo):
         super().__init__(spec, now_ms)
 
     def _load_limits(self) -> tuple[float, ...]:
-        """Return its protection limits by its registers."""
+        """Return its protection limits from its registers."""
         get = self.memory.get
         return (
             get("overload_torque") / 100.0,
@@ -75,7 +75,7 @@ class FeetechServo(EmulatedServo):
         )
 
     def apply_quirks(self, quirks: FeetechQuirks) -> None:
-        """Apply quirks from now on."""
+        """Use quirks from now on."""
         self.quirks = quirks
         self.mute_reboot = quirks.reboot == "mute"
         self.drive.obey_goal_time(quirks.goal_time == "obey")
@@ -88,7 +88,7 @@ class FeetechServo(EmulatedServo):
         self._protect()
 
     def _protect_from(self, bits: int) -> None:
-        """Flag voltage and heat while they are wrong, all else until something ends it."""
+        """Flag voltage and heat while they are wrong, other errors until they are reset."""
         errors = self.errors & ~(HEAT | VOLTAGE) | bits
         if errors != self.errors:
             self.errors = errors
@@ -109,19 +109,19 @@ class FeetechServo(EmulatedServo):
 
     @property
     def error_flag(self) -> int:
-        """The error byte that stands in every status."""
+        """Return the error byte of every status."""
         return self.errors
 
     def read(self, address: int, length: int) -> bytes:
-        """Return bytes of the memory; what is no register is 0."""
+        """Return bytes of the memory; addresses without a register are 0."""
         if address == SENSED_AT and length == SENSED_END - SENSED_AT:
-            return self._sensed.pack(*self._live_words())  # what a control loop reads every tick
+            return self._sensed.pack(*self._live_words())  # a control loop reads them every tick
         if address < SENSED_END and address + length > SENSED_AT:
             self._sensed.pack_into(self.memory.bytes, SENSED_AT, *self._live_words())
         return self.memory.read(address, length)
 
     def _live_words(self) -> tuple[int, ...]:
-        """Return the registers that change by themselves, 56 to 70."""
+        """Return the registers with live values, 56 to 70."""
         if self.stale_surroundings:
             self.stale_surroundings = False
             self._around = max(0, min(255, self.voltage_01v)), self.warmth_c
@@ -139,7 +139,7 @@ class FeetechServo(EmulatedServo):
         memory, end = self.memory, address + len(data)
         goal = memory.bytes[GOAL_AT:GOAL_END]
         if GOALS_AT <= address < end <= GOALS_END:
-            # The one write of every tick, the short way.
+            # A shortcut for the only write of every tick.
             memory.bytes[address:end] = data
             self._command(address < GOAL_END and end > GOAL_AT, goal)
             drive = self.drive
@@ -170,14 +170,14 @@ class FeetechServo(EmulatedServo):
         drive.follow(new_goal)
 
     def _goal_after_overload(self) -> None:
-        """End the overload on a new goal, if the quirks do so."""
+        """End the overload on a new goal, if the quirks require it."""
         ends = self.quirks.overload_ends
         ahead = self.memory.get("goal_position") - self.position_steps
         if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):
             self._end_overload()
 
     def _switch(self, value: int) -> None:
-        """Switch the torque, or make the present position the middle."""
+        """Switch the torque, or make the present position the centre."""
         drive = self.drive
         if value == SET_MIDDLE:
             self.memory.set("torque_enable", int(drive.torque))
@@ -203,10 +203,10 @@ class FeetechServo(EmulatedServo):
         self.errors &= ~bit
         self.protection.restart()
 
-    # --- from outside
+    # --- external events
 
     def factory_reset(self, new_id: int | None = None) -> None:
-        """Put the EEPROM as it left the factory, all but the id, and restart."""
+        """Restore the factory settings of the EEPROM, except the id, and restart."""
         self.memory.factory_settings()
         if new_id is not None:
             self.memory.keep("id", new_id)
@@ -216,7 +216,7 @@ class FeetechServo(EmulatedServo):
         """Trigger the overload protection, overheat the motor or break the angle sensor.
 
         Raises:
-            ValueError: there is no such error.
+            ValueError: the error is unknown.
         """
         if error != "overheating":
             return super().fail(error)

@@ -1,11 +1,11 @@
 """Registers and models of the Feetech servos that can be emulated: series STS and SCS.
 
-SCS servos speak the same packets with the high byte of two first. Their position comes from a
-potentiometer of 1024 steps over less than a turn; with both angle limits 0 they are driven by the
-duty in Goal Time (44). They answer no sync read and have no offset, torque limit or current.
+SCS servos use the same packets with the high byte of a word first. Their position is measured by
+a potentiometer of 1024 steps over less than a turn; with both angle limits 0 the duty in Goal
+Time (44) drives them. They answer no sync read and have no offset, torque limit or current.
 
 Sources: Feetech, memory table of the STS series and SCSCL of its SDK (addresses); rustypot's table
-of the SCS0009. Start values marked [A] are assumed, [R] are those that owners read out.
+of the SCS0009. Start values marked [A] are assumed, [R] were read by owners.
 """
 
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ SERVO, WHEEL, PWM, STEP = 0, 1, 2, 3
 
 
 class EmulatedFeetechRegister(NamedTuple):
-    """One register; ``sign``: the bit its sign stands in, None where it has none."""
+    """One register; ``sign``: the bit of its sign, None without a sign."""
 
     name: str
     address: int
@@ -84,12 +84,12 @@ _STS_KEPT = (
     EmulatedFeetechRegister("dts", 81),
     EmulatedFeetechRegister("velocity_unit_factor", 82, initial=1),
     EmulatedFeetechRegister("hts", 83),
-    EmulatedFeetechRegister("max_velocity_limit", 84),  # 50 steps/s, as the model is
+    EmulatedFeetechRegister("max_velocity_limit", 84),  # 50 steps/s, as of the model
     EmulatedFeetechRegister("max_acceleration", 85, initial=254),  # [R]
     EmulatedFeetechRegister("acceleration_factor", 86, initial=1),
 )
 _SCS_KEPT = (
-    # What STS servos have there is assumed of these, too [A].
+    # The values of STS servos are assumed for these, too [A].
     *_with(_KEPT, max_position_limit=1023, unloading_condition=0x24, led_alarm_condition=0x25),
     EmulatedFeetechRegister("protective_torque", 37, initial=20),
     EmulatedFeetechRegister("protection_time", 38, initial=200),
@@ -98,7 +98,7 @@ _SCS_KEPT = (
     EmulatedFeetechRegister("moving_threshold", 79, initial=1),  # [A]
     EmulatedFeetechRegister("dts", 80),
     EmulatedFeetechRegister("min_velocity_limit", 81),
-    EmulatedFeetechRegister("max_velocity_limit", 82),  # 50 steps/s, as the model is
+    EmulatedFeetechRegister("max_velocity_limit", 82),  # 50 steps/s, as of the model
 )
 _RAM = (
     EmulatedFeetechRegister("torque_enable", 40),
@@ -106,7 +106,7 @@ _RAM = (
     EmulatedFeetechRegister("goal_position", 42, 2, sign=15),
     EmulatedFeetechRegister(
         "goal_time", 44, 2
-    ),  # where a duty drives the motor the duty, its sign in bit 10
+    ),  # the duty in modes with a duty, its sign in bit 10
     EmulatedFeetechRegister("goal_speed", 46, 2, sign=15),
 )
 _FIXED = (
@@ -128,16 +128,16 @@ _ABSENT_FROM_SCS = (
 
 
 class Table(NamedTuple):
-    """The registers of one series of servos.
+    """Registers of one series of servos.
 
-    kept: kept without power; ram: given start values; fixed: never written
-    absent: what a series lacks and its motor goes by all the same; beyond what can be read
-    order: which byte of two comes first
-    lock_at: the register that keeps what is written from being kept
-    highest: largest value that exists, by address
-    turn_steps: steps of the position a whole turn would have
-    last_step: where the sensor of the position ends, None where it goes round
-    sync_read: its servos answer a sync read
+    kept: permanent registers; ram: registers with start values; fixed: read-only registers
+    absent: registers that a series lacks but its emulated motor uses; they cannot be read
+    order: byte order of words
+    lock_at: the register that makes writes temporary
+    highest: largest valid value, by address
+    turn_steps: steps of the position per whole turn
+    last_step: end of the position sensor, None if it is continuous
+    sync_read: whether its servos answer a sync read
     baud_rates: bit/s by the value of their register
     """
 
@@ -189,7 +189,7 @@ def model_and_table(model: str) -> tuple[FeetechModel, Table]:
     """Return a model and the registers of its series.
 
     Raises:
-        ValueError: there is no such model.
+        ValueError: the model is unknown.
     """
     if model in SCS:
         return SCS_MODELS[model], SCS[model]

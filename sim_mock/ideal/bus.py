@@ -1,7 +1,7 @@
 """Servos without bytes: goals in, a first-order lag out.
 
-For simulations that judge what is above the bus: no packets, no motor, no faults, no heat.
-The lag has a closed form, so the angles do not depend on how often they are read.
+For simulations that test code above the bus: no packets, no motor, no faults, no heat. The lag
+has a closed form, so the angles do not depend on the times of reads.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,21 +13,21 @@ from typing import NamedTuple
 from gazerig.drivers.types import BusHealth, Feedback, ServoConfig
 
 LAG_S = 0.008
-"""Time constant; an emulated eye on the desk rig's gains is as late."""
+"""Time constant; an emulated eye with the desk rig's gains has the same lag."""
 WARM_C = 30.0
 _TO_WHOLE = repeat(1.5 * 2.0**52)
-"""Added and subtracted again it rounds as ``round`` does: floats of its size have no fraction."""
+"""Rounds as ``round`` does when added and subtracted: such large floats have no fraction."""
 
 
 class _Motion(NamedTuple):
-    """Where the shafts were at a time, in steps; they have followed the goals since."""
+    """Positions of the shafts at a time, in steps, and the goals that they follow since."""
 
     at_s: float
     from_steps: tuple[float, ...]
     goals_steps: tuple[int, ...] | None
 
     def steps(self, now_s: float) -> tuple[float, ...]:
-        """Return the positions now; without goals the torque is off and the shafts stand still."""
+        """Return the positions now; without goals the torque is off and the shafts do not move."""
         goals = self.goals_steps
         if goals is None or now_s <= self.at_s:
             return self.from_steps
@@ -40,8 +40,8 @@ class IdealBus:
     """All servos of a rig; a gazerig.drivers.types.ServoBus.
 
     Args:
-        configs: of the servos.
-        start_steps: where their shafts stand at first, in the same order.
+        configs: configurations of the servos.
+        start_steps: initial positions of their shafts, in the same order.
         measured: whether each of them has feedback.
         now_s: the clock.
     """
@@ -54,10 +54,10 @@ class IdealBus:
         now_s: Callable[[], float],
     ) -> None:
         self._now_s = now_s
-        # One value, replaced as a whole: the camera may look from another thread.
+        # One value, replaced as a whole, because the camera may read it from another thread.
         self._motion = _Motion(now_s(), tuple(map(float, start_steps)), None)
         self._read = self._motion.at_s, self._motion.from_steps
-        self._reached = self._motion, *self._read  # where a motion has got to, when read last
+        self._reached = self._motion, *self._read  # positions at the last read
         self._events: tuple[str, ...] = ()
         self._measured = tuple(measured)
         count = len(self._measured)
@@ -71,7 +71,7 @@ class IdealBus:
         return self._motion.steps(self._now_s())
 
     def open(self) -> None:
-        """Report the servos as set up; there is nothing to open."""
+        """Report the servos as set up; nothing needs to be opened."""
         self._events = ("servos set up",)
 
     def close(self) -> None:
@@ -106,12 +106,12 @@ class IdealBus:
             self._follow(goals_steps)
 
     def disable_torque(self) -> None:
-        """Stop the shafts where they are."""
+        """Stop the shafts at their positions."""
         now_s = self._now_s()
         self._motion = _Motion(now_s, self._motion.steps(now_s), None)
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Keep other limits from the next goals on."""
+        """Use other limits from the next goals on."""
         self._lowest = tuple([one.min_steps for one in setups])
         self._highest = tuple([one.max_steps for one in setups])
 
@@ -120,16 +120,16 @@ class IdealBus:
         return ()
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call."""
+        """Return the events since the last call."""
         events, self._events = self._events, ()
         return events
 
     def health(self) -> BusHealth:
-        """Return that no byte was sent."""
+        """Report that no byte was sent."""
         return BusHealth(0, 0, {})
 
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
-        """Lead the shafts to goals from where they are now; return the goals within the limits."""
+        """Start a motion to goals; return the goals within the limits."""
         goals, low, high = tuple(goals_steps), self._lowest, self._highest
         if len(goals) != len(low):
             raise ValueError(f"{len(goals)} goals for {len(low)} servos")

@@ -1,1 +1,1 @@
-"""The device side of a Pololu Maestro, and the hobby servos behind it."""
+"""Device side of a Pololu Maestro, and its hobby servos."""

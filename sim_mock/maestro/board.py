@@ -1,9 +1,9 @@
-"""The device side of a Pololu Maestro: bytes in, bytes and pulses out, nothing opened.
+"""Device side of a Pololu Maestro: bytes in, bytes and pulses out, nothing opened.
 
-A board of 6, 12, 18 or 24 channels, all set up as servos, each with a hobby servo behind
-it. Left out: inputs, digital outputs, other periods than 20 ms, PWM (accepted, no effect),
-and scripts but for the one that a fault starts. Source: Pololu Maestro User's Guide
-(0J40), section 5; [A] is assumed.
+A board of 6, 12, 18 or 24 channels, all configured as servos, each with a hobby servo. Omitted:
+inputs, digital outputs, other periods than 20 ms, PWM (accepted, no effect), and scripts other
+than the one that a fault starts. Source: Pololu Maestro User's Guide (0J40), section 5; [A] is
+assumed.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,7 +47,7 @@ class EmulatedMaestro:
     Args:
         servos: one for each channel, in their order.
         device: its number in the Pololu protocol.
-        settings: what it was set to over USB.
+        settings: its configuration over USB.
         seed: of the random generator of faults.
     """
 
@@ -83,7 +83,7 @@ class EmulatedMaestro:
             MINI_SSC: self._mini_ssc,
         }
 
-    # --- what it is, and who is heard
+    # --- device interface
 
     def at_baud(self, client_baud: int) -> bool:
         """Return whether a client at this baud rate is understood, once it has sent AA."""
@@ -95,10 +95,10 @@ class EmulatedMaestro:
         return mode != "mute"
 
     def choose(self, case: str, value: str) -> None:
-        """Choose what the board is set to; it does not restart for that.
+        """Change a setting of the board; it does not restart.
 
         Raises:
-            ValueError: there is no such case or value.
+            ValueError: the case or value is unknown.
         """
         self.body.advance()
         if case in LIMITS:
@@ -114,7 +114,7 @@ class EmulatedMaestro:
     def _set_up(self, settings: Settings) -> None:
         self.body.settings = settings
         self._parser.crc = settings.crc
-        # The client's rate matters at the serial pins alone.
+        # The client's rate matters at the serial pins only.
         self.check_baud = settings.mode in ("uart-fixed", "uart-detect")
 
     def _forget(self) -> None:
@@ -122,12 +122,12 @@ class EmulatedMaestro:
         self._detected_baud = None
 
     def restart(self) -> None:
-        """Restart as a dip of the supply makes it."""
+        """Restart as after a dip of the supply."""
         self.body.restart()
         self._forget()
 
     def here(self, channel: int) -> HobbyServo:
-        """Return the servo of a channel, brought up to now.
+        """Return the servo of a channel, advanced to the present time.
 
         Raises:
             KeyError: the board has no such channel.
@@ -135,11 +135,11 @@ class EmulatedMaestro:
         self.body.advance()
         servos = self.body.servos
         if not 0 <= channel < len(servos):
-            raise KeyError(f"no channel {channel}; there is 0 to {len(servos) - 1}")
+            raise KeyError(f"no channel {channel}; channels are 0 to {len(servos) - 1}")
         return servos[channel]
 
     def channel_report(self, channel: int) -> dict[str, object]:
-        """Return what a channel is sent to, and its pulse on its way there."""
+        """Return a channel's target and its present pulse."""
         one = self.body.channels[channel]
         return {
             "target": one.target,
@@ -149,7 +149,7 @@ class EmulatedMaestro:
         }
 
     def positions_steps(self) -> tuple[float, ...]:
-        """Return where the shafts truly are now, in quarter microseconds, by channel."""
+        """Return the true positions of the shafts now, in quarter microseconds, by channel."""
         self.body.advance()
         return tuple(servo.place_steps for servo in self.body.servos)
 
@@ -172,7 +172,7 @@ class EmulatedMaestro:
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _what_comes(self, data: bytes, client_baud: int | None) -> bytes:
-        """Return what the board understands of a client's bytes."""
+        """Return the bytes of a client that the board understands."""
         if not self.body.awake or self.body.settings.mode == "mute":
             return b""
         if self.check_baud and client_baud is not None:
@@ -197,7 +197,7 @@ class EmulatedMaestro:
         return b""
 
     def _execute(self, command: ParsedCommand) -> list[Piece]:
-        """Carry out one command; return what is answered."""
+        """Execute one command; return the answer."""
         if command.trouble:
             self.body.fail(command.trouble)
             return []
@@ -211,11 +211,11 @@ class EmulatedMaestro:
         return self._sent(Piece(asked, answer))
 
     def _lost(self) -> bool:
-        """Return whether a command that answers nothing is lost on its way."""
+        """Return whether a command without an answer is lost."""
         return self._wire.take("lose_writes", None, self.now_s()) is not None
 
     def _sent(self, piece: Piece) -> list[Piece]:
-        """Return an answer as it arrives; faults of one channel spoil only its position."""
+        """Return an answer as it arrives; faults of one channel affect only its position."""
         if not self._wire.any:
             return [piece]
         now_s = self.now_s()
@@ -226,7 +226,7 @@ class EmulatedMaestro:
     # --- commands
 
     def _at(self, data: bytes, do: Callable[[EmulatedChannel, int], None]) -> None:
-        """Apply a number to a channel; one that does not exist is a protocol error [A]."""
+        """Apply a number to a channel; an unknown channel is a protocol error [A]."""
         if data[0] < len(self.body.channels):
             do(self.body.channels[data[0]], word(data[1], data[2]))
         else:
@@ -248,12 +248,12 @@ class EmulatedMaestro:
 
     def _mini_ssc(self, data: bytes) -> None:
         """Set a target of 8 bits: 127 is 1500 us, 0 and 254 are 476.25 us to either side."""
-        # Servo numbers beyond its own are other boards'.
+        # Servo numbers beyond its own belong to other boards.
         if data[0] < len(self.body.channels):
             self.body.channels[data[0]].aim(6000 + (data[1] - 127) * 15)
 
     def _run_script(self) -> None:
-        """Handle the start of a script although there is none [A]."""
+        """Handle the start of a script that does not exist [A]."""
         self.body.stop_script()
         self.body.fail("script-counter")
 
@@ -270,8 +270,8 @@ def build_board(
 ) -> EmulatedMaestro:
     """Build a board; channels without a spec have a default servo.
 
-    With a baud rate the host is at its serial pins, set to that rate; without one it is at
-    the USB command port, where any rate works.
+    With a baud rate the host is at its serial pins, set to that rate; without one it is at the USB
+    command port, where any rate works.
 
     Raises:
         ValueError: such a board or servo does not exist.

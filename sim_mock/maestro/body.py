@@ -1,7 +1,7 @@
 """An emulated Maestro without its serial side: channels, servos, errors, a script, and time.
 
-It moves in whole periods of 10 ms and sends pulses every 20 ms, however often it is looked
-at. Source: Pololu Maestro User's Guide (0J40); [A] is assumed.
+It moves in whole periods of 10 ms and sends pulses every 20 ms, however often it is read.
+Source: Pololu Maestro User's Guide (0J40); [A] is assumed.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,13 +12,13 @@ from gazerig.sim_mock.maestro.commands import ERRORS
 from gazerig.sim_mock.maestro.settings import OnError, Settings
 
 PERIODS_S = 100
-"""Periods in a second; a pulse goes out in every second one."""
+"""Periods per second; every second one has a pulse."""
 RESTART_S = 0.1
-"""From a dip of the supply until it receives again [A]."""
+"""Time from a dip of the supply until it receives again [A]."""
 PAUSE = 1000
-"""So many periods without being looked at are not lived through one by one."""
+"""Periods without access after which they are not simulated one by one."""
 SWING = 100
-"""The script that a fault starts sends a channel to its other end every so many periods."""
+"""Periods after which the script of a fault sends a channel to its other end."""
 
 
 class MaestroBody:
@@ -26,10 +26,10 @@ class MaestroBody:
 
     Args:
         servos: one for each channel, in their order.
-        settings: what it was set to over USB.
+        settings: its configuration over USB.
 
-    errors: its register; servo_power: the servos have their supply
-    script_running: a script does; swung: the channel that it moves, None for no channel
+    errors: its error register; servo_power: whether the servos have their supply
+    script_running: whether a script runs; swung: the channel that it moves, None without one
     """
 
     def __init__(
@@ -49,26 +49,26 @@ class MaestroBody:
 
     @property
     def awake(self) -> bool:
-        """Return whether it does not just restart."""
+        """Return whether it is not in a restart."""
         return self._period >= self._awake_from
 
     # --- commands
 
     def send_all(self, where: OnError) -> None:
-        """Send every channel to where it is to be at start or on an error."""
+        """Send every channel to its configured position at start or on an error."""
         if where != "ignore":
             for channel in self.channels:
                 channel.aim(self.settings.home_steps if where == "home" else 0)
 
     def feed(self) -> None:
-        """Count the time without valid commands from now on."""
+        """Restart the time without valid commands."""
         self._fed, self._timed_out = self._period, False
 
     def limit(self, low: int | None, high: int | None) -> None:
-        """Set other limits of every channel's targets; None: as they are.
+        """Set the limits of every channel's targets; None: no change.
 
         Raises:
-            ValueError: the lower one would be above the upper one.
+            ValueError: the lower limit would be above the upper one.
         """
         wanted = [
             (c.low if low is None else low, c.high if high is None else high) for c in self.channels
@@ -79,20 +79,20 @@ class MaestroBody:
         for channel, limits in zip(self.channels, wanted, strict=True):
             channel.limit(*limits)
 
-    # --- what goes wrong
+    # --- errors
 
     def fail(self, error: str) -> None:
-        """Register an error by its name: every channel does as it is set to do then."""
+        """Register an error by its name; every channel reacts as configured."""
         self.errors |= 1 << ERRORS.index(error)
         self.send_all(self.settings.on_error)
 
     def read_errors(self) -> int:
-        """Return the register of errors, which is empty after that."""
+        """Return the error register and clear it."""
         errors, self.errors = self.errors, 0
         return errors
 
     def restart(self) -> None:
-        """Restart as a dip of the supply makes it; the register of errors begins empty."""
+        """Restart as after a dip of the supply, with an empty error register."""
         self.advance()
         self.errors = 0
         self.stop_script()
@@ -103,7 +103,7 @@ class MaestroBody:
     # --- scripts
 
     def run_script(self, channel: int | None = None) -> None:
-        """Start a script that swings a channel from end to end, or does nothing for ever."""
+        """Start an endless script that swings a channel from end to end, or does nothing."""
         self.advance()
         self.script_running, self.swung = True, channel
 
@@ -114,7 +114,7 @@ class MaestroBody:
     # --- time
 
     def advance(self) -> None:
-        """Let time pass up to now."""
+        """Advance to the present time."""
         now = whole_periods(self.now_s())
         while now - self._period > PAUSE and self.swung is not None:
             self._live_on(self._period + 2 * SWING)
@@ -127,27 +127,27 @@ class MaestroBody:
             self._pass()
 
     def _skip_swings(self, now: int) -> None:
-        """Let whole swings of a script go by, as each leaves all as it was."""
+        """Skip whole swings of a script, because each one ends in its initial state."""
         due = self._due()
         until = now if due is None else min(now, due - 1)
         if self.awake and until > self._period and self._at_rest(but=self.swung):
             self._period += (until - self._period) // (2 * SWING) * (2 * SWING)
 
     def _next_period(self, now: int) -> int:
-        """Return the next period in which anything happens."""
+        """Return the next period with an event."""
         if self.swung is not None or not self.awake or not self._at_rest():
             return self._period + 1
         due = self._due()
         return now if due is None else max(self._period + 1, min(now, due))
 
     def _due(self) -> int | None:
-        """Return the period in which the serial time-out ends, None for never."""
+        """Return the period in which the serial time-out ends, None: never."""
         if not self.settings.timeout_s or self._timed_out:
             return None
         return self._fed + round(self.settings.timeout_s * PERIODS_S)
 
     def _at_rest(self, but: int | None = None) -> bool:
-        """Return whether every servo, ``but`` one, has followed its last pulse."""
+        """Return whether every servo except ``but`` has followed its last pulse."""
         return all(
             not channel.moving and servo.width_steps == self._pulse(channel) and servo.resting
             for k, (channel, servo) in enumerate(zip(self.channels, self.servos, strict=True))
@@ -159,7 +159,7 @@ class MaestroBody:
         return channel.position if self.servo_power else 0
 
     def _pass(self) -> None:
-        """Let one period pass."""
+        """Advance by one period."""
         if self._period == self._awake_from:
             self.feed()
             self.send_all(self.settings.startup)

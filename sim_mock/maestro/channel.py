@@ -1,10 +1,10 @@
-"""One channel of an emulated Maestro: the pulse width it sends, led to its target.
+"""One channel of an emulated Maestro: the pulse width that it sends, and its target.
 
-Widths are quarter microseconds. The board moves what it sends every 10 ms: by no more than
-the speed limit (quarter microseconds per 10 ms), while the speed changes by no more than
-the acceleration limit (the same per 80 ms), so that it comes to rest on the target. Sums
-are kept in eighths, in which both limits are whole numbers. Source: Pololu Maestro User's
-Guide (0J40), sections 4.b and 5.e; how it brakes there is not documented: as late as possible [A].
+Widths are quarter microseconds. The board changes its output every 10 ms, by at most the speed
+limit (quarter microseconds per 10 ms). The speed changes by at most the acceleration limit (the
+same per 80 ms), so that it comes to rest at the target. Sums are stored in eighths, in which both
+limits are integers. Source: Pololu Maestro User's Guide (0J40), sections 4.b and 5.e. Its braking
+is not documented; assumed: as late as possible [A].
 """
 
 from math import isqrt
@@ -14,9 +14,9 @@ EIGHTHS = 8
 
 
 class EmulatedChannel:
-    """A channel set up as a servo.
+    """A channel configured as a servo.
 
-    target, position: commanded width and the one it sends now; 0: no pulses
+    target, position: commanded width and present width; 0: no pulses
     speed, acceleration: limits in the board's units; 0: unlimited
     low, high: targets are clipped to these
     """
@@ -29,7 +29,7 @@ class EmulatedChannel:
 
     @property
     def position(self) -> int:
-        """Return the width that is sent now; 0: no pulses."""
+        """Return the present width; 0: no pulses."""
         return self._at8 // EIGHTHS
 
     @property
@@ -39,12 +39,12 @@ class EmulatedChannel:
 
     @property
     def moving(self) -> bool:
-        """Return whether it is still being led to its target."""
+        """Return whether it has not reached its target."""
         return self._at8 != self.target * EIGHTHS or self._velocity8 != 0
 
     @property
     def led(self) -> bool:
-        """Return whether it is being led to its target under a limit: what a board calls moving."""
+        """Return whether it moves under a limit, which the board reports as moving."""
         return self.limited and self.moving
 
     def limit_speed(self, speed: int) -> None:
@@ -52,14 +52,14 @@ class EmulatedChannel:
         self.speed = speed
 
     def limit_acceleration(self, acceleration: int) -> None:
-        """Limit the acceleration; 0: unlimited. More than 255 is taken as that [A]."""
+        """Limit the acceleration; 0: unlimited. Values above 255 count as 255 [A]."""
         self.acceleration = min(acceleration, 255)
 
     def aim(self, steps: int) -> None:
         """Set the target, clipped to the limits; 0 ends the pulses.
 
-        Without limits, and where no pulses were sent before, it is in force at once: the
-        board does not know from where to lead the servo.
+        Without limits, or without pulses before, the output changes immediately: the board does not
+        know the servo's position.
         """
         self.target = min(max(steps, self.low), self.high) if steps else 0
         if not steps or not self._at8 or not self.limited:
@@ -73,12 +73,12 @@ class EmulatedChannel:
             self._at8 = min(max(self._at8, low * EIGHTHS), high * EIGHTHS)
 
     def restart(self, speed: int = 0, acceleration: int = 0) -> None:
-        """Be as after power-on: no pulses, the limits of speed and acceleration as set up."""
+        """Reset to power-on: no pulses, the configured limits of speed and acceleration."""
         self.speed, self.acceleration = speed, acceleration
         self.aim(0)
 
     def step(self) -> None:
-        """Let 10 ms pass."""
+        """Advance by 10 ms."""
         if not self.moving:
             return
         if not self.limited:
@@ -106,9 +106,9 @@ class EmulatedChannel:
 
 
 def brakes_within(way: int, acceleration: int) -> int:
-    """Return the largest first step of a motion that comes to rest within a way.
+    """Return the largest first step of a motion that comes to rest within a distance.
 
-    The steps after it are smaller by the acceleration each, the last one is the smallest.
+    Each further step is smaller by the acceleration; the last one is the smallest.
     """
     steps = (isqrt(1 + 8 * way // acceleration) - 1) // 2
     rest = way - acceleration * steps * (steps + 1) // 2

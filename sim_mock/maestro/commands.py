@@ -1,11 +1,10 @@
 """Parsing of the commands in the bytes that an emulated Maestro receives.
 
-Command bytes have bit 7 set, data bytes have not. Three forms: compact ``84 ch lo hi``,
-Pololu ``AA device 04 ch lo hi``, Mini SSC ``FF servo target``, whose last two bytes are
-0..254. Source: Pololu Maestro User's Guide (0J40), sections 5.c to 5.f. Where it is silent:
-AA followed at once by another command byte is taken as the sign that it also is, from
-which the baud rate is detected, and no error [A]; what follows the number of another device
-is ignored until the next command byte [A].
+Command bytes have bit 7 set, data bytes do not. Three forms: compact ``84 ch lo hi``, Pololu
+``AA device 04 ch lo hi``, Mini SSC ``FF servo target``, whose last two bytes are 0..254. Source:
+Pololu Maestro User's Guide (0J40), sections 5.c to 5.f. Assumed where it is silent [A]: AA
+directly before another command byte only serves baud rate detection and is no error; bytes after
+the number of another device are ignored until the next command byte.
 """
 
 from collections.abc import Iterator
@@ -31,9 +30,9 @@ DATA_BYTES = {
     SET_PWM: 4,
     SET_TARGETS: 2,
 }
-"""Of set-targets: those before the targets."""
+"""Number of data bytes; for set-targets those before the targets."""
 MINI_ONLY = (SET_TARGETS, SET_PWM)
-"""The Micro Maestro, with six channels, does not know these."""
+"""The Micro Maestro, with six channels, does not support these."""
 
 ERRORS = (
     "signal",
@@ -46,16 +45,16 @@ ERRORS = (
     "script-call-stack",
     "script-counter",
 )
-"""By the bits of the error register."""
+"""Names by the bits of the error register."""
 
 Trouble = Literal["", "crc", "protocol"]
 
 
 class ParsedCommand(NamedTuple):
-    """One command, or what was wrong with the bytes.
+    """One command, or an error in the bytes.
 
-    end: where it ended among the bytes fed
-    code: the command byte of its compact form, 0 where there is trouble
+    end: its end among the bytes fed
+    code: the command byte of its compact form, 0 on trouble
     """
 
     end: int
@@ -65,11 +64,11 @@ class ParsedCommand(NamedTuple):
 
 
 class CommandParser:
-    """Keeps the received bytes of a command that is not complete yet.
+    """Stores the received bytes of an incomplete command.
 
     Args:
-        device: the number that Pololu forms must name.
-        mini: a board with 12, 18 or 24 channels.
+        device: the number that Pololu forms must contain.
+        mini: whether the board has 12, 18 or 24 channels.
     """
 
     def __init__(self, device: int, mini: bool) -> None:
@@ -105,7 +104,7 @@ class CommandParser:
         return self._go_on() if len(packet) >= self._until else ()
 
     def _begin(self, byte: int) -> tuple[ParsedCommand, ...]:
-        """Start a command; one that was not finished is an error."""
+        """Start a command; an unfinished one is an error."""
         packet = self._packet
         said = (_PROTOCOL,) if packet and packet != _SIGN else ()
         packet[:] = (byte,)
@@ -116,7 +115,7 @@ class CommandParser:
         return said + self._go_on()
 
     def _go_on(self) -> tuple[ParsedCommand, ...]:
-        """Look whether the command is complete, or how long it must be for another look."""
+        """Check whether the command is complete, or when to check again."""
         packet, head = self._packet, 1
         if packet[0] == MINI_SSC:
             return self._finished(MINI_SSC, head)
@@ -134,7 +133,7 @@ class CommandParser:
             return (_PROTOCOL,)
         self._until = head + self._known[code] + self.crc
         if code == SET_TARGETS:
-            # How long it is stands in its first byte.
+            # Its first byte gives its length.
             self._until = self._until + 2 * packet[head] if len(packet) > head else head + 1
         return self._finished(code, head) if len(packet) >= self._until else ()
 
@@ -158,7 +157,7 @@ def word(low: int, high: int) -> int:
 
 
 def crc7(data: bytes) -> int:
-    """Return the check of a command: CRC-7 with the polynomial 91 hex, lowest bit first."""
+    """Return the checksum of a command: CRC-7 with the polynomial 91 hex, lowest bit first."""
     rest = 0
     for byte in data:
         rest ^= byte

@@ -1,4 +1,4 @@
-"""What can go wrong with an emulated Maestro and its servos, beside all that can on its line."""
+"""Faults of an emulated Maestro and its servos, in addition to those of its line."""
 
 from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, one_of
 from gazerig.sim_mock.faults.hobby import HobbyBoard, HobbyFaults, channel_word, hobby_verbs
@@ -8,23 +8,23 @@ from gazerig.sim_mock.maestro.settings import cases
 
 
 class MaestroFaults(HobbyFaults):
-    """The faults of one board; an id is a channel."""
+    """Faults of one board; an id is a channel."""
 
     def __init__(
         self, board: HobbyBoard, body: MaestroBody, commands: CommandTable, seed: int = 0
     ) -> None:
-        # A Maestro's packets begin with AA: what a loose header and a broken node send.
+        # A Maestro's packets begin with AA: a loose header and a babbling node send it.
         super().__init__(board, commands, seed, header=b"\xaa")
         self._body = body
 
     def error(self, name: str) -> str:
-        """Let the board find an error: its channels do as they are set to do then."""
+        """Register an error on the board; its channels react as configured."""
         self._body.advance()
         self._body.fail(name)
         return f"the board has found an error: {name}"
 
     def script(self, what: int | bool) -> str:
-        """Let a script run that does nothing, or swings a channel, or end it (False)."""
+        """Start a script that does nothing or swings a channel, or end it (False)."""
         if what is False:
             self._body.advance()
             self._body.stop_script()
@@ -37,7 +37,7 @@ class MaestroFaults(HobbyFaults):
         return f"a script swings channel {what} from end to end"
 
     def board(self) -> dict[str, object]:
-        """Return the errors found and not yet asked for, and whether a script runs."""
+        """Return the unread errors, and whether a script runs."""
         named = [name for bit, name in enumerate(ERRORS) if self._body.errors >> bit & 1]
         return {"errors": named, "script": self._body.script_running}
 
@@ -54,7 +54,7 @@ OWN: dict[str, Verb] = {
     "error": Verb(MaestroFaults.error, (Argument("NAME", one_of(*ERRORS)),),
                   f"the board finds an error: {', '.join(ERRORS)}"),
     "script": Verb(MaestroFaults.script, (Argument("on|off|ID", _script),),
-                   "a script runs; with a channel it swings that from end to end"),
+                   "a script runs; with a channel it swings this from end to end"),
 }
 # fmt: on
 

@@ -1,8 +1,8 @@
-"""What an emulated Maestro is set to: what Pololu's own program sets over USB on a real one.
+"""Configuration of an emulated Maestro, which Pololu's own program sets over USB on a real one.
 
-Source: Pololu Maestro User's Guide (0J40), sections 4.b and 5.a. On a real board one
-setting per channel says what happens at start and on an error; here all channels have the
-same, and the two can differ.
+Source: Pololu Maestro User's Guide (0J40), sections 4.b and 5.a. On a real board one setting per
+channel defines its reaction to start and error; here all channels have the same, and the two can
+differ.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ OnError = Literal["off", "home", "ignore"]
 Startup = Literal["off", "home"]
 
 FIXED_BAUD = 9600
-"""Rate of the serial pins where none was chosen."""
+"""Rate of the serial pins by default."""
 LONGEST_TIMEOUT_MS = 655_350.0
 LOWEST_US, HIGHEST_US = 64.0, 3280.0
 US = 4
@@ -21,17 +21,17 @@ US = 4
 
 @dataclass(frozen=True)
 class Settings:
-    """The choices.
+    """Settings of a board.
 
-    mode: where the host is and what the board makes of it. At its USB command port with
-        usb-dual-port or usb-chained any rate works; at its serial pins with
-        uart-fixed only one at its rate, with uart-detect one that has sent AA; mute is the
-        USB command port of a board in either uart mode: what is sent there is ignored.
-    crc: a CRC is expected behind every command but those of the Mini SSC protocol
-    timeout_s: so long without a valid command is an error; 0: never
-    on_error, startup: what all channels do then; home_steps: where home is
+    mode: port of the host and its use. At the USB command port with usb-dual-port or usb-chained
+        any rate works; at the serial pins with uart-fixed only its rate, with uart-detect the rate
+        of a client that has sent AA; mute is the USB command port of a board in either uart mode,
+        which ignores all bytes.
+    crc: whether a CRC is expected after every command except those of the Mini SSC protocol
+    timeout_s: time without a valid command that is an error; 0: never
+    on_error, startup: reaction of all channels; home_steps: the home position
     baud: of uart-fixed
-    speed, acceleration: limits of every channel from the start on, in the board's units
+    speed, acceleration: initial limits of every channel, in the board's units
     """
 
     mode: Mode = "usb-dual-port"
@@ -46,7 +46,7 @@ class Settings:
 
 
 MOST = {"speed": 3968, "acceleration": 255}
-"""Largest limits that a board keeps; 0: none."""
+"""Largest limits of a board; 0: none."""
 
 _WORDS: dict[str, tuple[str, ...]] = {
     "mode": get_args(Mode),
@@ -72,18 +72,18 @@ def cases() -> dict[str, str]:
 
 
 def chosen(settings: Settings, case: str, value: str) -> Settings:
-    """Return the settings with one case decided otherwise.
+    """Return the settings with a new value for one case.
 
     Raises:
-        ValueError: there is no such case or value.
+        ValueError: the case or value is unknown.
     """
     if case in _WORDS:
         if value not in _WORDS[case]:
-            raise ValueError(f"{case} {value!r}: it can be {', '.join(_WORDS[case])}")
+            raise ValueError(f"{case} {value!r}: expected {', '.join(_WORDS[case])}")
         return replace(settings, **{case.replace("-", "_"): value})  # type: ignore[arg-type]
     if case == "crc":
         if value not in ("on", "off"):
-            raise ValueError(f"crc {value!r}: it can be on, off")
+            raise ValueError(f"crc {value!r}: expected on or off")
         return replace(settings, crc=value == "on")
     if case == "timeout-ms":
         return replace(settings, timeout_s=_timeout_ms(value) / 1000.0)
@@ -93,7 +93,7 @@ def chosen(settings: Settings, case: str, value: str) -> Settings:
         if not value.isdecimal() or int(value) > MOST[case]:
             raise ValueError(f"{case} {value!r}: not a whole number from 0 to {MOST[case]}")
         return replace(settings, **{case: int(value)})  # type: ignore[arg-type]
-    raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases())}")
+    raise ValueError(f"set {case!r}: unknown; expected {', '.join(cases())}")
 
 
 def _timeout_ms(value: str) -> float:
@@ -107,10 +107,10 @@ def _timeout_ms(value: str) -> float:
 
 
 def width_steps(case: str, value: str) -> int:
-    """Read a pulse width in microseconds; return quarter microseconds.
+    """Parse a pulse width in microseconds; return quarter microseconds.
 
     Raises:
-        ValueError: it is none that the board can send.
+        ValueError: the board cannot send it.
     """
     number = _number(value)
     if not LOWEST_US <= number <= HIGHEST_US:

@@ -14,7 +14,7 @@ STEPS_S = 100
 US_STEPS = 4
 GENERAL_CALL, SOFTWARE_RESET = 0x00, b"\x06"
 STRANGE = 0xA5
-"""What a chip of another kind answers, whatever it is asked."""
+"""Answer of a chip of another kind to every read."""
 
 
 class NotAcknowledged(Exception):
@@ -22,7 +22,7 @@ class NotAcknowledged(Exception):
 
 
 class BusStuck(Exception):
-    """The lines do not go high: the adapter gives up."""
+    """The lines stay low, and the adapter times out."""
 
 
 def _wired_and(*bytes_at_once: int) -> int:
@@ -34,11 +34,11 @@ class Pca9685Body:
 
     Args:
         chips: by their addresses.
-        servos: sixteen a board, in the order of the boards.
+        servos: sixteen per board, in the order of the boards.
 
-    servo_power: the servos have their supply
-    stuck: a device holds the data line low
-    absent: boards are not there; foreign: a chip of another kind is in their place
+    servo_power: whether the servos have their supply
+    stuck: whether a device holds the data line low
+    absent: whether the boards are missing; foreign: whether chips of another kind replace them
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Pca9685Body:
 
         Raises:
             NotAcknowledged: no device has this address.
-            BusStuck: the lines do not go high.
+            BusStuck: the lines stay low.
         """
         self.advance()
         if self.stuck:
@@ -81,7 +81,7 @@ class Pca9685Body:
         """Return the chips that answer at an address.
 
         Raises:
-            NotAcknowledged: there is none.
+            NotAcknowledged: no chip has it.
         """
         chips = [c for own, c in self.chips.items() if address in (own, *c.further_addresses)]
         if self.absent or not chips:
@@ -93,7 +93,7 @@ class Pca9685Body:
 
         Raises:
             NotAcknowledged: no device has this address.
-            BusStuck: the lines do not go high.
+            BusStuck: the lines stay low.
         """
         self.advance()
         if self.stuck:
@@ -101,11 +101,11 @@ class Pca9685Body:
         chips = self._addressed(address)
         if self.foreign:
             return bytes([STRANGE] * length)
-        # Where several answer at once a 0 of any pulls the line down.
+        # If several chips answer simultaneously, a 0 of any chip pulls the line down.
         return bytes(map(_wired_and, *(chip.read(length) for chip in chips)))
 
     def restart(self) -> None:
-        """Restart all boards as a dip of their supply makes it."""
+        """Restart all boards as after a dip of their supply."""
         self.advance()
         for chip in self.chips.values():
             chip.reset()
@@ -115,16 +115,16 @@ class Pca9685Body:
 
     @staticmethod
     def _steps(now_s: float) -> int:
-        # The margin keeps .03 s from being two steps.
+        # The margin keeps 0.03 s from being two steps.
         return int(now_s * STEPS_S + 1e-3)
 
     def width_steps(self, place: int, now_s: float) -> int:
-        """Return the pulses that truly leave a channel, quarter microseconds; 0: none."""
+        """Return the true pulses of a channel, quarter microseconds; 0: none."""
         chip, channel = self._outputs[place]
         return round(chip.width_s(channel, now_s) * 1e6 * US_STEPS)
 
     def advance(self) -> None:
-        """Let time pass up to now."""
+        """Advance to the present time."""
         until = self._steps(self.now_s())
         while self._step < until:
             if self._at_rest():
@@ -134,7 +134,7 @@ class Pca9685Body:
             self._pass(self._step)
 
     def _settle(self) -> None:
-        """Let pulses that have ended end at once: a servo gets none from then on."""
+        """End pulses that have ended immediately: a servo gets none from then on."""
         now_s = self.now_s()
         for place, servo in enumerate(self.servos):
             if servo.width_steps and not self._pulse_steps(place, now_s):

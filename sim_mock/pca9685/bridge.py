@@ -1,9 +1,9 @@
-"""The host's end of an emulated I2C bus: commands as bytes in, what they answer out.
+"""The host's end of an emulated I2C bus: command bytes in, answers out.
 
-Commands are those of NXP's SC18IM700, a bridge from a serial line to I2C: S, the address with
-its direction bit, a count and, of a write, so many bytes; further S are further starts; P ends
-it. R, a register, P reads a register of the bridge's own: how the last transfer ended. Source:
-NXP, SC18IM700 data sheet, rev. 2 (10 August 2007).
+Commands are those of NXP's SC18IM700, a bridge from a serial line to I2C: S, the address with its
+direction bit, a count and, for a write, its bytes; further S are further starts; P ends it. R, a
+register, P reads a register of the bridge: the status of the last transfer. Source: NXP,
+SC18IM700 data sheet, rev. 2 (10 August 2007).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +24,7 @@ OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
 
 
 class _Part(NamedTuple):
-    """One start of a transfer; length: of a read, None where it is a write."""
+    """One start of a transfer; length: of a read, None for a write."""
 
     address: int
     data: bytes
@@ -32,7 +32,7 @@ class _Part(NamedTuple):
 
 
 class Bridge:
-    """One bus behind a bridge; a servo's id is sixteen times its board's number and its channel.
+    """One bus behind a bridge; a servo's id is sixteen times its board's number plus its channel.
 
     Args:
         servos: sixteen for each board.
@@ -59,20 +59,20 @@ class Bridge:
         self._pointers: dict[int, int] = {}
         self.check_baud = False
 
-    # --- what it is
+    # --- device interface
 
     def at_baud(self, client_baud: int) -> bool:
-        """Return True: it takes any baud rate."""
+        """Return True, because it accepts any baud rate."""
         return True
 
     def choose(self, case: str, value: str) -> None:
-        """Choose what the boards are like.
+        """Change a property of the boards.
 
         Raises:
-            ValueError: there is no such case or value.
+            ValueError: the case or value is unknown.
         """
         if case not in CASES:
-            raise ValueError(f"set {case!r}: unknown; there is {', '.join(CASES)}")
+            raise ValueError(f"set {case!r}: unknown; expected {', '.join(CASES)}")
         try:
             mhz = float(value)
         except ValueError:
@@ -84,26 +84,26 @@ class Bridge:
             chip.oscillator_hz = mhz * 1e6
 
     def restart(self) -> None:
-        """Restart the boards as a dip of their supply makes it."""
+        """Restart the boards as after a dip of their supply."""
         self.body.restart()
 
     def here(self, place: int) -> HobbyServo:
-        """Return the servo of a channel, brought up to now.
+        """Return the servo of a channel, advanced to the present time.
 
         Raises:
-            KeyError: there is no such channel.
+            KeyError: the channel does not exist.
         """
         self.body.advance()
         if not 0 <= place < len(self.body.servos):
-            raise KeyError(f"no channel {place}; there is 0 to {len(self.body.servos) - 1}")
+            raise KeyError(f"no channel {place}; channels are 0 to {len(self.body.servos) - 1}")
         return self.body.servos[place]
 
     def channel_report(self, channel: int) -> dict[str, object]:
-        """Return what a channel sends, quarter microseconds."""
+        """Return the output of a channel, quarter microseconds."""
         return {"target": self.body.width_steps(channel, self.now_s())}
 
     def positions_steps(self) -> tuple[float, ...]:
-        """Return where the shafts truly are now, in quarter microseconds, by channel."""
+        """Return the true positions of the shafts now, in quarter microseconds, by channel."""
         self.body.advance()
         return tuple(servo.place_steps for servo in self.body.servos)
 
@@ -124,7 +124,7 @@ class Bridge:
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _commands(self, came: bytes) -> Iterator[tuple[int, list[Piece]]]:
-        """Carry out every whole command; what is not whole waits for its rest."""
+        """Execute every complete command; an incomplete one waits for the rest."""
         kept, at = len(self._unread), 0
         text = self._unread + came
         while at < len(text):
@@ -142,11 +142,11 @@ class Bridge:
                 at, parts = found
                 yield at - kept, self._sent(self._carry_out(parts))
             else:
-                at += 1  # no command begins so
+                at += 1  # not a command: skip the byte
         self._unread = text[at:]
 
     def _sent(self, pieces: list[Piece]) -> list[Piece]:
-        """Return an answer as it arrives; faults of one channel spoil only its own registers."""
+        """Return an answer as it arrives; faults of one channel affect only its registers."""
         if not self._wire.any or not pieces:
             return pieces
         now_s = self.now_s()
@@ -154,7 +154,7 @@ class Bridge:
         return self._wire.spoil_pieces(left, False, now_s)
 
     def _carry_out(self, parts: Sequence[_Part]) -> list[Piece]:
-        """Carry out one transfer; the first part that fails ends it."""
+        """Execute one transfer; the first part that fails ends it."""
         self._status = OK
         now_s, said = self.now_s(), []
         if self._wire.any:
@@ -184,7 +184,7 @@ class Bridge:
         return said
 
     def _whose(self, part: _Part) -> int:
-        """Return the channel whose registers are read, NO_DEVICE where it is not one's alone."""
+        """Return the channel whose registers are read, NO_DEVICE unless it is exactly one."""
         register = self._pointers.get(part.address, 0) - LED0
         if part.length != 4 or register % 4 or not 0 <= register < 4 * CHANNELS:
             return NO_DEVICE
@@ -192,7 +192,7 @@ class Bridge:
 
 
 def _transfer(text: bytes, at: int) -> tuple[int, list[_Part]] | None:
-    """Return where a transfer ends and its parts, None while bytes are missing."""
+    """Return the end of a transfer and its parts, None while bytes are missing."""
     parts: list[_Part] = []
     while True:
         if at >= len(text):
@@ -200,7 +200,7 @@ def _transfer(text: bytes, at: int) -> tuple[int, list[_Part]] | None:
         if text[at] == STOP:
             return at + 1, parts
         if text[at] != START:
-            return at + 1, []  # broken: it is dropped
+            return at + 1, []  # malformed: it is dropped
         if len(text) < at + 3:
             return None
         address, count = text[at + 1], text[at + 2]
@@ -228,10 +228,10 @@ def build_bridge(
         ValueError: such boards or servos do not exist.
     """
     if not addresses or len(set(addresses)) < len(addresses):
-        raise ValueError(f"every board needs an address of its own; there is {list(addresses)}")
+        raise ValueError(f"every board needs its own address; given {list(addresses)}")
     for address in addresses:
         if not 0x40 <= address <= 0x7F:
-            raise ValueError(f"address {address:#x}: a PCA9685 has one from 0x40 to 0x7f")
+            raise ValueError(f"address {address:#x}: a PCA9685 has 0x40 to 0x7f")
     count = CHANNELS * len(addresses)
     built = build_servos(servos, count, make_servo)
     return Bridge(built, now_s, addresses, oscillator_hz, seed)

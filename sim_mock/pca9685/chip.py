@@ -1,29 +1,30 @@
 """An emulated PCA9685, register by register: from written registers to pulses.
 
-Left out: inverted and open-drain outputs (kept, no effect), the output enable pin (tied to
-ground), an external clock (there is none, so choosing it ends the pulses), and that reserved
-registers are not acknowledged (here they take nothing). Source: NXP, PCA9685 data sheet, rev. 4
-(16 April 2015): 7.1.2 and 7.3.7 All Call, 7.3.1.1 restart, 7.3.3 full on and off, 7.5 power-on
-reset, 7.6 software reset, notes below table 4 on auto-increment and the prescaler; [A] is assumed.
+Omitted: inverted and open-drain outputs (stored, no effect), the output enable pin (tied to
+ground), an external clock (not connected, so choosing it ends the pulses), and the missing
+acknowledgement of reserved registers (here they ignore writes). Source: NXP, PCA9685 data sheet,
+rev. 4 (16 April 2015): 7.1.2 and 7.3.7 All Call, 7.3.1.1 restart, 7.3.3 full on and off, 7.5
+power-on reset, 7.6 software reset, notes below table 4 on auto-increment and the prescaler; [A]
+is assumed.
 """
 
 MODE1, MODE2, SUBADR1, ALLCALLADR = 0x00, 0x01, 0x02, 0x05
 LED0 = 0x06
 LAST_IN_TURN = 0x45
-"""Behind it, and behind the prescaler, auto-increment begins at 0 again."""
+"""After it, and after the prescaler, auto-increment continues at 0."""
 ALL_LED, PRESCALE, TEST_MODE = 0xFA, 0xFE, 0xFF
 
 RESTART, EXTCLK, AI, SLEEP, ALLCALL = 0x80, 0x40, 0x20, 0x10, 0x01
 SUBADDRESSES = (0x08, 0x04, 0x02)
-"""Bits of MODE1 that let it answer at SUBADR1 to 3."""
+"""Bits of MODE1 that enable SUBADR1 to 3."""
 OCH = 0x08
 FULL = 0x10
-"""In the high byte of ON or OFF: all the time; OFF goes before ON."""
+"""In the high byte of ON or OFF: all the time; OFF has priority."""
 
 CHANNELS, COUNTS = 16, 4096
 LEAST_PRESCALE = 3
 START_S = 500e-6
-"""From the end of sleep until the oscillator is steady."""
+"""Time from the end of sleep until the oscillator is stable."""
 
 NOMINAL_HZ = 25e6
 
@@ -32,8 +33,8 @@ class Chip:
     """One chip.
 
     Args:
-        oscillator_hz: of its own oscillator, which differs from the nominal 25 MHz by some
-            percent from chip to chip.
+        oscillator_hz: of its own oscillator, which differs from the nominal 25 MHz by a few percent
+            between chips.
     """
 
     def __init__(self, oscillator_hz: float = NOMINAL_HZ) -> None:
@@ -59,7 +60,7 @@ class Chip:
 
     @property
     def further_addresses(self) -> tuple[int, ...]:
-        """Return where it answers beside its own address: of several boards, and of all."""
+        """Return the further addresses that it answers: of groups of boards, and of all."""
         bits = (*SUBADDRESSES, ALLCALL)
         mode, named = self._registers[MODE1], self._registers[SUBADR1 : ALLCALLADR + 1]
         return tuple(byte >> 1 for bit, byte in zip(bits, named, strict=True) if mode & bit)
@@ -75,10 +76,10 @@ class Chip:
             self._show()
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one read, from the register that was chosen last."""
+        """Return the bytes of one read, from the register that was selected last."""
         found = bytearray()
         for _ in range(length):
-            # What is written to all channels at once cannot be read.
+            # Registers that write to all channels cannot be read.
             unreadable = ALL_LED <= self._pointer < PRESCALE
             found.append(0 if unreadable else self._registers[self._pointer])
             self._step()
@@ -102,18 +103,19 @@ class Chip:
                 self._set_output(4 * channel + register - ALL_LED, byte)
         elif register < LED0:
             self._registers[register] = byte
-        # The test mode and the reserved registers take nothing.
+        # The test mode and the reserved registers ignore writes.
 
     def _set_mode(self, byte: int, now_s: float) -> None:
         before = self._registers[MODE1]
-        # Awake for .5 ms first: the same write that ends the sleep restarts nothing.
+        # Awake for 0.5 ms first: the write that ends the sleep does not restart the outputs.
         if byte & RESTART and not (byte | before) & SLEEP and now_s >= self._awake_s:
             self._held_back = False
         if byte & SLEEP and not before & SLEEP and self._gives_any():
             self._held_back = True
         if before & SLEEP and not byte & SLEEP:
             self._awake_s = now_s + START_S
-        # The external clock is chosen asleep, by both bits at once, and until the next reset.
+        # The external clock is selected asleep, by both bits in one write, and until the next
+        # reset.
         clock = EXTCLK if before & EXTCLK or (before & byte & SLEEP and byte & EXTCLK) else 0
         self._registers[MODE1] = byte & ~(RESTART | EXTCLK) | clock
         self._mark_restart()
@@ -129,7 +131,7 @@ class Chip:
             self._show()
 
     def _show(self) -> None:
-        """Let the outputs take what was written; what a sleep has held back goes on as well."""
+        """Update the outputs from the registers; outputs stopped by a sleep restart as well."""
         self._shown = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
         self._staged = False
         if self._held_back and not self._registers[MODE1] & SLEEP:
@@ -147,7 +149,7 @@ class Chip:
         return (self._registers[PRESCALE] + 1) * COUNTS / self.oscillator_hz
 
     def counts(self, channel: int) -> int:
-        """Return the width that is set, in 4096ths of a period, whether it is awake or not."""
+        """Return the configured width, in 4096ths of a period, awake or not."""
         on_low, on_high, off_low, off_high = self._shown[4 * channel : 4 * channel + 4]
         if off_high & FULL:
             return 0
@@ -157,7 +159,7 @@ class Chip:
         return (off - on) % COUNTS
 
     def width_s(self, channel: int, now_s: float) -> float:
-        """Return how long the pulses of a channel truly are; 0: there are none."""
+        """Return the true length of a channel's pulses; 0: none."""
         mode = self._registers[MODE1]
         if mode & (SLEEP | EXTCLK) or self._held_back or now_s < self._awake_s:
             return 0.0

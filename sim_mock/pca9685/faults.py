@@ -1,4 +1,4 @@
-"""What can go wrong with emulated PCA9685 boards and their servos, beside all on the line."""
+"""Faults of emulated PCA9685 boards and their servos, in addition to those of the line."""
 
 from gazerig.sim_mock.faults.grammar import SWITCH, TIME, Argument, CommandTable, Verb, count
 from gazerig.sim_mock.faults.hobby import channel_word, hobby_verbs
@@ -11,9 +11,9 @@ OWN: dict[str, Verb] = {
     "nack": Verb(times("nack", "transfers are not acknowledged"), (Argument("N", count, True),),
                  "the next N transfers are not acknowledged", TIME),
     "stuck": Verb(switched("stuck", "the bus is stuck"), (SWITCH,),
-                  "the data line is held down: no transfer is possible", TIME),
+                  "the data line is held low: no transfer is possible", TIME),
     "absent": Verb(switched("absent", "the boards are off the bus"), (SWITCH,),
-                   "the boards are off the bus, pulses go on", TIME),
+                   "the boards are off the bus, pulses continue", TIME),
     "foreign": Verb(switched("foreign", "another chip answers"), (SWITCH,),
                     "chips of another kind answer", TIME),
 }

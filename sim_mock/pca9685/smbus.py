@@ -12,12 +12,12 @@ LONGEST_BLOCK = 32
 
 
 class EmulatedSMBus:
-    """An opened bus; errors are those of the kernel's drivers.
+    """An open bus; errors are those of the kernel's drivers.
 
     Args:
         body: boards and servos.
 
-    gone: the adapter was unplugged
+    gone: whether the adapter was unplugged
     """
 
     def __init__(self, body: Pca9685Body) -> None:
@@ -26,7 +26,7 @@ class EmulatedSMBus:
         self.gone = False
 
     def i2c_rdwr(self, *messages: Any) -> None:
-        """Carry out smbus2's messages as one transfer."""
+        """Execute smbus2's messages as one transfer."""
         for message in messages:
             if message.flags & READ_FLAG:
                 data = self._read(message.addr, message.len)
@@ -45,20 +45,20 @@ class EmulatedSMBus:
         return self._read(address, 1)[0]
 
     def write_i2c_block_data(self, address: int, register: int, data: Sequence[int]) -> None:
-        """Write up to 32 bytes from a register on.
+        """Write up to 32 bytes, starting at a register.
 
         Raises:
-            ValueError: there are more.
+            ValueError: there are more than 32.
         """
         if len(data) > LONGEST_BLOCK:
             raise ValueError(f"a block holds {LONGEST_BLOCK} bytes at most, not {len(data)}")
         self._write(address, bytes((register, *data)))
 
     def read_i2c_block_data(self, address: int, register: int, length: int) -> list[int]:
-        """Read up to 32 bytes from a register on.
+        """Read up to 32 bytes, starting at a register.
 
         Raises:
-            ValueError: more are asked for.
+            ValueError: more than 32 are requested.
         """
         if length > LONGEST_BLOCK:
             raise ValueError(f"a block holds {LONGEST_BLOCK} bytes at most, not {length}")

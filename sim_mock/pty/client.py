@@ -20,7 +20,7 @@ STOP_S = 2.0
 
 
 def has_terminals() -> bool:
-    """Return whether this system has the pseudo-terminals that servos are emulated on: Linux."""
+    """Return whether this system has the pseudo-terminals for emulated servos: Linux."""
     try:
         import gazerig.sim_mock.pty.terminal  # noqa: F401
     except ImportError:
@@ -29,18 +29,18 @@ def has_terminals() -> bool:
 
 
 class SentSurroundings(Protocol):
-    """Surroundings that the server's process makes."""
+    """Surroundings that the server's process creates."""
 
     @property
     def make(self) -> str:
-        """Return "module:function", which makes a ``server.ServedSurroundings``.
+        """Return "module:function", which creates a ``server.ServedSurroundings``.
 
-        It gets the folder, and what returns the host's time in seconds.
+        Its arguments are the folder and a function that returns the host's time in seconds.
         """
         ...
 
     def write(self, folder: Path) -> None:
-        """Write into a folder what that function needs."""
+        """Write the data of that function into a folder."""
         ...
 
 
@@ -52,13 +52,13 @@ class _Served:
         self._folder: ServedFolder | None = None
         self._asking = threading.Lock()
         self.joints: list[dict[str, int]] = []
-        """Place of each rig's joints in the state of the surroundings; [] without these."""
+        """Index of each rig's joints in the state of the surroundings; [] without these."""
 
     def _start(
         self, buses: Sequence[Mapping[str, object]], surroundings: SentSurroundings | None = None
     ) -> list[str]:
-        """Start it for these settings of buses; return the path of each."""
-        from gazerig.sim_mock.pty.served_folder import ServedFolder  # where there are terminals
+        """Start it with these settings of buses; return the path of each."""
+        from gazerig.sim_mock.pty.served_folder import ServedFolder  # Linux only
 
         self._folder = ServedFolder()
         folder = self._folder.path
@@ -70,7 +70,7 @@ class _Served:
             more["surroundings"] = {"make": surroundings.make, "folder": str(folder)}
         settings = json.dumps({"buses": linked, "until_eof": True, **more})
         self._server = child_process.start(
-            # The servos must outlive their client's way out: they end when their input does.
+            # The servos must outlive their client's shutdown: they end when their input does.
             "gazerig.sim_mock.pty.server",
             settings,
             stdin=subprocess.PIPE,
@@ -103,12 +103,12 @@ class _Served:
         return self._server.pid
 
     def command(self, text: str, bus: str = "") -> str:
-        """Carry out a fault command in the server, on the bus of this name; return what it did.
+        """Run a fault command in the server, on the bus of this name; return its description.
 
         May be called from any thread.
 
         Raises:
-            ValueError: names the word that is wrong and what would be right.
+            ValueError: the command is invalid; the message names the wrong word and valid ones.
             RuntimeError: the server is not running.
         """
         if self._server is None or self._server.stdin is None:
@@ -144,7 +144,7 @@ class _Served:
             self._folder = None
 
     def __enter__(self) -> Self:
-        """Nothing is started before ``start``."""
+        """Return this object; ``start`` starts the server."""
         return self
 
     def __exit__(self, *raised: object) -> None:
@@ -153,7 +153,7 @@ class _Served:
 
 
 class PtyBus(_Served):
-    """One emulated bus in a process of its own, and the terminal it is on."""
+    """One emulated bus in its own process, and its terminal."""
 
     def start(
         self,
@@ -165,7 +165,7 @@ class PtyBus(_Served):
     ) -> str:
         """Start a server for Dynamixel servos; return the path to open as a serial port.
 
-        The rest as for ``start_device``.
+        The other arguments are those of ``start_device``.
         """
         line = DynamixelLine(tuple(ServoSpec(*spec) for spec in specs), baud)
         return self.start_device(line, wire_time, turnaround_us, choices)
@@ -180,7 +180,7 @@ class PtyBus(_Served):
     ) -> str:
         """Start a server for servos or a board; return the path to open as a serial port.
 
-        The path stays the same over ``unplug`` and ``plug``. The rest as in
+        The path does not change with ``unplug`` and ``plug``. The other arguments are those of
         gazerig.sim_mock.pty.line.BusSettings.
 
         Raises:
@@ -198,19 +198,19 @@ class PtyBus(_Served):
 
 
 class PtyBuses(_Served):
-    """All emulated buses of a rig, or of several in one place, in one process of their own."""
+    """All emulated buses of a rig, or of several rigs in one world, in one process."""
 
     def start(
         self, devices: Mapping[str, Emulated], surroundings: SentSurroundings | None = None
     ) -> dict[str, str]:
-        """Start a server for what is on every bus; return the path of each, by the same names.
+        """Start a server for the devices of every bus; return the path of each, by the same names.
 
         Args:
             devices: by the name of their bus.
-            surroundings: in which all their servos are; None: each has mechanics of its own.
+            surroundings: surroundings of all their servos; None: each has its own mechanics.
 
         Raises:
-            SetupError: the surroundings cannot be used; says why.
+            SetupError: the surroundings cannot be used; the message gives the reason.
             RuntimeError: the server did not start; its message is on standard error.
         """
         return self.start_rigs([("", devices)], surroundings)[0]
@@ -220,15 +220,15 @@ class PtyBuses(_Served):
         rigs: Sequence[tuple[str, Mapping[str, Emulated]]],
         surroundings: SentSurroundings | None = None,
     ) -> list[dict[str, str]]:
-        """Start a server for the buses of several rigs in one place; return the paths of each.
+        """Start a server for the buses of several rigs in one world; return the paths of each.
 
         Args:
-            rigs: in the surroundings' order: a name, "" for the first, which is before the names
-                of its buses in commands, and what is on its buses.
+            rigs: in the surroundings' order: a name, "" for the first, which precedes the names of
+                its buses in commands, and the devices of its buses.
             surroundings: as for ``start``.
 
         Raises:
-            SetupError: as ``start``, or two buses would have one name.
+            SetupError: as ``start``, or two buses have the same name.
             RuntimeError: as ``start``.
         """
         places = [(number, bus) for number, (_, devices) in enumerate(rigs) for bus in devices]

@@ -13,28 +13,28 @@ from gazerig.sim_mock.pty.terminal import Terminal
 from gazerig.sim_mock.wire import ServoLine
 
 PACKET_GAP, GAP_MS = "packet-gap-ms", 50.0
-"""On a real line 1.5 ms; here the host's scheduler may tear a packet apart for longer."""
+"""1.5 ms on a real line; here the host's scheduler may split a packet for longer."""
 
 SPIN_S = 0.0001
-"""The kernel wakes a sleeper up to so late: the rest until bytes are due is spun away."""
+"""Largest delay of the kernel's wake-up: the last part of a wait is a busy loop."""
 
 IDLE_S = 0.5
-"""So often it is looked whether a signal came, while nothing else happens."""
+"""Interval of checks for signals while nothing else happens."""
 LOOK_S = 0.005
-"""How often faults that end by themselves are looked at."""
+"""Interval of checks for faults that end by time."""
 
 
 @dataclass(frozen=True)
 class BusSettings:
-    """What to emulate on one terminal.
+    """Settings of one emulated bus on a terminal.
 
-    device: its specification; clients at another baud rate than its own get no answer
+    device: its specification; clients at a baud rate other than its own get no answer
     name: of this bus among several in one process; None: it is the only one
     wire_time, turnaround_us: as in gazerig.sim_mock.wire
     link: name under which the terminal can be opened, also after it was unplugged
     choices: cases of the device by name
     seed: of the random numbers that faults draw
-    rig: which rig of a world it belongs to; rig_bus: its name there, None: the same name
+    rig: index of its rig in a world; rig_bus: its name in the rig, None: the same name
     """
 
     device: Emulated
@@ -52,14 +52,14 @@ class TerminalLine:
     """Passes bytes between a terminal and a device.
 
     Args:
-        settings: what to emulate, and how.
+        settings: the device and its line.
         now_s: the clock of device and line.
-        say: gets the bus's new path as JSON when it was plugged in again without a link.
+        say: receives the bus's new path as JSON when it is plugged in again without a link.
         warn: called once for each wrong baud rate of a client.
-        device: built already; None: it is built of its specification, with mechanics of its own.
+        device: a device; None: it is built from its specification, with its own mechanics.
 
     Raises:
-        ValueError, OSError: the settings cannot be met.
+        ValueError, OSError: the settings are invalid.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class TerminalLine:
         """Whether a client has sent anything yet."""
 
     def where(self) -> str:
-        """Return as JSON the path to open, the baud rate, and the name where there is one."""
+        """Return the path to open, the baud rate, and the name, if it has one, as JSON."""
         return self.labelled({"path": self.terminal.path, "baud": self.settings.device.baud})
 
     def labelled(self, message: Mapping[str, object]) -> str:
@@ -99,19 +99,19 @@ class TerminalLine:
     # --- bytes
 
     def watched(self) -> list[int]:
-        """Return the files that become readable when there is something to do."""
+        """Return the files that become readable when ``serve`` is needed."""
         watch = self.terminal.watch
         return [fd for fd in (self.terminal.master, -1 if watch is None else watch.fd) if fd >= 0]
 
     def wait_s(self) -> float:
-        """Return how long to sleep if nothing arrives."""
+        """Return how long to sleep unless bytes arrive, in seconds."""
         due_s = self.line.next_due_s()
         if due_s is not None:
             return max(0.0, due_s - SPIN_S - self._now_s())
         return LOOK_S if self.device.faults.wire.any else IDLE_S
 
     def serve(self, ready: Collection[int], now_s: float) -> None:
-        """Do what there is to do; ``ready``: the files that are readable since ``now_s``."""
+        """Process all that is due; ``ready``: the files that are readable since ``now_s``."""
         watch = self.terminal.watch
         if watch is not None and watch.fd in ready and watch.look():
             self.terminal.release()
@@ -125,7 +125,7 @@ class TerminalLine:
             self._plug()
 
     def _take_bytes(self, now_s: float) -> None:
-        """Return the client's bytes to the line, and back what is answered at once."""
+        """Pass the client's bytes to the line, and send answers that are due immediately."""
         data = self.terminal.read()
         self.heard = self.heard or bool(data)
         careful = self.device.check_baud or self.line.wire_time
@@ -137,7 +137,7 @@ class TerminalLine:
             self._warn_of(baud, self._warn)
 
     def _deliver(self) -> None:
-        """Write bytes that are due; the last 0.1 ms before that is waited for by spinning."""
+        """Write bytes that are due; the last 0.1 ms of the wait is a busy loop."""
         due_s = self.line.next_due_s()
         if due_s is not None:
             if due_s - self._now_s() > SPIN_S:
@@ -149,7 +149,7 @@ class TerminalLine:
             self.terminal.write(data)
 
     def _warn_of(self, baud: int, warn: Callable[[str], None]) -> None:
-        """Warn once for each baud rate that a client uses a wrong one."""
+        """Warn of a client's wrong baud rate, once for each rate."""
         if baud == self._warned or self.device.at_baud(baud):
             return
         self._warned = baud
@@ -190,7 +190,7 @@ class TerminalLine:
     # --- commands
 
     def obey(self, text: str) -> str:
-        """Carry out a fault command; return {"ok": ...} or {"error": ...} as JSON."""
+        """Run a fault command; return {"ok": ...} or {"error": ...} as JSON."""
         try:
             done = self.device.faults.command(text)
         except ValueError as error:

@@ -1,14 +1,14 @@
-"""Emulated servos and boards on pseudo-terminals, in a process of their own.
+"""Emulated servos and boards on pseudo-terminals, in their own process.
 
 ``python -m gazerig.sim_mock.pty.server '{"buses": [{"device": {"kind": "dynamixel", "servos":
-[[1, "xl330-m077", 2048]]}}]}'`` prints one JSON line a bus with its terminal's path and
-serves clients that come and go. It takes commands as lines on standard input and answers
-each with one JSON line: {"ok": ...} or {"error": ...}. Where there are several buses, a
-command begins with the name of its own: ``neck: lose 3``; without one it is for the bus
-that has none. Imports nothing heavy, so that it is up within a tenth of a second; with
-"surroundings" in its settings it makes these, and all servos of all buses are in them.
+[[1, "xl330-m077", 2048]]}}]}'`` prints one JSON line per bus with its terminal's path and serves
+clients that connect and disconnect. It reads commands as lines from standard input and answers
+each with one JSON line: {"ok": ...} or {"error": ...}. With several buses a command begins with
+the name of its bus: ``neck: lose 3``; a command without a name is for the bus without one. It
+imports nothing heavy, so that it starts within a tenth of a second; with "surroundings" in its
+settings it creates these, and all servos of all buses are in them.
 
-A server in a thread of the client's own process would fight it for the interpreter lock.
+A server in a thread of the client's process would compete with it for the interpreter lock.
 """
 
 import json
@@ -35,7 +35,7 @@ _LOOK_MS = 200
 
 
 class ServedSurroundings(Protocol):
-    """Surroundings that all servos of a server are in."""
+    """Surroundings that contain all servos of a server."""
 
     @property
     def commands(self) -> Collection[str]:
@@ -43,7 +43,7 @@ class ServedSurroundings(Protocol):
         ...
 
     def joints(self) -> list[dict[str, int]]:
-        """Return for each rig where its joints are in a state."""
+        """Return the index of each rig's joints in a state."""
         ...
 
     def device(self, bus: BusSettings) -> Device:
@@ -51,32 +51,32 @@ class ServedSurroundings(Protocol):
         ...
 
     def obey(self, text: str) -> str:
-        """Carry out a command; return {"ok": ...} or {"error": ...} as JSON."""
+        """Run a command; return {"ok": ...} or {"error": ...} as JSON."""
         ...
 
     def wait_s(self) -> float:
-        """Return how long to sleep if nothing arrives."""
+        """Return how long to sleep unless bytes arrive, in seconds."""
         ...
 
     def serve(self, heard: bool) -> None:
-        """Bring it up to now; heard: a client has sent bytes."""
+        """Advance to the present time; heard: a client has sent bytes."""
         ...
 
 
 @dataclass(frozen=True)
 class SurroundingsSettings:
-    """How surroundings are made.
+    """How to create surroundings.
 
     Attributes:
         make: "module:function".
-        folder: into which they are written; the function gets it and the clock.
+        folder: holds their data; the function receives it and the clock.
     """
 
     make: str
     folder: str
 
     def made(self) -> ServedSurroundings:
-        """Return them.
+        """Return the surroundings.
 
         Raises:
             SetupError: they cannot be used.
@@ -92,9 +92,9 @@ class ServerSettings:
     """Devices to emulate.
 
     Attributes:
-        buses: each on a terminal of its own.
+        buses: each on its own terminal.
         until_eof: stop at the end of standard input.
-        surroundings: what all servos are in; None: each has mechanics of its own.
+        surroundings: surroundings of all servos; None: each has its own mechanics.
     """
 
     buses: tuple[BusSettings, ...]
@@ -103,11 +103,11 @@ class ServerSettings:
 
 
 class ServerStopped(Exception):
-    """SIGTERM or Ctrl-C came."""
+    """SIGTERM or Ctrl-C was received."""
 
 
 class Server:
-    """Serves every bus on a terminal of its own until stopped."""
+    """Serves every bus on its own terminal until it is stopped."""
 
     def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
         self._settings = settings
@@ -116,10 +116,10 @@ class Server:
         self.lines: list[TerminalLine] = []
         self._typed = b""
         self.over = False
-        """To be set by a signal: an exception alone may be swallowed where it arises."""
+        """Set by a signal handler: an exception alone may be swallowed where it is raised."""
         names = [bus.name for bus in settings.buses]
         if not names or len(set(names)) < len(names):
-            raise ValueError(f"every bus needs a name of its own; there is {names}")
+            raise ValueError(f"every bus needs its own name; given {names}")
         try:
             self.surroundings: ServedSurroundings | None = None
             if settings.surroundings is not None:
@@ -165,11 +165,11 @@ class Server:
     # --- commands
 
     def _take_commands(self, commands: int | None) -> bool:
-        """Carry out received command lines; return False at the end of standard input."""
+        """Run received command lines; return False at the end of standard input."""
         assert commands is not None
         try:
             came = os.read(commands, 4096)
-        except OSError:  # a terminal that another job owns now
+        except OSError:  # the terminal belongs to another job now
             return False
         *lines, self._typed = (self._typed + came).split(b"\n")
         for line in lines:
@@ -179,7 +179,7 @@ class Server:
         return bool(came)
 
     def _obey(self, text: str) -> str:
-        """Carry out a command: on its bus, on the one without a name, or in the surroundings."""
+        """Run a command: on its bus, on the bus without a name, or in the surroundings."""
         if self.surroundings is not None and text.split()[0] in self.surroundings.commands:
             return self.surroundings.obey(text)
         named = {line.settings.name or "": line for line in self.lines}
@@ -199,17 +199,17 @@ class Server:
 
 @contextmanager
 def _ended_with_client(until_eof: bool) -> Iterator[None]:
-    """End this process with its client also while surroundings are made, which takes seconds."""
+    """End this process with its client even while surroundings are created, which takes seconds."""
     made = threading.Event()
     number: int | None = None
     if until_eof and sys.stdin is not None:
-        with suppress(OSError, ValueError):  # a program may have put something else in its place
+        with suppress(OSError, ValueError):  # a program may have replaced it
             number = sys.stdin.fileno()
 
     def watch() -> None:
         client = select.poll()
         assert number is not None
-        client.register(number, 0)  # that it is gone is always told
+        client.register(number, 0)  # a hang-up is always reported
         while not made.is_set():
             if client.poll(_LOOK_MS):
                 os._exit(0)
@@ -227,10 +227,10 @@ def _warn(text: str) -> None:
 
 
 def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool) -> None:
-    """Serve until SIGTERM, Ctrl-C where it is heeded, or the end of standard input.
+    """Serve until SIGTERM, Ctrl-C (if ``heed_ctrl_c``), or the end of standard input.
 
     Raises:
-        ValueError, OSError: the settings cannot be met.
+        ValueError, OSError: the settings are invalid.
     """
     servers: list[Server] = []
 
@@ -259,7 +259,7 @@ def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool)
 
 
 def say(line: str) -> None:
-    """Write one line to standard output at once."""
+    """Write one line to standard output immediately."""
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
 
@@ -268,7 +268,7 @@ def settings_of(settings: Mapping[str, Any]) -> ServerSettings:
     """Return the settings decoded from JSON.
 
     Raises:
-        ValueError, TypeError: there is no such device, or it has no such setting.
+        ValueError, TypeError: a device or one of its settings is unknown.
     """
     buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in settings["buses"]]
     around = settings.get("surroundings")

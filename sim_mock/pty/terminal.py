@@ -1,8 +1,8 @@
-"""A pseudo-terminal that stands for a serial adapter: Linux only.
+"""A pseudo-terminal in place of a serial adapter: Linux only.
 
 The link to it keeps its name over unplugging and plugging; the terminal behind it gets a
-new number each time. The slave side is kept open here, raw, else it would echo and fail
-between two clients.
+new number each time. The slave side stays open here, in raw mode; otherwise it would echo and
+fail between two clients.
 """
 
 import ctypes
@@ -23,13 +23,13 @@ _INPUT_SHIFT = 16
 
 _OPEN, _CLOSE_WRITE, _CLOSE_NOWRITE = 0x20, 0x08, 0x10
 _EVENT = struct.Struct("iIII")
-"""Of inotify(7), of which Python has no module."""
+"""Event of inotify(7), for which Python has no module."""
 
 
 class ClientCounter:
-    """Counts how many clients have a file open, with the kernel's inotify(7).
+    """Counts the clients that have a file open, with the kernel's inotify(7).
 
-    Where the kernel has none, ``fd`` is -1 and no client is ever counted.
+    If the kernel does not support it, ``fd`` is -1 and no client is counted.
     """
 
     def __init__(self, path: str) -> None:
@@ -41,7 +41,7 @@ class ClientCounter:
             libc.inotify_add_watch(self.fd, path.encode(), wanted)
 
     def look(self) -> bool:
-        """Process events; return True when the last client has gone."""
+        """Process events; return True when the last client has closed the file."""
         before = self.opened
         gone = False
         try:
@@ -58,21 +58,21 @@ class ClientCounter:
         return self.opened == 0 and (gone or before > 0)
 
     def close(self) -> None:
-        """Stop looking."""
+        """Stop watching."""
         if self.fd >= 0:
             os.close(self.fd)
             self.fd = -1
 
 
 class Terminal:
-    """The master's side.
+    """Master side of a pseudo-terminal.
 
     Args:
-        link: a symbolic link to the terminal; one that is left over is replaced.
-        baud: the speed it is set to until a client sets another.
+        link: a symbolic link to the terminal; an old link is replaced.
+        baud: its speed until a client sets another.
 
     Raises:
-        FileExistsError: there is something else under the name of the link.
+        FileExistsError: another file has the name of the link.
         FileNotFoundError: its folder does not exist.
     """
 
@@ -86,11 +86,11 @@ class Terminal:
 
     @property
     def plugged(self) -> bool:
-        """True if the terminal is there."""
+        """Return whether the terminal exists."""
         return self.master >= 0
 
     def plug(self) -> None:
-        """Make the terminal and the link to it."""
+        """Create the terminal and its link."""
         self.master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self.master, False)
@@ -127,14 +127,14 @@ class Terminal:
             return b""
 
     def write(self, data: bytes) -> None:
-        """Send to the client; what a full terminal does not take is lost, as on a wire."""
+        """Send bytes to the client; bytes that a full terminal rejects are lost, as on a wire."""
         try:
             os.write(self.master, data)
         except BlockingIOError:
             return
 
     def client_baud(self) -> int:
-        """Return the baud rate the client has set."""
+        """Return the baud rate that the client has set."""
         words = fcntl.ioctl(self.master, _TCGETS2, bytes(_TERMIOS2.size))
         return int(_TERMIOS2.unpack(words)[-1])
 
@@ -146,28 +146,28 @@ class Terminal:
         fcntl.ioctl(self._slave, _TCSETS2, _TERMIOS2.pack(*words))
 
     def hold(self, held: bool) -> None:
-        """Stop taking the client's bytes, as an adapter with a full buffer, or take them again."""
+        """Stop or resume reading the client's bytes, as an adapter with a full buffer does."""
         termios.tcflow(self._slave, termios.TCOOFF if held else termios.TCOON)
 
     def forbid(self, forbidden: bool) -> None:
-        """Forbid opening, or allow it again; the superuser may open it all the same."""
+        """Forbid or allow opening; the superuser can open it in any case."""
         os.chmod(self._slave, 0 if forbidden else 0o620)
 
     def release(self) -> None:
-        """Drop what the last client has left: unread answers, and the lock of a killed client."""
+        """Drop the last client's leftovers: unread answers, and the lock of a killed client."""
         termios.tcflush(self._slave, termios.TCIFLUSH)
         fcntl.ioctl(self._slave, termios.TIOCNXCL)
 
 
 def _point(link: Path, target: str) -> None:
-    """Make a link; a dangling one, or one to a terminal, is replaced."""
+    """Create a link; a dangling link, or one to a terminal, is replaced."""
     if link.is_symlink():
         old = os.readlink(link)
         if not old.startswith("/dev/pts/") and os.path.exists(old):
-            raise FileExistsError(errno.EEXIST, f"a link to {old} is in the way", str(link))
+            raise FileExistsError(errno.EEXIST, f"a link to {old} exists", str(link))
         link.unlink()
     elif link.exists():
-        raise FileExistsError(errno.EEXIST, "something else has this name", str(link))
+        raise FileExistsError(errno.EEXIST, "another file has this name", str(link))
     try:
         link.symlink_to(target)
     except OSError as error:

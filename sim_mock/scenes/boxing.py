@@ -1,17 +1,17 @@
-"""The scene ``boxing``: an opponent before the robot, for the five gazes of Mitake et al. 1.
+"""The scene ``boxing``: an opponent in front of the robot, for the five gazes of Mitake et al. 1.
 
-(a) the opponent punches and the robot guards: the hand is looked at; (b) the opponent opens the
-guard, which the robot attacks: before the blow lands, the place to be hit is looked at; (c)
-otherwise the opponent's face, also while the opponent steps left and right (section 4); (d) a
-hand is waved: the hand; (e) a hand reaches in from outside the field of view: it is noticed as it
-enters, and the head turns. Besides, two feints that draw the gaze off the face for an instant
-(section 4: boxers return to the face at once).
+(a) The opponent punches and the robot guards: the gaze is on the hand. (b) The opponent opens the
+guard, which the robot attacks: before the blow arrives, the gaze is on its target. (c) Otherwise
+the gaze is on the opponent's face, also while the opponent steps left and right (section 4). (d)
+The opponent waves a hand: the gaze is on the hand. (e) A hand reaches in from outside the field
+of view: it is detected as it enters, and the head turns. In addition, two feints draw the gaze
+off the face for an instant (section 4: boxers return to the face immediately).
 
-What the robot does about it is for its action planner (gazerig.gaze.attention.action_planner),
-which sees what the camera shows.
+The robot's action planner (gazerig.gaze.attention.action_planner) decides how it reacts, from
+the camera's view.
 
-The robot's eyes are taken to be at ``HEAD_M`` and to look straight ahead along the
-world's x; both hold for the desk rig within what the neck turns to follow the opponent.
+The robot's eyes are assumed to be at ``HEAD_M`` and to look straight ahead along the world's x;
+both hold for the desk rig within the neck's turns after the opponent.
 """
 
 from math import atan2, pi, sin, tan
@@ -22,13 +22,13 @@ from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing, betwee
 
 HEAD_M: Vec3 = (0.04, 0.0, 0.13)
 HALF_FIELD_RAD = 34.5 / 180.0 * pi
-"""Half of the horizontal field of the camera: a hand farther aside cannot be noticed."""
+"""Half of the camera's horizontal field: a hand farther to the side cannot be detected."""
 
 _ROUND_S = 44.0
 _CORNER: Vec3 = (1.0, 0.0, 0.24)
-_LEFT, _RIGHT = 1.0, -1.0  # as the robot sees it: the sign of the world's y
+_LEFT, _RIGHT = 1.0, -1.0  # as seen by the robot: the sign of the world's y
 
-# Steps to the left, to the right and back, as slow as a boxer who seeks an opening.
+# Steps to the left, to the right and back, as slow as a boxer who looks for an opening.
 _STEPS_S = ((7.8, 9.6), (10.1, 13.4), (13.9, 15.7))
 _KEYS = (
     Key(0.0, _CORNER),
@@ -41,13 +41,13 @@ _KEYS = (
     Key(_ROUND_S, _CORNER),
 )
 
-# Fists close before the chin, where stepping aside moves their image hardly more than the
-# face's; a punch stops a forearm's length before the robot.
+# Fists close in front of the chin, where a step aside moves their image hardly more than the
+# face's; a punch stops a forearm's length in front of the robot.
 _FIST_M = 0.06
 _PUNCH_OUT_S, _PUNCH_HOLD_S, _PUNCH_BACK_S = 0.25, 0.05, 0.30
 _PUNCH_ENDS_M = 0.35
 _STEP_S = 1e-4
-_PUNCH_TURN_RAD = 0.5 * pi  # the back of the hand comes up
+_PUNCH_TURN_RAD = 0.5 * pi  # the back of the hand turns up
 _WAVE_S = 2.2
 _FEINT_S = 0.3
 _RETURN_S = 1.3
@@ -56,7 +56,7 @@ _REACH_S = _REACH_IN_S + _REACH_STAY_S + _REACH_OUT_S
 
 
 class _ArmMotion(NamedTuple):
-    """Something that begins at ``start_s`` on one side."""
+    """A motion that begins at ``start_s`` on one side."""
 
     start_s: float
     side: float
@@ -74,13 +74,13 @@ _REACHES = (_ArmMotion(22.9, _LEFT), _ArmMotion(35.4, _RIGHT))
 
 
 class _Opening(NamedTuple):
-    """Both fists leave their place for ``way_m``, aside for the left one."""
+    """Both fists leave their position by ``way_m``; y is mirrored for the left one."""
 
     start_s: float
     way_m: Vec3
 
 
-# Dropped fists leave the face open; raised and parted ones, the chest.
+# Dropped fists leave the face open, raised and parted fists the chest.
 _DROPPED, _PARTED = (0.05, 0.04, -0.32), (0.0, 0.10, 0.15)
 _OPENINGS = (
     _Opening(6.1, _PARTED),
@@ -99,12 +99,12 @@ class Boxing:
     behaviours: tuple[str, ...] = ("wait", "guard", "attack")
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return the opponent, whose hands are things of their own."""
+        """Return the opponent, whose hands are separate things."""
         face, turn = _opponent(t_s)
         return (ScenePerson(face, turn, None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return both fists, and the hand from aside while it is there."""
+        """Return both fists, and the hand from the side while it is present."""
         phase_s = t_s % _ROUND_S
         face, _ = _opponent(t_s)
         things = [
@@ -117,7 +117,7 @@ class Boxing:
         return tuple(things)
 
     def events(self) -> tuple[Event, ...]:
-        """Return the five behaviours, the steps and the feints; the rest is for the face."""
+        """Return the five behaviours, the steps and the feints; otherwise the face is expected."""
         chin = _plus(_CORNER, (-0.3, 0.0, -0.1))
         events = [
             *(_punch_event(punch) for punch in _PUNCHES),
@@ -137,14 +137,14 @@ class Boxing:
 
 
 def _opponent(t_s: float) -> tuple[Vec3, tuple[float, float]]:
-    """Return the opponent's face, which bobs a little, and where it points."""
+    """Return the opponent's face, which bobs slightly, and its direction."""
     face, turn = between(_KEYS, t_s % _ROUND_S)
     bob = (0.008 * sin(2 * pi * 0.5 * t_s), 0.008 * sin(2 * pi * 0.75 * t_s + 1.0))
     return (face[0] + bob[0], face[1] + bob[1], face[2]), turn
 
 
 def _fist(side: float, face: Vec3, phase_s: float) -> Vec3:
-    """Return one fist: on guard before the chin, in a punch, waving or feinting."""
+    """Return one fist: on guard in front of the chin, punching, waving or feinting."""
     place = _plus(face, (-0.12, side * 0.12, -0.13))
     for punch in _PUNCHES:
         if punch.side == side:
@@ -171,12 +171,12 @@ def _fist(side: float, face: Vec3, phase_s: float) -> Vec3:
 
 
 def _punch_end(side: float) -> Vec3:
-    """Return where a punch ends: before the robot's face, a little to its side."""
+    """Return the end of a punch: in front of the robot's face, slightly to its side."""
     return _plus(HEAD_M, (_PUNCH_ENDS_M, side * 0.03, -0.02))
 
 
 def _turn(side: float, phase_s: float) -> tuple[float, float]:
-    """Return how fast a fist turns about the line of sight, and how far it has turned."""
+    """Return speed and angle of a fist's rotation about the line of sight."""
 
     def turned_rad(at_s: float) -> float:
         out = [
@@ -191,7 +191,7 @@ def _turn(side: float, phase_s: float) -> tuple[float, float]:
 
 
 def _reaching(reach: _ArmMotion, phase_s: float) -> Vec3:
-    """Return the hand that comes in from aside, beckons and goes."""
+    """Return the hand that reaches in from the side, beckons and retreats."""
     since_s = phase_s - reach.start_s
     into = there_and_back(since_s, _REACH_IN_S, _REACH_STAY_S, _REACH_OUT_S)
     beckon = 0.03 * sin(2 * pi * 2.0 * since_s) * into
@@ -203,7 +203,7 @@ def _reaching(reach: _ArmMotion, phase_s: float) -> Vec3:
 
 
 def _punch_event(punch: _ArmMotion) -> Event:
-    """Ask for the hand from the punch's beginning until it is back."""
+    """Expect the gaze on the hand from the start of the punch to its return."""
     end_s = punch.start_s + _PUNCH_OUT_S + _PUNCH_HOLD_S + _PUNCH_BACK_S
     middle = _towards(_plus(_CORNER, (0.0, 0.0, -0.1)), _punch_end(punch.side), 0.5)
     arrives_s = punch.start_s + _PUNCH_OUT_S
@@ -211,14 +211,14 @@ def _punch_event(punch: _ArmMotion) -> Event:
 
 
 def _opening_event(opening: _Opening) -> Event:
-    """Ask for the place to be hit from when the fists have left half of their way until then."""
+    """Expect the gaze on the target while the fists are more than half-way out."""
     start_s = opening.start_s + 0.5 * _OPEN_OUT_S
     end_s = opening.start_s + _OPEN_S - 0.5 * _OPEN_BACK_S
     return Event("attack", "look", "attack_target", start_s, end_s, _CORNER, 0.6)
 
 
 def _reach_event(reach: _ArmMotion) -> Event:
-    """Ask for the hand while it is nearer to straight ahead than half the field."""
+    """Expect the gaze on the hand while it is nearer to straight ahead than half the field."""
     inside = [
         ms / 1e3
         for ms in range(round(_REACH_S * 1e3))
@@ -230,12 +230,12 @@ def _reach_event(reach: _ArmMotion) -> Event:
 
 
 def _aside_rad(p_world_m: Vec3) -> float:
-    """Return how far to the side of straight ahead a place is, from the robot's eyes."""
+    """Return the horizontal angle of a point off straight ahead, from the robot's eyes."""
     return atan2(p_world_m[1] - HEAD_M[1], p_world_m[0] - HEAD_M[0])
 
 
 def _quiet(events: list[Event]) -> list[Event]:
-    """Ask for the face wherever nothing else happens for a while."""
+    """Expect the gaze on the face whenever nothing else happens for a while."""
     quiet, free_s = [], 0.0
     busy = sorted((event.start_s, event.end_s) for event in events)
     for start_s, end_s in (*busy, (_ROUND_S, _ROUND_S)):

@@ -1,11 +1,11 @@
 """The scene ``face-to-face``: a person at several heights who walks about before the robot.
 
-Nakamoto & Tsuruno 4.2: the character must keep looking at a user who is higher or lower
-than itself and never stands still. One person sits, stands up, walks about, and bends
-down to the height of a child; between 0.6 and 1.5 m from the robot's eyes, never faster
-than a stroll, and never out of the robot's sight. The face is turned to the robot but
-for glances aside: people look at who speaks to them for about 75 % of the time (Argyle
-and Cook), away by some 14 deg and mostly sideways. Not modelled: a child's smaller face.
+Nakamoto & Tsuruno 4.2: the character must keep looking at a user who is higher or lower than
+itself and never at rest. One person sits, stands up, walks about, and bends down to the height of
+a child; always between 0.6 and 1.5 m from the robot's eyes, at most at the speed of a stroll, and
+always visible to the robot. The face is turned to the robot except for glances aside: people look
+at a speaker for about 75 % of the time (Argyle and Cook), otherwise away by about 14 deg and
+mostly sideways. Not modelled: a child's smaller face.
 """
 
 from math import atan2, hypot, pi, sin
@@ -29,7 +29,7 @@ _KEYS = (
     Key(12.6, (0.80, 0.05, 0.22), (-14.0, 4.0)),
     Key(13.2, (0.80, 0.05, 0.22)),
     Key(16.5, (0.80, 0.05, 0.22)),
-    # Stands up, a step back, and walks to both sides.
+    # Standing up, a step back, walking to both sides.
     Key(18.5, (1.25, 0.10, 0.62)),
     Key(22.0, (1.25, 0.10, 0.62)),
     Key(24.0, (1.15, 0.50, 0.62)),
@@ -41,7 +41,7 @@ _KEYS = (
     Key(35.6, (1.20, -0.45, 0.60), (14.0, 6.0)),
     Key(36.4, (1.20, -0.45, 0.60), (14.0, 6.0)),
     Key(37.0, (1.20, -0.45, 0.60)),
-    # As high as a child, near, and about.
+    # At the height of a child, near, and walking about.
     Key(42.5, (0.80, -0.15, 0.00)),
     Key(45.0, (0.80, -0.15, 0.00)),
     Key(47.0, (0.72, 0.20, -0.02)),
@@ -50,7 +50,7 @@ _KEYS = (
     Key(50.6, (0.72, 0.20, -0.02), (14.0, 0.0)),
     Key(51.2, (0.72, 0.20, -0.02)),
     Key(54.0, (0.72, 0.20, -0.02)),
-    # Sits down again.
+    # Sitting down again.
     Key(57.0, (0.95, 0.0, 0.22)),
     Key(_ROUND_S, (0.95, 0.0, 0.22)),
 )
@@ -76,9 +76,9 @@ class FaceToFace:
         return (ScenePerson(face, (yaw, nod + down), None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return nothing: person and robot are by themselves."""
+        """Return nothing: person and robot are alone."""
         return ()
 
     def events(self) -> tuple[Event, ...]:
-        """Ask for the face, all the time."""
+        """Expect the gaze on the face, all the time."""
         return (Event("face", "look", "face", 0.0, _ROUND_S, (1.0, 0.0, 0.3), 1.0),)

@@ -1,7 +1,7 @@
-"""Several people before the robot: who looks at whom, who waves, where each of them stands.
+"""A group of people in front of the robot: their positions, gaze targets and waves.
 
-People who look at somebody turn the head about two thirds of the way and the eyes the rest, so
-that a face that is turned to a neighbour is still seen from the robot; the robot is faced fully.
+People who look at a person turn the head about two thirds of the angle and the eyes the rest, so
+that the robot still sees a face that is turned to a neighbour. They face the robot fully.
 """
 
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ _WAVES_HZ, _WAVE_M = 1.5, 0.11
 
 
 class Look(NamedTuple):
-    """From ``t_s`` on somebody looks at person ``at``, or at the ``ROBOT``."""
+    """From ``t_s`` on a member looks at person ``at``, or at the ``ROBOT``."""
 
     t_s: float
     at: int
 
 
 class Wave(NamedTuple):
-    """Somebody waves a hand at the robot between two times."""
+    """A member waves a hand at the robot between two times."""
 
     start_s: float
     end_s: float
@@ -39,10 +39,10 @@ class Wave(NamedTuple):
 class Member(NamedTuple):
     """One person of a group.
 
-    keys: where the face is, the turn of a key being unused; looks: whom it is turned to; both from
-        0 on, and at the round's end as at its beginning
+    keys: positions of the face, the turns of the keys being unused; looks: gaze targets; both from
+        0 on, and equal at the start and the end of the round
     side: of the raised hand, 1 to the robot's left
-    sway: phase of the small motion of one who stands, rad
+    sway: phase of the small motion of a standing person, rad
     """
 
     keys: tuple[Key, ...]
@@ -64,7 +64,7 @@ def people_of(members: Sequence[Member], t_s: float, round_s: float) -> tuple[Sc
 
 
 def _place(member: Member, t_s: float, phase_s: float) -> Vec3:
-    """Return where a face is, swaying a little."""
+    """Return the position of a face that sways slightly."""
     face, _ = between(member.keys, phase_s)
     sway = (
         0.005 * sin(2 * pi * 0.21 * t_s + member.sway),
@@ -75,7 +75,7 @@ def _place(member: Member, t_s: float, phase_s: float) -> Vec3:
 
 
 def _way(looks: tuple[Look, ...], phase_s: float, place: Vec3, places: Sequence[Vec3]) -> Angles2:
-    """Return yaw and pitch of a face that turns from one it looked at to the next."""
+    """Return yaw and pitch of a face that turns from one target to the next."""
     last = before = looks[0]
     for look in looks[1:]:
         if look.t_s > phase_s:
@@ -105,7 +105,7 @@ def _direction(way: Vec3) -> Angles2:
 
 
 def _hand(member: Member, phase_s: float, face: Vec3) -> Vec3 | None:
-    """Return the hand that waves beside the head, None while it hangs out of sight."""
+    """Return the hand that waves next to the head, None while it is not raised."""
     for wave in member.waves:
         since_s, left_s = phase_s - wave.start_s, wave.end_s - phase_s
         if since_s >= 0.0 and left_s >= 0.0:

@@ -1,4 +1,4 @@
-"""How a simulated scene looks, for another process to draw: OpenCV is loaded where it is drawn."""
+"""A picture of a simulated scene, drawn in another process: only that one loads OpenCV."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,14 @@ from gazerig.sim_mock.scenes.scene import Scene
 
 @dataclass(frozen=True)
 class ScenePicture(SceneView):
-    """Draws one scene, plainly: for runs whose camera gives no images. It knows no distances."""
+    """Draws one scene plainly, without distances, for runs whose camera returns no images."""
 
     scene: Scene
 
     def draw(
         self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
     ) -> Rendered:
-        """Return what a camera sees; see ``SceneView.draw``."""
+        """Return a camera's view; see ``SceneView.draw``."""
         from gazerig.sim_mock.cameras.scene_picture import draw_picture
 
         return Rendered(draw_picture(self.scene, seen_by)[slice(*(rows or (None,)))], None)

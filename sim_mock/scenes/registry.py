@@ -1,4 +1,4 @@
-"""The scenes that a simulated robot can be put into."""
+"""Registry of the simulated scenes."""
 
 from gazerig.sim_mock.scenes.boxing import Boxing
 from gazerig.sim_mock.scenes.face_to_face import FaceToFace

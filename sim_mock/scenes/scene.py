@@ -1,8 +1,8 @@
 """Interface of a simulated scene: people, things, expected gaze.
 
-Everything is a closed form of the time, so a scene needs no stepper and looks the same
-however often it is looked at. World frame (x forward, y left, z up), metres, seconds
-from the scene's beginning. Not modelled: bodies below the neck, gait, facial expression.
+Everything is a closed form of the time, so a scene needs no stepping and does not depend on how
+often it is read. World frame (x forward, y left, z up), metres, seconds from the start of the
+scene. Not modelled: bodies below the neck, gait, facial expression.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ class ScenePerson(NamedTuple):
     """One person at one instant.
 
     p_world_face_m: tip of the nose
-    face_yaw_pitch_rad: where the face points, yaw 0 = along the world's +x
-    hand: place of a raised hand, None while it hangs out of sight
+    face_yaw_pitch_rad: direction of the face, yaw 0 = along the world's +x
+    hand: position of a raised hand, None while it is not raised
     """
 
     p_world_face_m: Vec3
@@ -28,11 +28,11 @@ class ScenePerson(NamedTuple):
 class Thing(NamedTuple):
     """One thing at one instant.
 
-    id:   the same for as long as the scene lasts
+    id:   constant over the scene
     kind: "hand", "thing", ...
-    spin_rad_s: rotation about the line of sight, clockwise as the robot sees it above 0
-    turned_rad: how far it has turned so
-    person: number of the person whose hand it is, None where it is nobody's
+    spin_rad_s: rotation about the line of sight, clockwise as the robot sees it if positive
+    turned_rad: angle of this rotation
+    person: number of the person whose hand it is, None for other things
     """
 
     id: int
@@ -45,12 +45,12 @@ class Thing(NamedTuple):
 
 
 class Event(NamedTuple):
-    """Something that happens in a round, and what a gaze like a person's does about it.
+    """An event in a round, and the gaze that a person would show.
 
-    asks: "look": be on it between start and end; "return": be on it again by the end
-    kind: what must be looked at, within ``within_m`` of ``place_world_m``
-    start_s, end_s: from the beginning of the round
-    due_s: when a punch arrives; None for everything else
+    asks: "look": be on the target between start and end; "return": be on it again by the end
+    kind: kind of the target, within ``within_m`` of ``place_world_m``
+    start_s, end_s: from the start of the round
+    due_s: arrival of a punch; None for all other events
     """
 
     name: str
@@ -66,8 +66,8 @@ class Event(NamedTuple):
 class Scene(Protocol):
     """The people and things at an instant; it repeats after every round.
 
-    behaviours: those between which the robot's action planner has to choose there, so that a rig
-        without a rule for one can be refused before it moves; none where it plans nothing
+    behaviours: those between which the robot's action planner must choose, so that a rig without a
+        rule for one can be rejected before it moves; empty if it plans nothing
     """
 
     name: str
@@ -75,20 +75,20 @@ class Scene(Protocol):
     behaviours: tuple[str, ...]
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return all people present, also those outside every field of view."""
+        """Return all people present, including those outside every field of view."""
         ...
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return everything else that can be looked at."""
+        """Return all other possible gaze targets."""
         ...
 
     def events(self) -> tuple[Event, ...]:
-        """Return the events of one round, none of which outlasts the round."""
+        """Return the events of one round; each ends within the round."""
         ...
 
 
 class Key(NamedTuple):
-    """Where a person is from ``t_s`` on: face, and the turn of the face off the robot."""
+    """A person's state from ``t_s`` on: position of the face, and its turn off the robot."""
 
     t_s: float
     face: Vec3
@@ -96,12 +96,12 @@ class Key(NamedTuple):
 
 
 def min_jerk(s: float) -> float:
-    """Return a minimum-jerk path from 0 to 1 at a share 0..1 of its time."""
+    """Return the minimum-jerk path from 0 to 1 at a share 0..1 of its time."""
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
 def there_and_back(since_s: float, out_s: float, hold_s: float, back_s: float) -> float:
-    """Return 0 before, smoothly up to 1 in ``out_s``, held, and smoothly down to 0 again."""
+    """Return a smooth rise from 0 to 1 in ``out_s``, a hold, and a smooth return to 0."""
     if since_s <= 0.0 or since_s >= out_s + hold_s + back_s:
         return 0.0
     if since_s < out_s:
@@ -112,7 +112,7 @@ def there_and_back(since_s: float, out_s: float, hold_s: float, back_s: float) -
 def between(keys: Sequence[Key], phase_s: float) -> tuple[Vec3, Angles2]:
     """Move from key to key with minimum jerk; the face looks at the robot plus its turn.
 
-    Returns the place of the face and its (yaw, pitch); the pitch is the turn's alone.
+    Returns the position of the face and its (yaw, pitch); the pitch is the turn's only.
     """
     last = keys[0]
     for following in keys[1:]:

@@ -1,7 +1,7 @@
-"""The scene ``sits-still``: a person who sits before the robot, faces it and does not move.
+"""The scene ``sits-still``: a person who sits in front of the robot, faces it and does not move.
 
-For everything that a person does with the robot and not before it. No real person sits as
-still: no sway, no glance aside, no blink.
+For all experiments that a person does with the robot rather than in front of it. No real person
+sits as still: no sway, no glance aside, no blink.
 """
 
 from math import atan2, hypot
@@ -32,5 +32,5 @@ class SitsStill:
         return ()
 
     def events(self) -> tuple[Event, ...]:
-        """Ask for the face, all the time."""
+        """Expect the gaze on the face, all the time."""
         return (Event("face", "look", "face", 0.0, _ROUND_S, FACE_M, 0.3),)

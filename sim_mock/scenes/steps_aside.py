@@ -1,8 +1,8 @@
-"""The scene ``steps-aside``: a person who stands before the robot and steps 40 deg aside.
+"""The scene ``steps-aside``: a person in front of the robot who steps 40 deg aside.
 
-The case in which a head that turns to where a person *was* overshoots. One step to the
-left and back in a round, each in 0.7 s: over 0.75 m that takes 0.9 g sideways, about as
-much as shoes on a floor give. Peak speed 2.0 m/s, 105 deg/s as seen by the robot.
+The case in which a head that turns to the person's previous position overshoots. One step to the
+left and back in a round, each in 0.7 s: over 0.75 m that takes 0.9 g sideways, about the limit of
+shoes on a floor. Peak speed 2.0 m/s, 105 deg/s as seen by the robot.
 """
 
 from math import cos, radians, sin
@@ -50,7 +50,7 @@ class StepsAside:
         return ()
 
     def events(self) -> tuple[Event, ...]:
-        """Ask for the face wherever it has gone."""
+        """Expect the gaze on the face after its steps."""
         return (
             Event("left", "look", "face", STEP_AT_S + STEP_S, STEP_BACK_AT_S, _LEFT, 0.3),
             Event("right", "look", "face", STEP_BACK_AT_S + STEP_S, _ROUND_S, _RIGHT, 0.3),

@@ -1,7 +1,7 @@
-"""The scene ``three-people``: two stand before the robot, a third comes; they talk in turns.
+"""The scene ``three-people``: two people before the robot, a third arrives; they talk in turns.
 
-Who speaks looks at the robot or at one of the others, who listens mostly at the speaker. The one
-who came last waves, the one in the middle comes near, and the third leaves before the round ends.
+A speaker looks at the robot or at one of the others, a listener mostly at the speaker. The last
+to arrive waves, the person in the middle comes near, and the third leaves before the round ends.
 """
 
 from gazerig.gaze.types import Vec3
@@ -9,7 +9,7 @@ from gazerig.sim_mock.scenes.group import ROBOT, Look, Member, Wave, people_of
 from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing
 
 ARRIVES_S, LEAVES_S = 6.0, 55.0
-"""The third person is on the spot from the first to the second."""
+"""Arrival and departure of the third person."""
 
 _ROUND_S = 64.0
 _LEFT: Vec3 = (1.20, 0.42, 0.24)
@@ -72,7 +72,7 @@ class ThreePeople:
         return ()
 
     def events(self) -> tuple[Event, ...]:
-        """Ask for each of the faces, for the hand that waves and for who comes near."""
+        """Expect the gaze on each face, on the waving hand and on the person who comes near."""
         stands_s = (ARRIVES_S, LEAVES_S)
         return (
             Event("left", "look", "face", *stands_s, _LEFT, 0.2),

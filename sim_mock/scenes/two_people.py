@@ -1,6 +1,6 @@
 """The scene ``two-people``: two people before the robot who talk in turns, to it and to each other.
 
-A pinwheel stands before them; twice in a round the wind turns it. The person on the robot's right
+A pinwheel is in front of them; twice in a round the wind turns it. The person on the robot's right
 waves, the one on its left comes near and goes back.
 """
 
@@ -12,7 +12,7 @@ from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing
 
 PINWHEEL: Vec3 = (0.75, 0.0, 0.06)
 SPINS_S = ((4.0, 7.0), (34.0, 37.0))
-"""When the wind turns the pinwheel."""
+"""Times in which the wind turns the pinwheel."""
 
 _ROUND_S = 48.0
 _PINWHEEL_M = 0.06
@@ -53,7 +53,7 @@ class TwoPeople:
     behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return the person on the robot's left and the one on its right."""
+        """Return the person on the robot's left, then the person on its right."""
         return people_of((_LEFT_ONE, _RIGHT_ONE), t_s, _ROUND_S)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
@@ -69,7 +69,7 @@ class TwoPeople:
         return (Thing(0, "pinwheel", PINWHEEL, _PINWHEEL_M, speed, turned),)
 
     def events(self) -> tuple[Event, ...]:
-        """Ask for the pinwheel that turns, for the hand that waves and for a face otherwise."""
+        """Expect the gaze on the turning pinwheel, on the waving hand, and otherwise on a face."""
         face = (1.0, 0.0, 0.2)
         return (
             Event("spin", "look", "pinwheel", *SPINS_S[0], PINWHEEL, 0.2),

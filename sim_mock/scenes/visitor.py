@@ -1,11 +1,11 @@
-"""The scene ``visitor``: a person who comes, talks, moves, waves, leaves and comes back."""
+"""The scene ``visitor``: a person who arrives, talks, moves, waves, leaves and returns."""
 
 from math import pi, sin
 
 from gazerig.gaze.types import Vec3
 from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing, between
 
-# One round: arrive, talk, move left, turn the head, wave, step aside, leave, come back.
+# One round: arrive, talk, move left, turn the head, wave, step aside, leave, return.
 _ROUND_S = 44.0
 _KEYS = (
     Key(0.0, (1.0, -0.05, 0.24), (0.0, 0.0)),
@@ -51,11 +51,11 @@ class Visitor:
         return ()
 
     def events(self) -> tuple[Event, ...]:
-        """Return none: nothing in particular is asked of the gaze."""
+        """Return none: no particular gaze is expected."""
         return ()
 
     def _hand(self, phase_s: float, face: Vec3) -> Vec3 | None:
-        """Wave: 1.5 times a second beside the head, rising and sinking smoothly."""
+        """Return the hand that waves 1.5 times a second next to the head and rises smoothly."""
         start, end = _WAVE_S
         if not start <= phase_s <= end:
             return None

@@ -1,6 +1,6 @@
-"""The scene ``walks-past``: a person walks by, 1.5 m before the robot, at 1 m/s, and back.
+"""The scene ``walks-past``: a person walks by, 1.5 m in front of the robot, at 1 m/s, and back.
 
-The face is turned to the robot all the way, as of a person who looks while passing.
+The face is always turned to the robot, as of a person who looks while passing.
 """
 
 from math import atan2
@@ -13,8 +13,8 @@ HALF_WAY_M = 1.1
 
 _UP_M = 0.42
 _HEAD_AHEAD_M = 0.04
-_TURN_S = 1.0  # of standing at each end
-_SOON_S = 0.25  # as much as it takes to get to full speed, and to stop
+_TURN_S = 1.0  # standing time at each end
+_SOON_S = 0.25  # time of acceleration to full speed, and of braking
 _WAY_S = 2.0 * HALF_WAY_M / WALK_M_S + _SOON_S
 _ROUND_S = 2.0 * (_WAY_S + _TURN_S)
 
@@ -52,7 +52,7 @@ class WalksPast:
         return ()
 
     def events(self) -> tuple[Event, ...]:
-        """Ask for the face where it passes before the robot."""
+        """Expect the gaze on the face while it passes in front of the robot."""
         middle: Vec3 = (_HEAD_AHEAD_M + FAR_M, 0.0, _UP_M)
         first = _TURN_S + 0.5 * _WAY_S
         second = first + _WAY_S + _TURN_S

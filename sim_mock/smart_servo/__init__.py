@@ -1,1 +1,1 @@
-"""What all emulated smart servos share."""
+"""Common parts of all emulated smart servos."""

@@ -9,7 +9,7 @@ S = TypeVar("S", bound=EmulatedServo)
 
 
 class AddressTable(Generic[S]):
-    """The servos that hear one client.
+    """The servos that receive one client's bytes.
 
     by_id: the first servo of each id; twins: further ones with the same id
     shadows: servos by secondary id: they obey and never answer
@@ -41,5 +41,5 @@ class AddressTable(Generic[S]):
 
 
 def at_baud(servo: EmulatedServo, client_baud: int | None) -> bool:
-    """True if a servo and a client at this baud rate (None: any) understand each other."""
+    """Return whether a servo and a client at this baud rate (None: any) understand each other."""
     return client_baud is None or servo.baud == client_baud

@@ -1,7 +1,7 @@
-"""The device side of a bus of smart servos: bytes in, bytes out, nothing opened.
+"""Device side of a bus of smart servos: bytes in, bytes out, nothing opened.
 
-Where documents and devices are silent or differ, the choice is one of ``ChainQuirks``. A
-client at another baud rate than a servo's gets no answer from it.
+Behaviour that is undocumented or differs between documents and devices is a choice in
+``ChainQuirks``. A client at a baud rate other than a servo's gets no answer from it.
 """
 
 from collections.abc import Callable, Iterable
@@ -28,7 +28,7 @@ from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 from gazerig.sim_mock.smart_servo.span import whole_ms
 
 TWIN_AWAY_STEPS = 257
-"""A second servo with a taken id stands so far from the first, so that they differ."""
+"""Distance of a second servo with a taken id from the first, so that they differ."""
 
 GroupAction = Callable[[bytes], list[Piece]]
 
@@ -39,14 +39,14 @@ Q = TypeVar("Q", bound=ChainQuirks)
 class ServoChain(Generic[S, Q]):
     """Servos on one bus.
 
-    A make of servos says in class attributes what they are, which choices there are, how packets
-    begin and are found and built, what can be told to a servo and what can befall it.
+    A make of servos defines in class attributes its servo type, its quirks, the framing and the
+    packets, its instructions and its fault commands.
 
     Args:
         servos: any order; servos with one id answer at the same time.
         now_s: the chain's clock.
-        quirks: what servos do where documents and devices differ; None: the first of each case.
-        check_baud: whether only clients at a servo's baud rate get answers; else all do.
+        quirks: behaviour where documents and devices differ; None: the first value of each case.
+        check_baud: whether only clients at a servo's baud rate get answers, instead of all.
         seed: of the random numbers that faults draw.
     """
 
@@ -55,11 +55,11 @@ class ServoChain(Generic[S, Q]):
     framing_type: type[Framing]
     header: bytes
     status: Callable[[int, int, bytes], bytes]
-    """Builds a status packet of id, error and parameters."""
+    """Builds a status packet from id, error and parameters."""
     instructions: InstructionSet[S]
     commands: CommandTable
     eeprom_end = 0
-    """Writes below are not for those who listen under a secondary id."""
+    """Servos ignore writes below it that address their secondary id."""
 
     def __init__(
         self,
@@ -85,32 +85,32 @@ class ServoChain(Generic[S, Q]):
         self._apply_quirks(self.quirks)
         self.refresh()
 
-    # --- who is there
+    # --- addresses
 
     def refresh(self) -> None:
-        """Read ids, baud rates and return delays again; needed after changes from outside."""
+        """Read ids, baud rates and return delays again; needed after external changes."""
         self._stale = False
         known = AddressTable(self.servos, self._client_baud if self.check_baud else None)
         self._known = known
         self._by_id, self._twins, self._delay_s = known.by_id, known.twins, known.delay_s
 
     def _readdressed(self) -> None:
-        """Read addresses again before the next instruction; until then the old ones hold."""
+        """Read addresses again before the next instruction; the old ones are valid until then."""
         self._stale = True
 
     def at_baud(self, client_baud: int) -> bool:
-        """True if any servo understands a client at this baud rate."""
+        """Return whether any servo understands a client at this baud rate."""
         return not self.check_baud or any(at_baud(servo, client_baud) for servo in self.servos)
 
     def __getitem__(self, servo_id: int) -> S:
-        """Return a servo by its id, as it was when last looked at."""
+        """Return a servo by its id, without advancing it."""
         for servo in self.servos:
             if servo.id == servo_id:
                 return servo
-        raise KeyError(f"no servo {servo_id}; there is {', '.join(map(str, self.ids()))}")
+        raise KeyError(f"no servo {servo_id}; servos are {', '.join(map(str, self.ids()))}")
 
     def here(self, servo_id: int) -> S:
-        """Return a servo by its id, brought up to now."""
+        """Return a servo by its id, advanced to the present time."""
         servo = self[servo_id]
         servo.advance(whole_ms(self.now_s()), self._fed_ms)
         return servo
@@ -120,7 +120,7 @@ class ServoChain(Generic[S, Q]):
         return tuple(servo.id for servo in self.servos)
 
     def join(self, servo_id: int) -> None:
-        """Put a second servo with a taken id on the bus, a little turned from the first."""
+        """Add a second servo with a taken id to the bus, slightly turned from the first."""
         first, now_ms = self.here(servo_id), whole_ms(self.now_s())
         start = (first.position_steps + TWIN_AWAY_STEPS) % 4096
         spec = ServoSpec(servo_id, first.model.name, start, first.firmware)
@@ -133,14 +133,14 @@ class ServoChain(Generic[S, Q]):
         self.refresh()
 
     def choose(self, case: str, value: str) -> None:
-        """Choose one of the quirks by its name, or whether baud rates are heeded.
+        """Choose a quirk by its name, or whether servos check the baud rate.
 
         Raises:
-            ValueError: there is no such case or value.
+            ValueError: the case or value is unknown.
         """
         if case == "baud":
             if value not in ("heed", "any"):
-                raise ValueError(f"baud {value!r}: it can be heed, any")
+                raise ValueError(f"baud {value!r}: expected heed or any")
             self.check_baud = value == "heed"
             self.refresh()
             return
@@ -158,14 +158,14 @@ class ServoChain(Generic[S, Q]):
     # --- what a make of servos adds
 
     def _apply_quirks(self, quirks: Q) -> None:
-        """Apply quirks from now on."""
+        """Use quirks from now on."""
 
     def _obeys_broadcast(self, servo: S, code: int, params: bytes) -> bool:
-        """True if a servo carries out an instruction that goes to all."""
+        """Return whether a servo executes a broadcast instruction."""
         return True
 
     def _touches_eeprom(self, code: int, params: bytes) -> bool:
-        """True if an instruction is not for servos addressed by a secondary id."""
+        """Return whether servos ignore an instruction that addresses their secondary id."""
         return False
 
     # --- bytes
@@ -200,7 +200,7 @@ class ServoChain(Generic[S, Q]):
         ]
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
-        """Let the addressed servos carry out one instruction; return what they send."""
+        """Execute one instruction on the addressed servos; return the bytes that they send."""
         servo_id, code, params, _ = instruction
         if self._stale:
             self.refresh()
@@ -222,23 +222,23 @@ class ServoChain(Generic[S, Q]):
         return self._wire.spoil_pieces(spoilt, False, self._now_s)
 
     def _pieces(self, answers: Iterable[Answer]) -> list[Piece]:
-        """Send each answer as a status of its own."""
+        """Send each answer as its own status."""
         return [Piece(a[0], self._packet(a), a[3], a[4]) for a in answers]
 
     def _packet(self, answer: Answer) -> bytes:
-        """Build the status of a servo, or of several that answer under one id at the same time."""
+        """Build the status of a servo, or of several that answer simultaneously under one id."""
         own = self.status(answer[0], answer[1], answer[2])
         return own if answer.twin is None else merge(own, self._packet(answer.twin))
 
     def _is_muted(self, servo_id: int) -> bool:
-        """True if a fault keeps this servo from answering."""
+        """Return whether a fault keeps this servo from answering."""
         return self._wire.any and self._wire.take("lose", servo_id, self._now_s) is not None
 
     # --- one id
 
     def _answer_all(self, servo_id: int, code: int, params: bytes) -> Answer | None:
-        """Let all servos that listen to an id carry out an instruction."""
-        # Looked up first: the instruction may change who has this id.
+        """Execute an instruction on all servos that listen to an id."""
+        # Looked up first: the instruction may change the owner of this id.
         servo, twins = self._by_id.get(servo_id), self._twins.get(servo_id, ())
         shadows = self._known.shadows.get(servo_id, ())
         answer = None if servo is None else self._answer(servo, code, params)
@@ -250,10 +250,10 @@ class ServoChain(Generic[S, Q]):
         return None if answer is None or self._is_muted(servo_id) else answer
 
     def _answer(self, servo: S, code: int, params: bytes) -> Answer | None:
-        """Let one servo carry out an instruction; return its answer, None where it is silent."""
+        """Execute an instruction on one servo; return its answer, None if it is silent."""
         if not servo.advance(self._now_ms, self._fed_ms):
             return None
-        # Flags, id and delay as they were before: an answer leaves under the old settings.
+        # Read flags, id and delay first: an answer is sent with the old settings.
         answers, flag, servo_id = servo.answers(code), servo.error_flag, servo.id
         said = self.instructions.carry_out(servo, code, params)
         if said is None or not answers:
@@ -263,7 +263,7 @@ class ServoChain(Generic[S, Q]):
     # --- groups
 
     def _group_instructions(self) -> dict[int, GroupAction]:
-        """Return what is done for instructions to a group, by code."""
+        """Return the handlers of group instructions, by code."""
         return {
             PING: lambda params: self._out(self._ping_all()),
             SYNC_READ: lambda params: self._plain(self.instructions.sync_rows(params)),
@@ -271,12 +271,12 @@ class ServoChain(Generic[S, Q]):
         }
 
     def _ping_all(self) -> list[Answer]:
-        """Return the answers to a ping to all, in the order of the ids."""
+        """Return the answers to a broadcast ping, in the order of the ids."""
         answers = (self._answer_all(servo_id, PING, b"") for servo_id in sorted(self._by_id))
         return [answer for answer in answers if answer is not None]
 
     def _part(self, servo_id: int, address: int, length: int) -> Answer | None:
-        """Return a servo's part of a group read, None where it is silent."""
+        """Return a servo's part of a group read, None if it is silent."""
         servo = self._by_id.get(servo_id)
         answer = None if servo is None else self._seen(servo, address, length)
         for twin in self._twins.get(servo_id, ()) if self._twins else ():
@@ -292,7 +292,7 @@ class ServoChain(Generic[S, Q]):
         return Answer(servo_id, flag, data, self._delay_s[servo_id])
 
     def _plain(self, rows: Iterable[GroupRead]) -> list[Piece]:
-        """Answer a group read with one status a servo, in the order asked."""
+        """Answer a group read with one status per servo, in the order of the request."""
         if not self._wire.any and not self._twins:
             return self._undisturbed(rows)
         answers, late_s, policy = list[Answer](), 0.0, self.quirks.after_missing
@@ -308,7 +308,7 @@ class ServoChain(Generic[S, Q]):
         return self._out(answers)
 
     def _undisturbed(self, rows: Iterable[GroupRead]) -> list[Piece]:
-        """Do the same for unique ids and a line without faults: this happens every tick."""
+        """Answer a group read for unique ids and a line without faults: this happens every tick."""
         servos, now_ms, fed_ms = self._by_id, self._now_ms, self._fed_ms
         pieces, late_s, policy = list[Piece](), 0.0, self.quirks.after_missing
         for servo_id, address, length in rows:
@@ -327,7 +327,7 @@ class ServoChain(Generic[S, Q]):
         return pieces
 
     def _write_each(self, params: bytes) -> list[Piece]:
-        """Carry out a sync write; a servo that follows these very goals already is left alone."""
+        """Execute a sync write; skip servos that already follow the same goals."""
         address, rows = self.instructions.sync_writes(params)
         if self._wire.any or self._known.twins or self._known.shadows:
             return self._write_all([(servo_id, address, data) for servo_id, data in rows])
@@ -341,7 +341,7 @@ class ServoChain(Generic[S, Q]):
         return []
 
     def _write_all(self, writes: Iterable[GroupWrite]) -> list[Piece]:
-        """Carry out a group write; no servo answers."""
+        """Execute a group write; no servo answers."""
         if self._wire.any and self._wire.take("lose_writes", None, self._now_s):
             return []
         known = self._known
@@ -372,17 +372,17 @@ def build_chain(
     """Build servos and their bus.
 
     Args:
-        chain: that of a make.
+        chain: the chain type of a make.
         specs: a plain tuple is (id, model, start position in steps).
         now_s: the clock.
-        baud: the servos are set to it, all else as from the factory, and only clients at their
-            rate get answers; without one any rate works.
-        quirks: what servos do where documents and devices differ.
+        baud: rate of all servos, which keep their other factory settings; only clients at their
+            rate get answers; None: any rate works.
+        quirks: behaviour where documents and devices differ.
         seed: of the random numbers that faults draw.
-        make_shaft: makes the shaft of each servo.
+        make_shaft: creates the shaft of each servo.
 
     Raises:
-        ValueError: there is no such model, or it does not know this baud rate.
+        ValueError: the model is unknown, or does not support this baud rate.
     """
     now_ms = whole_ms(now_s())
     servos = [chain.servo_type(ServoSpec(*spec), now_ms, make_shaft) for spec in specs]

@@ -1,7 +1,7 @@
-"""What moves a shaft: its motor and mechanics as numbers, and the controller in front of it.
+"""Parameters of a shaft's motor and mechanics, and its controller.
 
-Inside an emulated servo lengths are steps (4096 a turn) and times milliseconds; torque is a share
-of the stall torque at the rated voltage, PWM a share of full.
+Inside an emulated servo lengths are steps (4096 per turn) and times milliseconds; torque is a
+share of the stall torque at the rated voltage, PWM a share of full PWM.
 """
 
 from math import inf, pi
@@ -10,24 +10,24 @@ from typing import NamedTuple, Protocol
 from gazerig.sim_mock.smart_servo.physics import Physics
 
 STEPS_PER_TURN = 4096
-"""Resolution of the encoder on the shaft; a make may count otherwise in its registers."""
+"""Resolution of the encoder on the shaft; registers of a make may have another one."""
 STEPS_PER_RAD = STEPS_PER_TURN / (2.0 * pi)
 MS_S = 0.001
 SAG_MOST = 0.5
-"""Share of the voltage that the supply may lose at stall; more would hunt."""
+"""Largest drop of the supply voltage at stall, as a share; more would oscillate."""
 
 
 class Motor(Protocol):
-    """What the shaft must know of a servo's motor and gear."""
+    """Data of a servo's motor and gear that the shaft needs."""
 
     @property
     def stall_torque_nm(self) -> float:
-        """Return the torque that holds it still."""
+        """Return the torque at stall."""
         ...
 
     @property
     def stall_current_a(self) -> float:
-        """Return the current it draws then."""
+        """Return the current at stall."""
         ...
 
     @property
@@ -37,7 +37,7 @@ class Motor(Protocol):
 
     @property
     def rated_v(self) -> float:
-        """Return the voltage that all this is for."""
+        """Return the voltage of these data."""
         ...
 
 
@@ -46,8 +46,8 @@ class Loop(NamedTuple):
 
     p, d, f1, f2: on position error, speed error, profile speed, profile acceleration
     i: per ms on position error; vi: per ms on speed error (velocity mode)
-    bias: constant part, in the modes without feedback
-    u_most: PWM limit; t_most: torque (current) limit; slew: most change of PWM per ms
+    bias: constant part, in modes without feedback
+    u_max: PWM limit; torque_max: torque (current) limit; slew: largest change of PWM per ms
     """
 
     p: float = 0.0
@@ -63,13 +63,13 @@ class Loop(NamedTuple):
 
 
 class Mechanics(NamedTuple):
-    """What never changes of a motor and its shaft, in steps and milliseconds.
+    """Constants of a motor and its shaft, in steps and milliseconds.
 
     accel: speed that the stall torque adds in 1 ms
-    drag, free: what divides a speed after 1 ms, with the motor's own braking and without
-    dry: speed that dry friction takes in 1 ms
+    drag, free: divisor of a speed per 1 ms, with the motor's own braking and without
+    dry: speed that dry friction removes in 1 ms
     rate: share of the rated voltage that the motor induces per step/ms
-    gravity: speed that the weight adds in 1 ms at its full lever; upright: where it has none
+    gravity: speed that the weight adds in 1 ms at its full lever; upright: position without lever
     play: half the dead travel; sag: share of the voltage that the supply loses at stall
     """
 
@@ -85,7 +85,7 @@ class Mechanics(NamedTuple):
 
 
 def mechanics_of(model: Motor, physics: Physics) -> Mechanics:
-    """Return the mechanics of a model in its physics."""
+    """Return the mechanics of a model with its physics."""
     stall_nm = model.stall_torque_nm
     top_rad_s = model.no_load_rpm * pi / 30.0
     inertia = physics.rotor_s * stall_nm / top_rad_s + physics.load_kg_m2
@@ -112,7 +112,7 @@ DISABLED = Loop(u_max=0.0, torque_max=0.0)
 
 
 def is_linear(loop: Loop, built: Mechanics) -> bool:
-    """True if five steps can be one: nothing is summed up, nothing depends on the position."""
+    """Return whether five steps can be one: no integral terms, no dependence on the position."""
     return (
         loop.i == loop.vi == loop.f2 == loop.bias == built.gravity == 0.0 and loop.torque_max == inf
     )

@@ -1,4 +1,4 @@
-"""What every emulated smart servo has between its registers and its shaft."""
+"""Common base of the part between an emulated smart servo's registers and its shaft."""
 
 from abc import ABC, abstractmethod
 from typing import Any
@@ -14,20 +14,20 @@ from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 class Drive(ABC):
     """Modes, goals and origin of one servo.
 
-    It reads the registers and never refuses anything: what may be written is decided elsewhere.
+    It reads the registers and never refuses a value: the servo decides which writes are permitted.
 
     Args:
         memory: of the servo.
         model: of the servo.
         spec: of the servo.
-        scale: steps of the registers for one of the 4096 steps of the shaft's turn.
-        make_shaft: makes its shaft.
+        scale: steps of the registers per step of the shaft (4096 per turn).
+        make_shaft: creates its shaft.
 
     Attributes:
         torque: whether it is switched on.
-        mode: operating mode in force.
-        followed: address and bytes of the last write of goals, while the same again would
-            change nothing; None otherwise.
+        mode: present operating mode.
+        followed: address and bytes of the last write of goals, while repeating it would change
+            nothing; None otherwise.
     """
 
     torque = False
@@ -61,14 +61,14 @@ class Drive(ABC):
     @property
     @abstractmethod
     def position_steps(self) -> float:
-        """Return the true position of the shaft in the registers' terms, finer than they are."""
+        """Return the true position of the shaft in the registers' unit, with fractions."""
 
     @abstractmethod
     def turn(self, steps: float) -> None:
         """Turn the joint by hand, in the registers' direction."""
 
     def _flicker(self, now_ms: int) -> tuple[int, int]:
-        """Return the noise of current and velocity while the shaft holds still."""
+        """Return the noise of current and velocity while the shaft holds its position."""
         return self._noise[now_ms + self._noise_from_ms & LENGTH - 1]
 
     def _lead_from_here(self, by_speed: bool) -> None:
@@ -77,6 +77,6 @@ class Drive(ABC):
         shaft.start(SpeedProfile(shaft.x, shaft.v) if by_speed else PositionProfile(shaft.x))
 
     def _set_goal_here(self) -> None:
-        """Make the goal position the present one."""
+        """Set the goal position to the present position."""
         self.followed = None
         self.memory.set("goal_position", round(self.position_steps))

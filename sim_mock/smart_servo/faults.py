@@ -1,4 +1,4 @@
-"""What can go wrong with emulated smart servos and their joints, beside all on their line."""
+"""Faults of emulated smart servos and their joints, in addition to those of their line."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -17,12 +17,12 @@ from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
 
 class Chain(Protocol):
-    """Interface of a chain for its faults."""
+    """Interface of a chain to its faults."""
 
     now_s: Callable[[], float]
 
     def here(self, servo_id: int) -> EmulatedServo:
-        """Return a servo by id, brought up to now."""
+        """Return a servo by id, advanced to the present time."""
         ...
 
     def ids(self) -> tuple[int, ...]:
@@ -30,23 +30,23 @@ class Chain(Protocol):
         ...
 
     def join(self, servo_id: int) -> None:
-        """Put a second servo with this id on the chain."""
+        """Add a second servo with this id to the chain."""
         ...
 
     def choose(self, case: str, value: str) -> None:
-        """Choose what servos do where documents and devices differ."""
+        """Choose the servos' behaviour where documents and devices differ."""
         ...
 
 
 class ServoFaults(LineFaults):
-    """The faults of one chain."""
+    """Faults of one chain."""
 
     def __init__(self, chain: Chain, commands: CommandTable, seed: int, header: bytes) -> None:
         super().__init__(chain, commands, seed, header)
         self.chain = chain
 
     def servos(self, servo_id: int | None) -> list[EmulatedServo]:
-        """Return a servo, or all (None), brought up to now."""
+        """Return a servo, or all (None), advanced to the present time."""
         ids = self.chain.ids() if servo_id is None else (servo_id,)
         return [self.chain.here(one) for one in ids]
 
@@ -65,11 +65,11 @@ def _reset(faults: ServoFaults, servo_id: int) -> str:
     error = servo.reset_all()
     if error:
         raise ValueError(f"servo {servo_id} refuses with error {error}: its torque is on")
-    return f"servo {servo_id} is as from the factory: id {servo.id}, {servo.baud} bit/s"
+    return f"servo {servo_id} has factory settings: id {servo.id}, {servo.baud} bit/s"
 
 
 def _fails(error: str) -> Do:
-    """Return what lets an error of one servo arise."""
+    """Return a command that triggers an error of one servo."""
     return lambda faults, servo_id: f"servo {servo_id} {faults.chain.here(servo_id).fail(error)}"
 
 
@@ -85,7 +85,7 @@ def _suffers(do: Callable[..., None], text: str) -> Do:
 
 
 def _has(attribute: str, unit: str) -> Do:
-    """Return what sets a quantity of one servo, or of all."""
+    """Return a command that sets a quantity of one servo, or of all."""
     return _suffers(lambda s, value: setattr(s, attribute, value), f"{{label}} has {{:g}} {unit}")
 
 
@@ -93,13 +93,13 @@ def _has(attribute: str, unit: str) -> Do:
 def commands_of(
     highest_id: int, quirks: type[ChainQuirks], without: Sequence[str] = (), reset: str = ""
 ) -> CommandTable:
-    """Return what can be asked of one make of servos as text.
+    """Return the fault commands of one make of servos.
 
     Args:
         highest_id: of a servo.
         quirks: of this make.
-        without: what cannot happen to it.
-        reset: what the command of that name makes of a servo.
+        without: commands that do not apply to it.
+        reset: effect of the command ``reset``.
     """
     one = Argument("ID", whole(0, highest_id, "a servo id"))
     some = Argument("ID", or_all(one.read))
@@ -108,25 +108,25 @@ def commands_of(
         **packet_verbs(one),
         **adapter_verbs(),
         "collide": Verb(_collide, (one,), "a second servo with this id joins the bus"),
-        "overload": Verb(_fails("overload"), (one,), "let the overload protection act"),
+        "overload": Verb(_fails("overload"), (one,), "trigger the overload protection"),
         "overheat": Verb(_fails("overheating"), (one,), "the motor is too hot"),
         "encoder": Verb(_fails("encoder"), (one,), "the angle sensor is broken"),
         "shock": Verb(_fails("electrical shock"), (one,), "latch the electrical shock error"),
         "brown-out": Verb(_suffers(EmulatedServo.restart, "{label} restarts"), (one,),
-                          "restart as a dip of the supply makes it: no status tells"),
-        "reset": Verb(_reset, (one,), f"as from the factory: {reset}"),
+                          "restart as after a dip of the supply: no status shows it"),
+        "reset": Verb(_reset, (one,), f"restore factory settings: {reset}"),
         "voltage": Verb(_has("supply_v", "V"), (some, Argument("V", number(0.0, 30.0, "volts"))),
-                        "supply with another voltage"),
+                        "change the supply voltage"),
         "temperature": Verb(_has("temperature_c", "degC"),
                             (some, Argument("C", number(-40.0, 200.0, "degC"))),
-                            "give the motor a temperature; it drifts on by itself"),
+                            "set the motor's temperature, which then drifts"),
         "stick": Verb(_suffers(lambda servo: servo.jam(True), "{label} is stuck"), (some,),
-                      "jam the joint where it is"),
+                      "jam the joint at its position"),
         "free": Verb(_suffers(lambda servo: servo.jam(False), "{label} is free"), (some,),
-                     "let a jammed joint go"),
+                     "free a jammed joint"),
         "load": Verb(_suffers(EmulatedServo.set_load, "{label} carries {:g} Nm"),
                      (some, Argument("NM", number(-100.0, 100.0, "Nm"))),
-                     "hang a constant torque on the joint"),
+                     "apply a constant torque to the joint"),
         "turn": Verb(_suffers(EmulatedServo.turn, "{label} was turned by {:g} steps"),
                      (some, Argument("STEPS", number(-1e6, 1e6, "steps"))), "turn the joint by hand"),
         **closing_verbs(one),

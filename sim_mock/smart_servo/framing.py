@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 PING, READ, WRITE, REG_WRITE, ACTION, FACTORY_RESET, REBOOT = 1, 2, 3, 4, 5, 6, 8
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
-"""Codes of the instructions that all makes have."""
+"""Codes of the instructions that are common to all makes."""
 
 
 class Instruction(NamedTuple):
-    """A packet found.
+    """An instruction packet.
 
-    code: -1 where the check at its end is wrong; params: as they were meant
+    code: -1 if its checksum is wrong; params: without byte stuffing
     end: position of its last byte + 1, counted from the first byte of the newest piece
     """
 
@@ -30,7 +30,7 @@ class Framing(ABC):
     """Finds instructions in bytes that arrive in pieces.
 
     Args:
-        gap_s: a packet that stays unfinished so long is dropped.
+        gap_s: time after which an unfinished packet is dropped, seconds.
     """
 
     def __init__(self, gap_s: float, now_s: float) -> None:
@@ -40,12 +40,12 @@ class Framing(ABC):
         self._known: dict[bytes, list[Instruction]] = {}
 
     def forget(self) -> None:
-        """Drop an unfinished packet, and the kept ones."""
+        """Drop an unfinished packet, and the cached ones."""
         self._unfinished = b""
         self._known.clear()
 
     def feed(self, data: bytes, now_s: float) -> list[Instruction]:
-        """Return the instructions that bytes which arrive now complete."""
+        """Return the instructions that these bytes complete; they arrive now."""
         if not self._unfinished:
             self._arrived_s = now_s
             known = self._known.get(data)
@@ -59,7 +59,7 @@ class Framing(ABC):
         return found
 
     def _search_alone(self, data: bytes) -> list[Instruction]:
-        """Return the instructions in bytes that nothing came before; keep those of a read."""
+        """Return the instructions in bytes at the start of a packet; cache those of a read."""
         found, self._unfinished = self._search(data, 0)
         if len(found) == 1 and found[0].code in _READS and not self._unfinished:
             if len(self._known) >= _MAX_KNOWN:
@@ -69,7 +69,7 @@ class Framing(ABC):
 
     @abstractmethod
     def _search(self, data: bytes, before: int) -> tuple[list[Instruction], bytes]:
-        """Return the instructions in these bytes, and what may be the begin of another.
+        """Return the instructions in these bytes, and the possible start of another.
 
-        before: so many of the bytes came in earlier pieces
+        before: number of bytes that arrived in earlier pieces
         """

@@ -1,4 +1,4 @@
-"""The instructions that all makes have, as one servo carries them out, and those of groups."""
+"""The instructions common to all makes, for one servo and for groups."""
 
 import struct
 from collections.abc import Callable, Iterable, Mapping
@@ -24,8 +24,8 @@ class InstructionSet(Generic[S]):
     """Instructions of one make of servos.
 
     Args:
-        address_bytes: so many bytes an address has in a packet; a length has as many.
-        misunderstood: the result of what is no instruction; None: silence.
+        address_bytes: bytes of an address or a length in a packet.
+        misunderstood: the result of an unknown instruction; None: silence.
         own: instructions of this make, by code.
     """
 
@@ -49,16 +49,16 @@ class InstructionSet(Generic[S]):
         }
 
     def carry_out(self, servo: S, code: int, params: bytes) -> Result | None:
-        """Let a servo carry out an instruction; return its answer, None for silence."""
+        """Execute an instruction on a servo; return its answer, None for silence."""
         action = self._actions.get(code)
         return self._misunderstood if action is None else action(servo, params)
 
     def sync_rows(self, params: bytes) -> tuple[GroupRead, ...]:
-        """Read the parameters of a sync read."""
+        """Parse the parameters of a sync read."""
         return _sync_rows(self._span, params)
 
     def sync_writes(self, params: bytes) -> tuple[int, Iterable[tuple[int, bytes]]]:
-        """Return address, ids and data of a sync write; no ids where they do not add up."""
+        """Return address, ids and data of a sync write; no ids if the lengths do not match."""
         if len(params) < self._span.size:
             return 0, ()
         address, length = self._span.unpack_from(params)
@@ -67,7 +67,7 @@ class InstructionSet(Generic[S]):
         return address, _row(length).iter_unpack(params[self._span.size :])
 
     def address_of(self, params: bytes) -> int:
-        """Return the address that a write begins with."""
+        """Return the address at the start of a write."""
         return int.from_bytes(params[: self._address_bytes], "little")
 
     def _read(self, servo: S, params: bytes) -> Result | None:
@@ -84,13 +84,13 @@ class InstructionSet(Generic[S]):
 
 @cache
 def _row(length: int) -> struct.Struct:
-    """Return how one servo's part of a sync write stands in its packet."""
+    """Return the layout of one servo's part of a sync write."""
     return struct.Struct(f"<B{length}s")
 
 
 @lru_cache(maxsize=64)
 def _sync_rows(span: struct.Struct, params: bytes) -> tuple[GroupRead, ...]:
-    """Read the parameters of a sync read; a control loop's are the same again and again."""
+    """Parse the parameters of a sync read; cached, because a control loop repeats them."""
     if len(params) <= span.size:
         return ()
     address, length = span.unpack_from(params)

@@ -1,8 +1,8 @@
-"""How an emulated shaft moves on: by steps of 1 ms, or by five of them at once.
+"""Motion of an emulated shaft: in steps of 1 ms, or in five of them at once.
 
-One step is an implicit one: P and D act on position and speed at its end, as the real loop, much
-faster than 1 kHz, would make them act on the way. So no gain the registers allow can shake the
-numbers to infinity. Five steps are one linear map while nothing changes sides (see span.py).
+A step is implicit: P and D act on position and speed at its end, because the real loop, much
+faster than 1 kHz, acts during the step. So no gain of the registers makes the numbers diverge.
+Five steps are one linear map while no sign changes (see span.py).
 """
 
 from collections.abc import Sequence
@@ -20,17 +20,17 @@ from gazerig.sim_mock.smart_servo.span import (
 )
 
 SLOWEST = 1e-4
-"""Speeds below, in steps/ms, are none."""
+"""Lower speeds, in steps/ms, count as 0."""
 
 HELD_SAFELY = 0.999
-"""Share of the dry friction that surely holds."""
+"""Share of the dry friction that certainly holds."""
 
 RESOLUTION = 0.5
-"""The encoder sees no smaller error: the I part rests inside it, in steps."""
+"""Resolution of the encoder: the I part rests within this error, in steps."""
 
 
 class ShaftState(NamedTuple):
-    """All that moves of a shaft, and where its profile is."""
+    """All variables of a shaft's motion, and the state of its profile."""
 
     x: float
     v: float
@@ -44,14 +44,14 @@ class ShaftState(NamedTuple):
 
 
 class ShaftMotion:
-    """What moves of a shaft, and how.
+    """The variables of a shaft's motion, and their integration.
 
-    x, v: position in steps and speed in steps/ms, as the encoder would see them, unrounded
+    x, v: position in steps and speed in steps/ms, as the encoder would measure them, unrounded
     joint: position of the joint behind the play
-    u, effort: PWM and torque (which is current) as shares
+    u, effort: PWM and torque (proportional to current) as shares
     supply: open-circuit voltage, and
     volts: present voltage, both as shares of the rated one
-    quiet: nothing will change until something is written or a hand pushes
+    quiet: nothing will change until a write or a push by hand
     """
 
     __slots__ = (
@@ -82,13 +82,13 @@ class ShaftMotion:
     _weights: dict[tuple[int, float], SpanWeights]
 
     def run(self, ticks: int) -> None:
-        """Move on by so many milliseconds.
+        """Advance by a number of milliseconds.
 
-        The shaft moves from change to change in spans of 5 ms. What is read in the middle of one
-        is computed from the span's start each time, so it does not change how the span ends.
+        The shaft moves from change to change in spans of 5 ms. A reading within a span is computed
+        from the span's start each time, so it does not change the end of the span.
         """
         if ticks == SPAN_MS and not self._since_ms and not self.quiet:
-            self._advance(SPAN_MS)  # this happens every tick of a loop at 200 Hz
+            self._advance(SPAN_MS)  # in every tick of a loop at 200 Hz
             return
         while ticks > 0 and not self.quiet:
             since = self._since_ms
@@ -114,15 +114,15 @@ class ShaftMotion:
         self.profile.restore(state.profile)
 
     def _advance(self, ticks: int) -> None:
-        """Move on by some milliseconds, at once if that can be, else one by one."""
+        """Advance by some milliseconds, in one map if possible, else one by one."""
         loop, profile, v = self._loop, self.profile, self.v
-        # Where there is no speed to follow, D brakes only.
+        # Without a speed to follow, D only brakes.
         kr = 0.0 if profile.jumps else loop.d + loop.f1
         led = profile.running
         linear = self._linear and self._integral == 0.0
         quick = linear and ticks == SPAN_MS
-        # The quick ways: friction holds it, or it moves on. Where the duty may change only
-        # slowly, as in X330 servos, it meets that limit too often.
+        # The fast paths: friction holds it, or it moves on. With a limited change of the duty, as
+        # in X330 servos, it meets that limit too often.
         if quick and v == 0.0 and not led and self._stick(kr):
             return
         before = profile.r
@@ -136,7 +136,7 @@ class ShaftMotion:
             self._follow(path, before, kr)
 
     def _leave_rest(self, path: Sequence[float], before: float, kr: float) -> None:
-        """Follow a path from rest, and see whether it stays at rest for good."""
+        """Follow a path from rest, and check whether it stays at rest permanently."""
         was = self.x, self.u, self._integral, self.joint, self.volts
         if not (self._linear and self._integral == 0.0 and self._step(path, before, kr)):
             self._follow(path, before, kr)
@@ -144,7 +144,7 @@ class ShaftMotion:
             self.quiet = was == (self.x, self.u, self._integral, self.joint, self.volts)
 
     def _stick(self, kr: float) -> bool:
-        """Stay where it is for a span if friction holds it; return False if it may not."""
+        """Hold the position for a span if friction holds it; return False if it may not."""
         kp, slew, u_max, built = self._loop.p, self._loop.slew, self._loop.u_max, self._built
         rv, pulled = self._rv, kp * (self.profile.r - self.x)
         push, load = built.accel * self.supply, self._load
@@ -169,10 +169,10 @@ class ShaftMotion:
         return True
 
     def _glide(self, path: Sequence[float] | None, before: float, kr: float) -> bool:
-        """Move for a span if nothing changes sides in it; return False if something may.
+        """Move for a span if no sign changes in it; return False if one may change.
 
-        path: the profile's position after each millisecond, None where it rests
-        before: that at the start
+        path: the profile's position after each millisecond, None if it rests
+        before: its position at the start
         """
         loop = self._loop
         accel, drag, _, dry, rate, _, _, play, sag = self._built
@@ -188,7 +188,7 @@ class ShaftMotion:
             p1, p2, p3, p4, end = path
             first, d2, d3, d4, d5 = p1 - before, p2 - p1, p3 - p2, p4 - p3, end - p4
             bend = abs(d3 - d2 - d2 + first) + abs(d4 - d3 - d3 + d2) + abs(d5 - d4 - d4 + d3)
-            # So much the duty may change beyond its first change where the profile bends.
+            # The largest change of the duty after its first change when the profile bends.
             jump = (kp + kr * SMOOTHING) * bend * drag / divisor
         torque = self._load - dry if v > 0.0 else self._load + dry
         rv_first = rv + (first - rv) * SMOOTHING
@@ -222,9 +222,9 @@ class ShaftMotion:
         return True
 
     def _step(self, path: Sequence[float], before: float, kr: float) -> bool:
-        """Do what ``_follow`` does, the same to the bit, while no limit is met; else return False.
+        """Do the same as ``_follow``, bit by bit, while no limit is met; else return False.
 
-        This happens every tick to whatever starts, stops or turns round.
+        This happens every tick while the shaft starts, stops or reverses.
         """
         kp, u_max, slew = self._loop.p, self._loop.u_max, self._loop.slew
         accel, drag, _, dry, rate, _, _, play, sag = self._built
@@ -263,7 +263,7 @@ class ShaftMotion:
         return True
 
     def _follow(self, path: Sequence[float], before: float, kr: float) -> None:
-        """Follow a path of one position a millisecond, with a gain on its speed."""
+        """Follow a path of one position per millisecond, with a gain on its speed."""
         kp, ki, kd, vi, _, kf2, bias, u_max, torque_max, slew = self._loop
         accel, drag, free, dry, rate, gravity, upright, play, sag = self._built
         x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint

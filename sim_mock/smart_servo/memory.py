@@ -6,7 +6,7 @@ from typing import Generic, Protocol, TypeVar
 
 
 class RegisterPlace(Protocol):
-    """Where a register is."""
+    """Name, address and size of a register."""
 
     @property
     def name(self) -> str:
@@ -31,7 +31,7 @@ class ServoMemory(ABC, Generic[R]):
     """One servo's registers.
 
     Attributes:
-        bytes: what is read.
+        bytes: the bytes that a read returns.
     """
 
     def __init__(self, registers: Iterable[R], size: int) -> None:
@@ -45,11 +45,11 @@ class ServoMemory(ABC, Generic[R]):
         return self._decode(register, self.bytes[at : at + register.size])
 
     def set(self, name: str, value: int) -> None:
-        """Set a register whatever its access."""
+        """Set a register regardless of its access."""
         self.put(self._by_name[name], value)
 
     def keep(self, name: str, value: int) -> None:
-        """Set a register so that it outlasts power-off, where that differs from ``set``."""
+        """Set a register permanently, if that differs from ``set``."""
         self.set(name, value)
 
     def put(self, register: R, value: int) -> None:
@@ -58,7 +58,7 @@ class ServoMemory(ABC, Generic[R]):
         self.bytes[at : at + register.size] = self._encode(register, value)
 
     def has(self, name: str) -> bool:
-        """True if this model has a register."""
+        """Return whether this model has a register."""
         return name in self._by_name
 
     def named(self, name: str) -> R:
@@ -67,11 +67,11 @@ class ServoMemory(ABC, Generic[R]):
 
     @abstractmethod
     def power_up(self) -> None:
-        """Set the registers that power-on sets."""
+        """Set the registers to their values after power-on."""
 
     @abstractmethod
     def _decode(self, register: R, data: bytes | bytearray) -> int:
-        """Return the value that a register's bytes stand for."""
+        """Return the value of a register's bytes."""
 
     @abstractmethod
     def _encode(self, register: R, value: int) -> bytes:

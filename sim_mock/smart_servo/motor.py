@@ -1,6 +1,6 @@
 """The shaft of an emulated servo: controller, motor, friction, stops, play.
 
-What is read does not depend on how often it is read.
+Readings do not depend on how often they are taken.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ class Shaft(ShaftMotion):
     Args:
         model: motor and gear.
         physics: friction, load, stops, play, supply.
-        position_steps: where it is at first.
+        position_steps: initial position.
     """
 
     __slots__ = ("_held", "_low_high")
@@ -43,15 +43,15 @@ class Shaft(ShaftMotion):
         self.profile = PositionProfile(position_steps)
         self.place(position_steps)
 
-    # --- from outside
+    # --- external events
 
     def resume(self) -> None:
-        """Go on from the present state after anything has changed, the profile too."""
+        """Continue from the present state after any change, including the profile's."""
         self.quiet = False
         self._since_ms = 0
 
     def place(self, position_steps: float) -> None:
-        """Place the shaft at rest between its stops; profile and controller go on from there."""
+        """Place the shaft at rest between its stops; profile and controller continue from there."""
         x = min(max(float(position_steps), self._low_high[0]), self._low_high[1])
         self.x = self.joint = x
         self.v = self._rv = self.u = self.effort = self._integral = 0.0
@@ -62,12 +62,12 @@ class Shaft(ShaftMotion):
         self.resume()
 
     def turn(self, steps: float) -> None:
-        """Turn the shaft by hand, up to its stops; the controller keeps acting."""
+        """Turn the shaft by hand, up to its stops; the controller remains active."""
         self.x = min(max(self.x + steps, self._low), self._high)
         self.resume()
 
     def jam(self, stuck: bool) -> None:
-        """Jam the joint where it is, or free it."""
+        """Jam the joint at its position, or free it."""
         self._held = stuck
         self._low, self._high = (self.x, self.x) if stuck else self._low_high
         self.resume()
@@ -82,7 +82,7 @@ class Shaft(ShaftMotion):
         self.supply = self.volts = supply
         self.resume()
 
-    # --- from the servo
+    # --- calls of the servo
 
     def drive(self, loop: Loop) -> None:
         """Apply controller settings."""
@@ -109,8 +109,8 @@ class Shaft(ShaftMotion):
     def skip(self, ticks: int) -> None:
         """Skip a long time: the shaft moves as far as its profile, between its stops.
 
-        What is not at rest after seconds without a question is led by a slow profile, turns
-        for ever, or hunts around its goal; the last stays as it is.
+        A shaft that is not at rest after seconds without a packet follows a slow profile, turns
+        permanently, or oscillates around its goal; the last does not change.
         """
         if self.quiet or ticks <= 0:
             return
@@ -118,7 +118,7 @@ class Shaft(ShaftMotion):
         before = self.profile.r
         self.profile.skip(ticks)
         moved = self.profile.r - before
-        if self._loop.bias:  # without feedback: on at the speed it has
+        if self._loop.bias:  # without feedback: it keeps its speed
             moved = self.v * ticks
         self.x = min(max(self.x + moved, self._low), self._high)
         play = self._built.play
@@ -131,9 +131,9 @@ class Shaft(ShaftMotion):
 
 
 ShaftMaker = Callable[[int, Motor, Physics, float], Shaft]
-"""Makes the shaft of a servo: of its id, motor, physics and first position in steps."""
+"""Creates the shaft of a servo from its id, motor, physics and first position in steps."""
 
 
 def own_shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
-    """Return a shaft with mechanics of its own: nothing but its own load acts on it."""
+    """Return an independent shaft: only its own load acts on it."""
     return Shaft(model, physics, position_steps)

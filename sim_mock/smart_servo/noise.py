@@ -1,18 +1,18 @@
-"""Noise of the readings of a servo that holds still."""
+"""Noise of the readings of a servo that holds its position."""
 
 from functools import lru_cache
 
 LENGTH = 4096
-"""Milliseconds after which it repeats; a power of 2."""
+"""Period in milliseconds; a power of 2."""
 SEED_APART_MS = 1009
-"""Servos of different seeds are so far apart in it."""
+"""Offset in time between servos of consecutive seeds."""
 
 
 @lru_cache(maxsize=8)
 def flicker(current: int, velocity: int) -> tuple[tuple[int, int], ...]:
     """Return the noise of current and velocity for each of ``LENGTH`` milliseconds.
 
-    A number of the time alone, so that reading does not change it; velocity is mostly 0.
+    It depends on the time only, so that reading does not change it; velocity is mostly 0.
     """
     return tuple(_noise(now_ms, current, velocity) for now_ms in range(LENGTH))
 

@@ -1,15 +1,15 @@
-"""Long times without a packet, of which a servo lives only the begin and the end."""
+"""Long times without a packet, of which only the start and the end are simulated."""
 
 PAUSE_MS = 10_000
-"""A time without any packet that is longer is not lived through millisecond by millisecond."""
+"""Longest time without a packet that is simulated millisecond by millisecond."""
 _BEFORE_MS, _AFTER_MS = 3_000, 1_000
-"""Of such a pause these are: whatever was begun ends, and what is asked then is in motion."""
+"""Simulated start and end of a pause: motions end in the first, readings vary in the second."""
 
 
 def long_pause(now_ms: int, until_ms: int, unit_ms: int) -> tuple[int, int]:
-    """Return start and length of the part of a pause that is skipped; (until, 0) for short pauses.
+    """Return start and length of the skipped part of a pause; (until, 0) for short pauses.
 
-    unit_ms: The time passed at once is a whole number of these.
+    unit_ms: the skipped time is a multiple of it.
     """
     if until_ms - now_ms <= PAUSE_MS:
         return until_ms, 0

@@ -1,8 +1,8 @@
-"""Physical parameters of an emulated servo, and the specification it is built from.
+"""Physical parameters of an emulated servo, and its specification.
 
-Stall torque, stall current and no-load speed are the model's own and stand in
-gazerig.drivers.dynamixel.control_table. What no data sheet states is an assumption, marked [A];
-what follows from a report of users, [R].
+Stall torque, stall current and no-load speed belong to the model, in
+gazerig.drivers.dynamixel.control_table. Values that no data sheet contains are assumptions, marked
+[A]; values that follow from a report of users are marked [R].
 """
 
 from collections.abc import Sequence
@@ -15,28 +15,28 @@ class Physics(NamedTuple):
 
     rotor_s: s; rotor inertia as the time to no-load speed at stall torque. 0.0373 [A] gives an
         XL330-M077 2.0e-4 kg m2 at its output; the same motor has the same behind any gear.
-    load_kg_m2: kg m2; inertia of what the joint carries, besides the rotor's.
-    coulomb_share: share of the stall torque that dry friction takes. 0.03 lets a P gain of 640
-        stop up to 5 steps short, as XL430 do (4-10) [R].
+    load_kg_m2: kg m2; inertia of the joint's load, in addition to the rotor's.
+    coulomb_share: dry friction as a share of the stall torque. 0.03 lets a P gain of 640 stop up
+        to 5 steps short, as XL430 do (4-10) [R].
     viscous_share: share of the stall torque lost at no-load speed [A]. With both frictions
         the servo still reaches the no-load speed of its data sheet.
     load_nm: Nm; constant torque on the joint, e.g. a spring or a cable [A: none].
     gravity_nm: Nm; weight times lever: the torque is gravity_nm * sin(x - upright_steps), so
-        it drives the joint away from ``upright_steps`` where positive, back to it where negative.
+        it drives the joint away from ``upright_steps`` if positive, towards it if negative.
     upright_steps: steps of the encoder at which gravity has no lever.
     stop_low_steps, stop_high_steps: steps of the encoder; hard stops of the joint, no bounce.
     play_deg: deg; dead travel between output shaft and joint, 0.25 as in the data sheets of
-        the X430. The encoder of X servos sits on the output, so what the registers tell
-        has no play; ``Shaft.joint`` has it. Play inside the gear is left out.
-    supply_v: V; open-circuit voltage at the plug; None: the voltage the model is rated at.
-    supply_ohm: ohm; cable and connector, so that load sags the voltage [A]; at most 1.
+        the X430. The encoder of X servos is at the output, so the registers show no play;
+        ``Shaft.joint`` has it. Play inside the gear is omitted.
+    supply_v: V; open-circuit voltage at the plug; None: the rated voltage of the model.
+    supply_ohm: ohm; cable and connector, so that load lowers the voltage [A]; at most 1.
     ambient_c: degC inside the head [A].
     stall_rise_c: K; final rise above ambient at stall current [A].
     thermal_s: s; time constant of warming and cooling [A].
     overload_share: share of the stall torque at the present voltage that counts as
-        overload; overload_s: s; how long until it latches [A: no data sheet states].
+        overload; overload_s: s; duration until it latches [A: in no data sheet].
     brown_out_share: share of the rated voltage below which the servo restarts [A].
-    noise_current: units; largest flicker of Present Current while it holds still [R: 1-3].
+    noise_current: units; largest noise of Present Current at rest [R: 1-3].
     noise_velocity: units; the same of Present Velocity.
     """
 
@@ -63,13 +63,13 @@ class Physics(NamedTuple):
 
 
 class Quirks(NamedTuple):
-    """Behaviour that differs between firmware, or is only reported.
+    """Behaviour that differs between firmware versions, or is only reported.
 
     goal_at_torque_on: True: torque on sets the goal to the present position; False: the old
-        goal is kept and the joint snaps to it, as XL330 do [R].
-    wrap_at_torque_on: a homing offset in position mode makes the position jump by a turn as
-        the torque comes on, where it lies outside one turn [R].
-    mute_reboot: no status is sent for a reboot instruction [R: XL430].
+        goal stays and the joint snaps to it, as XL330 do [R].
+    wrap_at_torque_on: with a homing offset in position mode, torque on makes a position outside
+        one turn jump by a turn [R].
+    mute_reboot: a reboot instruction gets no status [R: XL430].
     """
 
     goal_at_torque_on: bool = False
@@ -78,7 +78,7 @@ class Quirks(NamedTuple):
 
 
 class ServoSpec(NamedTuple):
-    """How to build one servo. The seed is that of its noise; None: its id."""
+    """Specification of one servo. The seed is that of its noise; None: its id."""
 
     id: int
     model: str
@@ -102,7 +102,7 @@ def checked(physics: Physics) -> Physics:
     if not physics.stop_low_steps <= physics.stop_high_steps:
         raise ValueError("servo physics: stop_low_steps is above stop_high_steps")
     if physics.coulomb_share + physics.viscous_share > 0.9:
-        raise ValueError("servo physics: both frictions together take more than 0.9 of the torque")
+        raise ValueError("servo physics: both frictions together exceed 0.9 of the torque")
     return physics
 
 

@@ -1,24 +1,24 @@
 """The profile generator of an emulated servo: from a goal to a position for every millisecond.
 
-Units: steps and milliseconds. The path to a goal is planned once, in closed form, from
-where the generator is and how fast it moves: a phase that reaches the cruise speed, one
-that holds it, one that brakes. So its values do not depend on when it is called.
+Units: steps and milliseconds. The path to a goal is planned once, in closed form, from the
+generator's position and speed: a phase that reaches the cruise speed, a constant phase, a braking
+phase. So its values do not depend on when it is called.
 Source: ROBOTIS e-Manual, X series, "What is the Profile".
 """
 
 from math import ceil, copysign, sqrt
 
 STEP, RECTANGLE, TRIANGLE, TRAPEZOID = 0, 1, 2, 3
-"""Profile types as bits 4-5 of Moving Status (123) name them."""
+"""Profile types as numbered by bits 4-5 of Moving Status (123)."""
 
 
 class PositionProfile:
     """Reference position and speed of the shaft.
 
     r, v: position in steps and speed in steps/ms now
-    goal: where it leads
+    goal: end of the path
     kind: profile type
-    running: whether it is still on its way
+    running: whether it has not reached its end
     """
 
     __slots__ = (
@@ -31,11 +31,11 @@ class PositionProfile:
 
     @property
     def jumps(self) -> bool:
-        """True if it has no speed to follow: Velocity Trajectory of a step is 0."""
+        """Return whether it has no speed to follow: Velocity Trajectory of a step is 0."""
         return self.kind == STEP
 
     def rest(self, position: float) -> None:
-        """Stand at a position."""
+        """Rest at a position."""
         self._t = 0
         self.r = self.goal = position
         self.v = 0.0
@@ -43,11 +43,11 @@ class PositionProfile:
         self.running = False
 
     def state(self) -> tuple[float, ...]:
-        """Return where on its plan it is, for ``restore``."""
+        """Return the state within its plan, for ``restore``."""
         return self._t, self.r, self.v, self.running
 
     def restore(self, state: tuple[float, ...]) -> None:
-        """Go back on the same plan."""
+        """Return to an earlier state of the same plan."""
         t, self.r, self.v, running = state
         self._t = int(t)
         self.running = bool(running)
@@ -67,7 +67,7 @@ class PositionProfile:
         if cruise <= 0.0:
             self.step(goal)
         elif ramp <= 0.0:
-            # The everyday one, two hundred times a second: planned here, at once.
+            # The usual case, two hundred times a second, is planned here directly.
             distance = goal - self.r
             self.goal, self.kind, self.running = goal, RECTANGLE, True
             self._t, self._t1, self._p1, self._slow = 0, 0.0, self.r, 0.0
@@ -78,7 +78,7 @@ class PositionProfile:
             self._ramps(goal, cruise, ramp)
 
     def by_time(self, goal: float, total_ms: float, ramp_ms: float) -> None:
-        """Plan to a goal in a time (0: step); each ramp takes its part of it, half at most."""
+        """Plan to a goal in a time (0: step); each ramp takes at most half of it."""
         distance = goal - self.r
         if total_ms <= 0.0:
             self.step(goal)
@@ -128,7 +128,7 @@ class PositionProfile:
         begin, start, out, p1 = self._from, self._start, self._out, self._p1
         cruise, slow, end = self._cruise, self._slow, begun + ticks
         times = range(begun + 1, end + 1)
-        if end < t1:  # the everyday ones: all in one phase
+        if end < t1:  # the usual cases: all in one phase
             path = [begin + t * (start + t * out) for t in times]
             self.v = start + 2.0 * end * out
         elif t1 <= begun + 1 and end < t2:
@@ -162,7 +162,7 @@ class PositionProfile:
         return self._from + t * (self._start + t * self._out)
 
     def skip(self, ticks: int) -> None:
-        """Advance by many milliseconds at once."""
+        """Advance by many milliseconds in one step."""
         if not self.running:
             return
         self._t = t = self._t + ticks
@@ -185,7 +185,7 @@ class PositionProfile:
 class SpeedProfile:
     """Reference of the velocity mode: a ramp to a speed.
 
-    ``r`` counts on from where it started; only its changes matter.
+    ``r`` continues from its start; only its changes matter.
     """
 
     jumps = False
@@ -199,16 +199,16 @@ class SpeedProfile:
         self.running = False
 
     def state(self) -> tuple[float, ...]:
-        """Return where on its plan it is, for ``restore``."""
+        """Return the state within its plan, for ``restore``."""
         return self.r, self.v, self.running
 
     def restore(self, state: tuple[float, ...]) -> None:
-        """Go back on the same plan."""
+        """Return to an earlier state of the same plan."""
         self.r, self.v, running = state
         self.running = bool(running)
 
     def set_goal(self, speed: float, ramp: float) -> None:
-        """Plan to a speed (steps/ms) with a ramp (steps/ms2, 0: at once)."""
+        """Plan to a speed (steps/ms) with a ramp (steps/ms2, 0: immediately)."""
         self.goal = speed
         self._ramp = ramp
         self.kind = TRAPEZOID if ramp > 0.0 else STEP
@@ -228,7 +228,7 @@ class SpeedProfile:
         return path
 
     def skip(self, ticks: int) -> None:
-        """Advance by many milliseconds at once."""
+        """Advance by many milliseconds in one step."""
         left = self.goal - self.v
         ramping = min(ticks, ceil(abs(left) / self._ramp)) if self._ramp > 0.0 else 0
         end = self.goal if ramping < ticks else self.v + copysign(self._ramp * ramping, left)

@@ -1,7 +1,7 @@
 """Protections of an emulated servo: temperature, load, current, input voltage.
 
-Checked every 20 ms of its own time, so the result does not depend on how often it is
-asked. A heavy load is torque, not duty: a motor at full speed has all the duty and no load.
+They are checked every 20 ms of the servo's time, so the result does not depend on how often it is
+read. A heavy load is torque, not duty: a motor at full speed has full duty and no load.
 """
 
 from math import inf
@@ -14,15 +14,15 @@ CHECK_MS = 20
 CHECK_S = CHECK_MS / 1000.0
 
 VOLTAGE, HEAT, CURRENT, OVERLOAD = 1, 4, 8, 32
-"""Bits of what is wrong, as they stand in the registers of the servos that know them."""
+"""Bits of the errors, as in the registers of the servos that have them."""
 
 
 class Limits(NamedTuple):
     """Limits of a servo's protections.
 
     hottest_c: degC; highest_01v, lowest_01v: 0.1 V
-    overload_share: share of the stall torque at the present voltage; overload_s: for so long
-    current_a, current_s: the same of the current
+    overload_share: share of the stall torque at the present voltage; overload_s: its duration
+    current_a, current_s: the same for the current
     """
 
     hottest_c: int
@@ -45,7 +45,7 @@ def temperature_after(now_c: float, final_c: float, thermal_s: float, checks: in
 
 
 class ServoProtection:
-    """Temperature of the motor and how long it has been overloaded.
+    """Temperature of the motor and duration of its overload.
 
     ambient_c: degC, may be changed at any time
     """
@@ -63,9 +63,9 @@ class ServoProtection:
         self._heavy_checks = self._strong_checks = 0
 
     def check(self, effort: float, volts: float, checks: int = 1) -> int:
-        """Return the bits of what is wrong after 20 ms more at this torque and voltage (shares).
+        """Return the error bits after another 20 ms at this torque and voltage (shares).
 
-        checks: go on by so many times 20 ms at once
+        checks: advance by this number of times 20 ms in one step
         """
         physics = self._physics
         hottest_c, highest, lowest, heavy_share, heavy_s, current_a, current_s = self.limits
@@ -98,9 +98,9 @@ class ServoProtection:
 
     @property
     def steady(self) -> bool:
-        """True if checking again changes nothing but what the motor does."""
+        """Return whether further checks change nothing unless the motor changes."""
         return not self._heavy_checks and not self._strong_checks
 
     def browned_out(self, volts: float) -> bool:
-        """True if the voltage (a share) is too low for the servo to run."""
+        """Return whether the voltage (a share) is too low for the servo to run."""
         return volts < self._physics.brown_out_share

@@ -1,4 +1,4 @@
-"""Behaviour of emulated servos where documents and devices are silent or differ, case by case.
+"""Behaviour of emulated servos that is undocumented or differs between documents and devices.
 
 Logic analyser traces published by users of ROBOTIS' SDK show that later servos of a group
 wait for a missing one. Times marked [A] are assumed.
@@ -11,17 +11,17 @@ AfterMissing = Literal["silence", "skip", "timeout"]
 WrongBaud = Literal["silence", "garbage"]
 
 TIMES = {"slot_timeout_ms": "slot_timeout_s", "packet_gap_ms": "packet_gap_s"}
-"""Cases that are times, and the fields that hold them."""
+"""Cases that are times, and their fields."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ChainQuirks:
-    """The choices that every chain has; a field that is a Literal is a case.
+    """Choices of behaviour of every chain; a field that is a Literal is a case.
 
-    after_missing: what servos do that come after a silent one in a plain group read:
-        never answer, answer at once, or answer after ``slot_timeout_s`` [A]
+    after_missing: reaction of the servos after a silent one in a plain group read: never answer,
+        answer immediately, or answer after ``slot_timeout_s`` [A]
     wrong_baud: a client at another baud rate receives nothing, or garbage
-    packet_gap_s: a packet that stays unfinished so long is dropped [A]
+    packet_gap_s: time after which an unfinished packet is dropped [A]
     """
 
     after_missing: AfterMissing = "silence"
@@ -50,16 +50,16 @@ def decided(quirks: Q, case: str, value: str) -> Q:
     """Return the quirks with one case changed.
 
     Raises:
-        ValueError: there is no such case or value.
+        ValueError: the case or value is unknown.
     """
     name, choices = case.replace("-", "_"), _choices(type(quirks))
     change: dict[str, Any] = {name: value}
     if name in TIMES:
         change = {TIMES[name]: _milliseconds(case, value) / 1000.0}
     elif name not in choices:
-        raise ValueError(f"set {case!r}: unknown; there is {', '.join(cases_of(type(quirks)))}")
+        raise ValueError(f"set {case!r}: unknown; expected {', '.join(cases_of(type(quirks)))}")
     elif value not in choices[name]:
-        raise ValueError(f"{case} {value!r}: it can be {', '.join(choices[name])}")
+        raise ValueError(f"{case} {value!r}: expected {', '.join(choices[name])}")
     return replace(quirks, **change)
 
 

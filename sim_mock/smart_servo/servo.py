@@ -1,7 +1,7 @@
-"""What every emulated smart servo is: registers and a motor that are brought up to date on demand.
+"""Common base of emulated smart servos: registers and a motor that advance on demand.
 
-``advance`` brings a servo up to a time, nothing runs by itself. A make of servo adds what its
-registers do when they are written and read, and what follows from an error.
+``advance`` brings a servo up to a time; nothing runs in the background. A make of servo adds the
+effects of writing and reading its registers, and of errors.
 """
 
 from abc import ABC, abstractmethod
@@ -34,28 +34,28 @@ class EmulatedServo(ABC):
     A make sets ``model``, ``memory``, ``drive`` and ``baud_rates`` before this class's constructor.
 
     Attributes:
-        id: what it is spoken to by.
+        id: its address.
         errors: bits of its faults, as in their register.
         baud_rates: bit/s by the value of their register.
-        on_address: called when id, baud rate or return delay are other than before.
+        on_address: called when id, baud rate or return delay have changed.
 
     Raises:
         ValueError: the spec's physics cannot exist.
     """
 
     restart_ms: int
-    """So long it is deaf while it restarts."""
+    """Time of a restart without answers, milliseconds."""
     unreadable = 0
-    """Error number of a read that touches what is not there."""
+    """Error number of a read of an undefined address."""
     none_registered = 0
-    """Error number of an Action when no write waits for one."""
+    """Error number of an Action without a stored write."""
     read_level = 0
     answer_level = 1
-    """Status Return Levels from which it answers reads, and everything else."""
+    """Lowest Status Return Levels at which it answers reads, and all other instructions."""
     mute_reboot = False
     """Whether it restarts without an answer."""
     error_bits: ClassVar[Mapping[str, int]]
-    """Bits of the errors that can be made to arise, by name."""
+    """Bits of the errors that can be triggered, by name."""
     model: ServoModel
     memory: ServoMemory[Any]
     drive: Drive
@@ -66,7 +66,7 @@ class EmulatedServo(ABC):
     stale_surroundings = True
     """Whether voltage and temperature were measured again since their registers were read."""
     shadow_id: int | None = None
-    """An id under which it carries out writes to RAM and never answers."""
+    """An id under which it executes writes to RAM and never answers."""
 
     def __init__(self, spec: ServoSpec, now_ms: int) -> None:
         self._physics = checked(Physics(*spec.physics))
@@ -105,7 +105,7 @@ class EmulatedServo(ABC):
             self.on_address()
 
     def _limits(self) -> Limits:
-        """Return its protection limits by its registers."""
+        """Return its protection limits from its registers."""
         get = self.memory.get
         return Limits(
             get("temperature_limit"),
@@ -119,7 +119,7 @@ class EmulatedServo(ABC):
     def advance(self, now_ms: int, fed_ms: int = 0) -> bool:
         """Advance to ``now_ms``; the last packet before was on the bus at ``fed_ms``.
 
-        Return whether it listens: it is deaf while it restarts.
+        Return whether it listens, which it does not during a restart.
         """
         ahead = now_ms - self._ms
         if ahead > 0:
@@ -136,7 +136,7 @@ class EmulatedServo(ABC):
         return now_ms >= self._deaf_until_ms
 
     def _move(self, until_ms: int) -> None:
-        """Advance; the middle of a long pause is skipped, so that answers come at once."""
+        """Advance; the middle of a long pause is skipped, so that answers are not delayed."""
         pause_at_ms, pause_ms = long_pause(self._ms, until_ms, CHECK_MS)
         self._run_until(pause_at_ms)
         if pause_ms:
@@ -172,58 +172,58 @@ class EmulatedServo(ABC):
             self.restart()
 
     def _measure_surroundings(self) -> None:
-        """Measure voltage and temperature, as is done every 20 ms."""
+        """Measure voltage and temperature, every 20 ms."""
         self._measured = self.shaft.volts, self.protection.temperature_c
         self.stale_surroundings = True
 
     def restart(self) -> None:
-        """Restart by instruction or a dip of the supply: deaf for a while, then as at power-on."""
+        """Restart by instruction or after a dip of the supply; deaf until it has restarted."""
         self._booted_ms = self._ms
         self._deaf_until_ms = self._ms + self.restart_ms
         self._boot()
 
     def _trip(self, after_ms: int) -> None:
-        """Let the bus watchdog run out, once, so many ms from where the servo's clock stands."""
+        """Trip the bus watchdog, once, after a time from the servo's present time."""
         self._move(self._ms + after_ms)
         self._watchdog_ms = 0
 
     @abstractmethod
     def _protect_from(self, bits: int) -> None:
-        """React to the errors that its protections find now."""
+        """React to the present errors of its protections."""
 
     @abstractmethod
     def _load_limits(self) -> tuple[float, ...]:
-        """Return the overload's share and time, and where it has them the current's."""
+        """Return the overload's share and time, and the current's if it has them."""
 
     # --- instructions
 
     def answers(self, code: int) -> bool:
-        """True if it answers an instruction to it alone."""
+        """Return whether it answers an instruction that addresses it alone."""
         if code == REBOOT and self.mute_reboot:
             return False
         needed = 0 if code == PING else self.read_level if code == READ else self.answer_level
         return self.status_level >= needed
 
     def identity(self) -> bytes:
-        """Return what a ping is answered with."""
+        """Return the parameters of the answer to a ping."""
         return b""
 
     @abstractmethod
     def read(self, address: int, length: int) -> bytes | None:
-        """Return bytes of the memory, None where an address is not defined."""
+        """Return bytes of the memory, None if an address is not defined."""
 
     @abstractmethod
     def write(self, address: int, data: bytes) -> int:
-        """Write bytes as an instruction does; return the error number, 0 when done."""
+        """Write bytes as an instruction does; return the error number, 0 on success."""
 
     def register(self, address: int, data: bytes) -> int:
-        """Keep a write for Action; a later one replaces it. Return the error number."""
+        """Store a write for Action; a later one replaces it. Return the error number."""
         self._pending = (address, data)
         self.memory.set("registered_instruction", 1)
         return 0
 
     def action(self) -> int:
-        """Carry out the kept write; return the error number."""
+        """Execute the stored write; return the error number."""
         if self._pending is None:
             return self.none_registered
         (address, data), self._pending = self._pending, None
@@ -235,23 +235,23 @@ class EmulatedServo(ABC):
     @property
     @abstractmethod
     def error_flag(self) -> int:
-        """Bits in the error byte of every status."""
+        """Return the bits in the error byte of every status."""
 
     @property
     def baud(self) -> int:
-        """Bit/s by its register; a new one acts after the status of its write has gone out."""
+        """Return the register's bit/s; a new one is valid after the status of its write."""
         return self.baud_rates[self.memory.get("baud_rate")]
 
     @property
     def return_delay_s(self) -> float:
-        """The pause before a status, by its register."""
+        """Return the register's pause before a status."""
         return self.memory.get("return_delay_time") * RETURN_DELAY_UNIT_S
 
     def set_baud(self, baud: int) -> None:
-        """Set its baud rate for good.
+        """Set its baud rate permanently.
 
         Raises:
-            ValueError: it does not know this rate.
+            ValueError: it does not support this rate.
         """
         if baud not in self.baud_rates:
             known = ", ".join(map(str, self.baud_rates))
@@ -259,16 +259,16 @@ class EmulatedServo(ABC):
         self.memory.keep("baud_rate", self.baud_rates.index(baud))
         self._apply_settings()
 
-    # --- from outside
+    # --- external events
 
     @property
     def torque(self) -> bool:
-        """True if the torque is on."""
+        """Return whether the torque is on."""
         return self.drive.torque
 
     @property
     def position_steps(self) -> float:
-        """True position of the shaft in the registers' terms, finer than they are."""
+        """Return the true position of the shaft in the registers' unit, with fractions."""
         return self.drive.position_steps
 
     def report(self) -> dict[str, object]:
@@ -286,44 +286,44 @@ class EmulatedServo(ABC):
 
     @property
     def voltage_01v(self) -> int:
-        """Voltage at the servo as it was last measured, in 0.1 V."""
+        """Return the last measured voltage at the servo, in 0.1 V."""
         return round(self._measured[0] * self.model.rated_v * 10.0)
 
     @property
     def warmth_c(self) -> int:
-        """Temperature of the motor as it was last measured, as registers hold it."""
+        """Return the last measured temperature of the motor, as registers contain it."""
         return max(0, min(255, round(self._measured[1])))
 
     def fail(self, error: str) -> str:
-        """Let an error arise by name, as the servo's own protection would; return what it does.
+        """Trigger an error by name, as the servo's own protection does; return its effect.
 
         Raises:
-            ValueError: there is no such error.
+            ValueError: the error is unknown.
         """
         if error not in self.error_bits:
-            raise ValueError(f"error {error!r}: there is {', '.join(self.error_bits)}")
+            raise ValueError(f"error {error!r}: expected {', '.join(self.error_bits)}")
         self._protect_from(self.errors | self.error_bits[error])
         return f"protects itself: {error}"
 
     @abstractmethod
     def reset_all(self) -> int:
-        """Restore factory settings, id 1; return the error number, 0 when done."""
+        """Restore factory settings, id 1; return the error number, 0 on success."""
 
     def turn(self, steps: float) -> None:
-        """Turn the joint by hand, in the registers' direction; under torque it fights back."""
+        """Turn the joint by hand, in the registers' direction; under torque it resists."""
         self.drive.turn(steps)
 
     def jam(self, stuck: bool = True) -> None:
-        """Jam the joint where it is, or free it."""
+        """Jam the joint at its position, or free it."""
         self.shaft.jam(stuck)
 
     def set_load(self, load_nm: float) -> None:
-        """Apply a constant torque to the joint, as a spring or a cable does, from now on."""
+        """Apply a constant torque to the joint from now on, as a spring or a cable does."""
         self.shaft.set_load(load_nm / self.model.stall_torque_nm)
 
     @property
     def supply_v(self) -> float:
-        """Open-circuit voltage; far too little makes it restart again and again."""
+        """Return the open-circuit voltage; far too low, it makes the servo restart repeatedly."""
         return self.shaft.supply * self.model.rated_v
 
     @supply_v.setter
@@ -334,7 +334,7 @@ class EmulatedServo(ABC):
 
     @property
     def temperature_c(self) -> float:
-        """Temperature of the motor; it drifts to what load and room make it."""
+        """Return the temperature of the motor, which approaches that of load and surroundings."""
         return self.protection.temperature_c
 
     @temperature_c.setter
@@ -345,7 +345,7 @@ class EmulatedServo(ABC):
 
     @property
     def ambient_c(self) -> float:
-        """Temperature around the servo."""
+        """Return the temperature around the servo."""
         return self.protection.ambient_c
 
     @ambient_c.setter

@@ -1,18 +1,19 @@
-"""Five milliseconds of a shaft at once: while nothing changes sides its steps are one linear map.
+"""Five milliseconds of a shaft at once: while no sign changes, its steps are one linear map.
 
-The weights of that map are those of the steps themselves (gazerig.sim_mock.smart_servo.motor), made
-once for each controller and voltage with nothing but sums and products: the same on every machine.
+The weights of that map are those of the steps themselves (gazerig.sim_mock.smart_servo.motor),
+computed once for each controller and voltage with sums and products only: the same on every
+machine.
 """
 
 from functools import lru_cache
 
 SPAN_MS = 5
 SMOOTHING = 0.25
-"""Share of the profile's new speed that D and feed-forward take over in 1 ms: what differs from
-one millisecond to the next must be smoothed in any servo, the time of 4 ms is assumed."""
+"""Share of the profile's new speed that D and feed-forward adopt in 1 ms: any servo must smooth
+differences between milliseconds; the time of 4 ms is assumed."""
 
 VOLTAGE_LEVELS = 1024
-"""The voltage counts as constant meanwhile, rounded to this part of the rated one."""
+"""Levels per rated voltage; the voltage counts as constant during a span."""
 
 Still = tuple[float, ...]
 """Weights of error, speed, reference speed and constant torque: for the error after the span (4),
@@ -21,7 +22,7 @@ Led = tuple[float, ...]
 """Weights of the profile's motion in each millisecond: 5 each for error, speed, profile speed."""
 
 SpanWeights = tuple[Still, Led, float, float]
-"""With push and divisor of the first millisecond."""
+"""Including push and divisor of the first millisecond."""
 
 
 @lru_cache(maxsize=4096)
@@ -31,7 +32,7 @@ def span_weights(
     """Return the weights for one controller and voltage.
 
     Args:
-        drag: what divides a speed after 1 ms, without the controller.
+        drag: divisor of a speed per 1 ms, without the controller.
         accel: speed that the stall torque adds in 1 ms.
         kp: gain on the position error.
         kd: gain on the speed.

@@ -192,7 +192,7 @@ def test_a_push_can_be_typed() -> None:
         ("push head 500 left", "'500' is not newtons from 0 to 100"),
         ("push head 5 sideways", "'sideways' is none of forward, back"),
         ("push head", "N is missing"),
-        ("kick head", "'kick' is no command; there is push, help"),
+        ("kick head", "'kick' is not a command; commands: push, help"),
     ],
 )
 def test_a_push_that_cannot_be_is_refused_with_what_would_be_right(text: str, message: str) -> None:
