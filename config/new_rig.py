@@ -143,7 +143,7 @@ _MIRRORED = ("right_eye_tilt", *_UPPER[1:], *_LOWER[1:])
 """Joints whose servo sits mirrored to its fellow on the left."""
 
 
-def rig_text(new: NewRig) -> str:
+def params_text(new: NewRig) -> str:
     """Return the YAML of a rig.
 
     Raises:

@@ -10,18 +10,12 @@ from typing import Any
 from gazerig.config.gestures import GestureSet, gesture_name, gesture_path, load_gesture
 from gazerig.config.load import load
 from gazerig.config.parameters import plain
-from gazerig.config.rig import Rig
 from gazerig.config.save_text import written
 from gazerig.config.schema import load_walk
 
 
-def rig_text(rig: Rig) -> str:
-    """Return all active settings of a rig as YAML: rig, profile, character and changes."""
-    return "".join(_lines(plain(rig)))
-
-
 def params_text(params: Any) -> str:
-    """Return a dataclass of parameters, such as a world's script, as YAML."""
+    """Return a dataclass of parameters as YAML: a world's script, or all in force of a rig."""
     return "".join(_lines(plain(params)))
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.config.schema import Rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import leave
@@ -25,7 +25,7 @@ def recorded(path: Path, rig: Rig, seconds: float) -> Run:
     """Record a simulated run; give its ticks too."""
     options = RunOptions(mock=True, fast=True, seed=5, scene="visitor", bus="emulated")
     info = RunInfo(
-        "a rig", rig.profile, rig_text(rig), 5, rig.loop.rate_hz, STARTED,
+        "a rig", rig.profile, params_text(rig), 5, rig.loop.rate_hz, STARTED,
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True, fast=True,
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)

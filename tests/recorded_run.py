@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.drivers.types import Detections
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
@@ -31,7 +31,7 @@ def info_for(pictures_hz: float = 4.0) -> RunInfo:
     return RunInfo(
         rig="desk",
         profile=rig.profile,
-        config_yaml=rig_text(rig),
+        config_yaml=params_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
         seed=7,
         rate_hz=rig.loop.rate_hz,

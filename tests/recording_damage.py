@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
@@ -34,7 +34,7 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
     """Record a short run as ``gazerig run --fast --record`` does; return the file's bytes."""
     options, rig = RunOptions(mock=True, fast=True, seed=5, scene="visitor"), load_rig("desk")
     info = RunInfo(
-        rig="desk", profile=rig.profile, config_yaml=rig_text(rig),
+        rig="desk", profile=rig.profile, config_yaml=params_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=5, rate_hz=rig.loop.rate_hz,
         started_utc="2026-01-31T23:59:59+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip

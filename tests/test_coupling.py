@@ -18,8 +18,9 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import rig_setups
+from gazerig.robot.app.camera_factory import true_head
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import run_bus, true_head
+from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Jog

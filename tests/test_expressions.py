@@ -12,8 +12,8 @@ from gazerig.gaze.gesture.expression import Expressions
 from gazerig.gaze.gesture.level import HOLD_S, LevelParams, LevelRange, Levels
 from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
-from gazerig.robot.app.animation_tables import pose_offset
 from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.app.rig_limits import pose_offset
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.command_json import as_json, as_recorded, from_json, from_recording

@@ -11,7 +11,7 @@ from expressive_rig import started
 from gazerig.config.load import shipped
 from gazerig.config.parameters import changed, parameters
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
@@ -41,7 +41,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecording, li
     rig = load_rig("expressive")
     path = tmp_path_factory.mktemp("face") / "face.mcap"
     info = RunInfo(
-        rig="expressive", profile=rig.profile, character=None, config_yaml=rig_text(rig),
+        rig="expressive", profile=rig.profile, character=None, config_yaml=params_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=3, rate_hz=rig.loop.rate_hz,
         started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip

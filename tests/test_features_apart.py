@@ -76,8 +76,8 @@ def test_another_package_brings_a_command_and_a_schema(tmp_path: Path) -> None:
 
 
 HALL = """
-from gazerig.robot.app.camera_factory import locator_of, scene_camera
-from gazerig.robot.app.run_bus import run_bus, true_head
+from gazerig.robot.app.camera_factory import locator_of, scene_camera, true_head
+from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.surroundings import Surroundings
 from gazerig.robot.recording.run_format import WORLD
 from gazerig.robot.recording.world_info import WorldInfo

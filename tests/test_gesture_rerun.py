@@ -10,7 +10,8 @@ from gazerig.config.schema import load_rig, load_rules
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.session import leave, run_info
+from gazerig.robot.app.run_rig import run_info
+from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Play

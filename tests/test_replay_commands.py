@@ -9,7 +9,7 @@ from replayed_run import RATE_HZ, ticks_of
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text
+from gazerig.config.text import params_text
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import replay as cli_replay
@@ -33,7 +33,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
     rig = load_rig("desk")
     info = RunInfo(
-        "configs/desk.yaml", rig.profile, rig_text(rig), 0, RATE_HZ, "2026-01-01T00:00:00+00:00",
+        "configs/desk.yaml", rig.profile, params_text(rig), 0, RATE_HZ, "2026-01-01T00:00:00+00:00",
         scene="face-to-face", mock=True, fast=True, versions=versions(),
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)

@@ -12,7 +12,7 @@ import pytest
 from stand_in import StandIn
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Percept
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
@@ -64,7 +64,7 @@ def recorded(
     """Record a simulated run as ``gazerig run --fast --record`` does; give its ticks."""
     rig = load_rig("desk", character)
     info = RunInfo(
-        rig="desk", profile=rig.profile, character=character, config_yaml=rig_text(rig),
+        rig="desk", profile=rig.profile, character=character, config_yaml=params_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=5, rate_hz=rig.loop.rate_hz,
         started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import pytest
 
-from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.testing.struck_machine import LINE, RESTARTS, Case, Machine, pair_of
 
@@ -37,19 +36,14 @@ class FaultSuite:
             metafunc.parametrize("case", self.cases, ids=[case.name for case in self.cases])
 
     @pytest.fixture
-    def rig(self) -> Rig:
-        """Return the rig."""
-        return load_rig(self.rig_file)
-
-    @pytest.fixture
-    def machine(self, rig: Rig) -> Machine:
+    def machine(self) -> Machine:
         """Return the rig's joints, in motion."""
-        machine = Machine(rig, self.rate_hz)
+        machine = Machine(load_rig(self.rig_file), self.rate_hz)
         machine.start()
         return machine
 
-    def test_whatever_befalls_a_bus_ends_well(self, rig, machine, case):
-        outcome = machine.strike(*pair_of(rig, rig.bus.kind), case, STRUCK_S)
+    def test_whatever_befalls_a_bus_ends_well(self, machine, case):
+        outcome = machine.strike(*pair_of(machine.rig, machine.rig.bus.kind), case, STRUCK_S)
         assert outcome.survived, outcome
         assert (outcome.end == "left, named") == (case.name in self.left), outcome
         # A write to an adapter that accepts no bytes times out after 0.25 s.
@@ -57,9 +51,9 @@ class FaultSuite:
         machine.body.stop()
         assert all(machine.true_goal(i) is None for i in range(len(machine.names)))
 
-    def test_many_at_once_and_nothing_leaves_its_limits(self, rig, machine):
+    def test_many_at_once_and_nothing_leaves_its_limits(self, machine):
         """Three random faults at a time; the joints that are left end well nevertheless."""
-        dice = random.Random(rig.bus.kind)
+        dice = random.Random(machine.rig.bus.kind)
         gentle = [case for case in self.cases if case.name not in self.left]
         # Servos that catch up by themselves have no other limit.
         machine.own_speed = True
@@ -70,5 +64,5 @@ class FaultSuite:
                 tuple(text for case in three for text in case.ends),
                 own_speed=True,
             )
-            outcome = machine.strike(*pair_of(rig, rig.bus.kind), both)
+            outcome = machine.strike(*pair_of(machine.rig, machine.rig.bus.kind), both)
             assert outcome.survived, (both.name, outcome)

@@ -17,10 +17,11 @@ from gazerig.gaze.attention.aversion import Aversion
 from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
-from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import (
     lendable,
     placed_camera,
+    run_camera,
+    sight_of,
 )
 from gazerig.robot.app.gaze_models import (
     chooser_of,
@@ -34,16 +35,15 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.app.rig_limits import (
+    animation_tables,
     lid_spans,
     limits,
     own_parts,
     park_rad,
 )
 from gazerig.robot.app.run_bus import run_bus
-from gazerig.robot.app.run_camera import run_camera, sight_of
 from gazerig.robot.app.run_parts import RunBus
-from gazerig.robot.app.run_rig import with_options
-from gazerig.robot.app.run_scene import scene_of
+from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import GuardedChooser, TargetChooser

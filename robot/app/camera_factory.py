@@ -1,8 +1,9 @@
-"""The camera that was asked for: a scene, a film, a recording, a webcam or an OAK-D."""
+"""The camera of a run, and where it sits: a scene, a film, a recording, a webcam or an OAK-D."""
 
 from collections.abc import Callable
 from functools import partial
 from math import radians
+from operator import itemgetter
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -10,15 +11,22 @@ import numpy as np
 from gazerig.config.rig import Rig
 from gazerig.drivers.camera import sources
 from gazerig.drivers.camera.browser_source import FIELD_DEG
-from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
-from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.camera_plugins import (
+    CheckedSource,
+    camera_part,
+    is_source,
+    plugin_source,
+)
+from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.guarded_camera import (
     CLOSE_PROCESS_S,
     OPEN_PROCESS_S,
     GuardedCamera,
 )
-from gazerig.drivers.camera.orientation import FrameOrientation, upright
+from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S
+from gazerig.drivers.camera.orientation import FrameOrientation, UprightSource, upright
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
+from gazerig.drivers.camera.pose_slot import PoseSlot
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
@@ -29,13 +37,22 @@ from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
-from gazerig.robot.app.drawn_camera import DrawnCamera, drawn_camera
+from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, HeadPose, scene_pixels
+from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
+from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, label_of, require
+from gazerig.robot.app.run_parts import RunBus, Sight, TrueSteps
 from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.frames import CameraMount, CameraParams, standing_still
-from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.coupling_params import pairs_of
+from gazerig.robot.model.frames import (
+    CameraMount,
+    CameraParams,
+    NewestPose,
+    PoseHistory,
+    standing_still,
+)
+from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import motion_finder, retuned
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
@@ -45,8 +62,82 @@ if TYPE_CHECKING:
     from gazerig.drivers.camera.playback import CameraReplay
     from gazerig.drivers.camera.video_file import VideoFile
 
-HeadPose = Callable[[float], tuple[Mat3, Vec3]]
-"""Gives R_world_head and p_world_head_m at a time."""
+
+def sight_of(
+    kinematics: Kinematics, camera: CameraParams, options: RunOptions, real: bool
+) -> Sight:
+    """Return where the camera of a run sits.
+
+    Args:
+        kinematics: of the head.
+        camera: the camera as it is believed.
+        options: by which pose detections are placed.
+        real: another process looks through it, and must know how it is turned.
+    """
+    mount = CameraMount(camera)
+    turns = PoseBuffer() if real and mount.on_head else None
+    history = PoseHistory if options.placed_by == "capture" else NewestPose
+    return Sight(mount, history(kinematics, tell=_turn_sender(mount, turns)), turns)
+
+
+def _turn_sender(
+    mount: CameraMount, turns: PoseBuffer | None
+) -> Callable[[float, Mat3], None] | None:
+    """Return what tells the camera's process how its camera is turned, None if it is not needed."""
+    if turns is None:
+        return None
+    return lambda t_s, R_world_head: turns.record(t_s, mount.rotation(R_world_head))
+
+
+def run_camera(
+    rig: Rig,
+    options: RunOptions,
+    scene: Scene | None,
+    sight: Sight,
+    wires: RunBus,
+    rng: np.random.Generator,
+    placed: CameraParams,
+    clock: Clock,
+    own: ProgramParts,
+) -> Camera:
+    """Return what the robot looks through."""
+    if scene is None:
+        return real_camera(rig, options, clock, placed, sight.turns, own)
+    locate = locator_of(placed)
+    where = true_head(wires.true_steps, rig, sight.poses)
+    return scene_camera(
+        rig, options, scene, sight.mount, where, rng, locate, own, clock, sight.turns
+    )
+
+
+def true_head(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> HeadPose:
+    """Return where the emulated head is: from the servos themselves where they are at hand.
+
+    It is built as the rig says now, whatever is believed of it later.
+    """
+    if true_steps is None:
+        return poses.head_pose
+    kinematics = kinematics_of(rig)
+    pairs = pairs_of(rig.couplings)
+    linkages = {
+        name: rig.joints[name].made()
+        for name in {*NECK, *LOWER_NECK, *(other for pair in pairs for other in pair[:2])}
+        & rig.joints.keys()
+    }
+
+    absent = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
+    angles_of = itemgetter(*NECK, *LOWER_NECK)
+
+    def now(_: float) -> tuple[Mat3, Vec3]:
+        steps, angles = true_steps(), absent.copy()
+        for name, linkage in linkages.items():
+            angles[name] = linkage.angle_rad(steps[name])
+        for first, second, coupling in pairs:
+            angles[first], angles[second] = coupling.joint_rad((angles[first], angles[second]))
+        yaw, pitch, roll, lower_yaw, lower_pitch = angles_of(angles)
+        return kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
+
+    return now
 
 
 def scene_camera(
@@ -78,8 +169,41 @@ def scene_camera(
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
-    faces, moves = own.find_faces(rig), MotionOfDrawn(rig.motion)
+    faces, moves = own.find_faces(rig.detector), MotionOfDrawn(rig.motion)
     return PixelCamera(drawn, scene, mount, where, faces, rng, moves, locate)
+
+
+def drawn_camera(
+    rig: Rig,
+    scene: Scene,
+    mount: CameraMount,
+    where: HeadPose,
+    rng: np.random.Generator,
+    clock: Clock,
+    own: ProgramParts,
+    motion: Callable[[], Motion],
+    locate: Locate,
+) -> DrawnCamera:
+    """Return a camera on a drawn scene in real time.
+
+    Args:
+        rig: how wide it sees, and how a lost camera is recovered.
+        scene: what is before it.
+        mount: where it sits on the head.
+        where: rotation and place of the head in the world at a time.
+        rng: for the noise.
+        clock: the host's.
+        own: a program's own detector, if it has one.
+        motion: makes what finds motion.
+        locate: locates what is found in the camera's axes.
+    """
+    poses = PoseSlot()
+    make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
+    source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
+    if own.detector is not None:
+        return DrawnCamera(watched(rig, own, source(), clock, motion, locate), poses, where)
+    parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
+    return DrawnCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), poses, where)
 
 
 def scene_start_s(camera: Camera) -> float | None:
@@ -148,7 +272,7 @@ def real_camera(
         from gazerig.sim_mock.cameras.video import FilmCamera
 
         film, delay_s = _film(options), options.film_delay_s
-        faces, turned = own.find_faces(rig), orientation_of(placed)
+        faces, turned = own.find_faces(rig.detector), orientation_of(placed)
         return FilmCamera(film, faces, delay_s, motion=motion(), locate=locate, orientation=turned)
     name = options.camera if isinstance(options.camera, str) else None
     if own.detector is not None and (name is None or is_ours(CAMERA, name)):
@@ -164,6 +288,44 @@ def real_camera(
         process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
         return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S, open_s=OPEN_PROCESS_S)
     return GuardedCamera(cast(Camera, camera), label)
+
+
+def program_camera(
+    rig: Rig,
+    parts: ProgramParts,
+    clock: Clock,
+    motion: Callable[[], Motion | None],
+    locate: Locate,
+    fast: bool,
+) -> Camera:
+    """Return the program's own camera, checked and watched like another package's.
+
+    Raises:
+        SetupError: it is none, or gives frames in simulated time.
+    """
+    camera = parts.camera
+    label = label_of("camera", camera)
+    if not is_source(camera):
+        require(camera, "camera", "latest")
+        return GuardedCamera(cast(Camera, camera), label, None if fast else LONGEST_CAMERA_S)
+    if fast:
+        raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
+    source = CheckedSource(cast(FrameSource, camera), label)
+    turned = UprightSource(source, orientation_of(rig.camera))
+    return GuardedCamera(watched(rig, parts, turned, clock, motion, locate), label)
+
+
+def watched(
+    rig: Rig,
+    parts: ProgramParts,
+    source: FrameSource,
+    clock: Clock,
+    motion: Callable[[], Motion | None],
+    locate: Locate,
+) -> CameraThread:
+    """Return a source of frames with the detector looking in a thread of this program."""
+    detector = parts.find_faces(rig.detector)
+    return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)
 
 
 def locator_of(placed: CameraParams) -> FrameLocator:

@@ -7,23 +7,16 @@ only that program has, it is a thread.
 
 import threading
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from gazerig.config.rig import Rig
-from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.pose_slot import PoseAt, PoseSlot
 from gazerig.drivers.camera.process import CameraProcess
-from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
-from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.types import DetectedFace, Detections, ImageArray
-from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.app.program_parts import ProgramParts, watched
-from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -178,36 +171,3 @@ class DrawnCamera:
     def close(self) -> None:
         """End the process; safe to call twice."""
         self.process.close()
-
-
-def drawn_camera(
-    rig: Rig,
-    scene: Scene,
-    mount: CameraMount,
-    where: HeadPose,
-    rng: np.random.Generator,
-    clock: Clock,
-    own: ProgramParts,
-    motion: Callable[[], Motion],
-    locate: Locate,
-) -> DrawnCamera:
-    """Return a camera on a drawn scene in real time.
-
-    Args:
-        rig: how wide it sees, and how a lost camera is recovered.
-        scene: what is before it.
-        mount: where it sits on the head.
-        where: rotation and place of the head in the world at a time.
-        rng: for the noise.
-        clock: the host's.
-        own: a program's own detector, if it has one.
-        motion: makes what finds motion.
-        locate: locates what is found in the camera's axes.
-    """
-    poses = PoseSlot()
-    make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
-    source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
-    if own.detector is not None:
-        return DrawnCamera(watched(rig, own, source(), clock, motion, locate), poses, where)
-    parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
-    return DrawnCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), poses, where)

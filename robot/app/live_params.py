@@ -28,9 +28,9 @@ from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.oculomotor.pursuit import Pursuit
 from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk
-from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (
+    animation_tables,
     eye_limits,
     head_limits,
     lid_ends,

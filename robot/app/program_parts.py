@@ -1,21 +1,14 @@
 """A program's own camera, detector and rule of attention in the place of the rig's."""
 
 from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
-from gazerig.config.rig import Rig
-from gazerig.drivers.camera.camera_plugins import CheckedSource, is_source
-from gazerig.drivers.camera.frame_analysis import Locate, Motion
-from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S
-from gazerig.drivers.camera.guarded_camera import GuardedCamera
-from gazerig.drivers.camera.orientation import FrameOrientation, UprightSource
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import CheckedDetector, face_detector, mtcnn
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.robot.control.chooser import LONGEST_S, Chooser, GuardedChooser, TargetChooser
-from gazerig.robot.model.clock import Clock
 
 
 class ProgramParts(NamedTuple):
@@ -30,13 +23,13 @@ class ProgramParts(NamedTuple):
     detector: FaceDetector | None = None
     chooser: Chooser | None = None
 
-    def find_faces(self, rig: Rig) -> FaceDetector:
+    def find_faces(self, params: FaceDetectorParams) -> FaceDetector:
         """Return the detector: the program's, with ours for after it has failed, or the rig's."""
         if self.detector is None:
-            return face_detector(rig.detector)
-        _require(self.detector, "detector", "find")
-        label = _label("detector", self.detector)
-        return CheckedDetector(self.detector, label, lambda: mtcnn(rig.detector))
+            return face_detector(params)
+        require(self.detector, "detector", "find")
+        label = label_of("detector", self.detector)
+        return CheckedDetector(self.detector, label, lambda: mtcnn(params))
 
     def choose(
         self, own: TargetChooser, say: Callable[[str], None], simulated: bool
@@ -44,56 +37,26 @@ class ProgramParts(NamedTuple):
         """Return who chooses what to look at: the program's rule before the rig's own."""
         if self.chooser is None:
             return own
-        _require(self.chooser, "attention", "choose")
+        require(self.chooser, "attention", "choose")
         longest_s = None if simulated else LONGEST_S
-        return GuardedChooser(self.chooser, own, _label("attention", self.chooser), say, longest_s)
+        return GuardedChooser(
+            self.chooser, own, label_of("attention", self.chooser), say, longest_s
+        )
 
 
 NO_PARTS = ProgramParts()
 
 
-def program_camera(
-    rig: Rig,
-    parts: ProgramParts,
-    clock: Clock,
-    motion: Callable[[], Motion | None],
-    locate: Locate,
-    fast: bool,
-) -> Camera:
-    """Return the program's own camera, checked and watched like another package's.
+def require(part: object, what: str, method: str) -> None:
+    """Refuse a part of a program that lacks a method.
 
     Raises:
-        SetupError: it is none, or gives frames in simulated time.
+        SetupError: it has none of that name.
     """
-    camera = parts.camera
-    label = _label("camera", camera)
-    if not is_source(camera):
-        _require(camera, "camera", "latest")
-        return GuardedCamera(cast(Camera, camera), label, None if fast else LONGEST_CAMERA_S)
-    if fast:
-        raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
-    source = CheckedSource(cast(FrameSource, camera), label)
-    turned = UprightSource(source, FrameOrientation(rig.camera.rotation, rig.camera.mirrored))
-    return GuardedCamera(watched(rig, parts, turned, clock, motion, locate), label)
-
-
-def watched(
-    rig: Rig,
-    parts: ProgramParts,
-    source: FrameSource,
-    clock: Clock,
-    motion: Callable[[], Motion | None],
-    locate: Locate,
-) -> CameraThread:
-    """Return a source of frames with the detector looking in a thread of this program."""
-    detector = parts.find_faces(rig)
-    return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)
-
-
-def _require(part: object, what: str, method: str) -> None:
     if not callable(getattr(part, method, None)):
-        raise SetupError(f"{_label(what, part)} has no method {method}")
+        raise SetupError(f"{label_of(what, part)} has no method {method}")
 
 
-def _label(what: str, part: object) -> str:
+def label_of(what: str, part: object) -> str:
+    """Return a part of a program as messages name it."""
     return f"{what} {type(part).__name__} of the program"

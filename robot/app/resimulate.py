@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 from gazerig.config.load import ConfigError, load, shipped
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.config.text import gesture_files, rig_text
+from gazerig.config.text import gesture_files, params_text
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Substitutes, assemble
@@ -316,7 +316,7 @@ def _rig(
     """Return the rig to run with: the recorded one, unless another was asked for."""
     if isinstance(rig, str):
         return load_rig(rig, character)
-    text = rig_text(rig) if rig is not None else recording.info.config_yaml
+    text = params_text(rig) if rig is not None else recording.info.config_yaml
     whole = _kept(text, folder / "recorded.yaml")
     base = rig if rig is not None else _read(recording, whole)
     found = base

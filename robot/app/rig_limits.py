@@ -4,11 +4,14 @@ from collections.abc import Mapping
 from math import radians
 
 from gazerig.config.rig import Rig
+from gazerig.gaze.gesture.animation import AnimationTables
+from gazerig.gaze.gesture.level import LevelParams, LevelRange
+from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.kinematics import LIDS, LidEnds
-from gazerig.robot.model.types import JointAngles, in_order
+from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
+from gazerig.robot.model.types import JointAngles, further, in_order
 
 EyeLimits = tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]]
 """Of the left and the right eye: ((yaw low, high), (pitch low, high)), radians."""
@@ -87,3 +90,35 @@ def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
 def park_rad(rig: Rig) -> dict[str, float]:
     """Return the parking pose by joint; joints left out go to 0."""
     return {name: radians(angle) for name, angle in rig.park_deg.items()}
+
+
+def animation_tables(rig: Rig) -> AnimationTables:
+    """Return what expressions and levels add to the pose."""
+    expressions = {name: pose_offset(rig, angles) for name, angles in rig.expressions.items()}
+    levels = {name: _level(rig, level) for name, level in rig.levels.items()}
+    return AnimationTables(expressions, rig.expression_blend_s, levels)
+
+
+def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
+    """Return angles added to joints as an offset of the pose.
+
+    The angle of a lid becomes a factor of its opening, such that it is added where the lid is
+    open and nothing where it is shut: blinks still shut it.
+
+    Args:
+        rig: its joints and the ends of its lids.
+        offsets_deg: joint -> angle; none of an eye.
+    """
+    offsets = {name: radians(angle) for name, angle in offsets_deg.items()}
+    spans = lid_spans(rig)
+    yaw, pitch, roll = (offsets.get(name, 0.0) for name in NECK)
+    a, b, c, d = (1.0 + offsets.get(name, 0.0) / spans.get(name, 1.0) for name in LIDS)
+    joints = tuple(offsets.get(name, 0.0) for name in further(rig.joints))
+    return NO_OFFSET._replace(head_rad=(yaw, pitch, roll), lids=(a, b, c, d), joints_rad=joints)
+
+
+def _level(rig: Rig, level: LevelParams) -> LevelRange:
+    low, high = (
+        pose_offset(rig, {level.joint: angle}) for angle in (level.low_deg, level.high_deg)
+    )
+    return LevelRange(low, high, level.smoothing_ms / 1e3)

@@ -2,22 +2,15 @@
 
 import hashlib
 from collections.abc import Mapping
-from operator import itemgetter
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port_owner import refuse_owner
-from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
-from gazerig.robot.app.camera_factory import HeadPose
 from gazerig.robot.app.emulation import emulated_lines, ideal_bus, place_of
-from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_parts import RunBus, TrueSteps
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.coupling_params import pairs_of
-from gazerig.robot.model.frames import PoseHistory
-from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.ideal.bus import IdealBus
@@ -71,35 +64,5 @@ def _true_steps(rig: Rig, devices: Mapping[str, Device]) -> TrueSteps:
     def now() -> dict[str, float]:
         steps = {bus: device.positions_steps() for bus, device in devices.items()}
         return {name: steps[bus][place] for name, bus, place in places}
-
-    return now
-
-
-def true_head(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> HeadPose:
-    """Return where the emulated head is: from the servos themselves where they are at hand.
-
-    It is built as the rig says now, whatever is believed of it later.
-    """
-    if true_steps is None:
-        return poses.head_pose
-    kinematics = kinematics_of(rig)
-    pairs = pairs_of(rig.couplings)
-    linkages = {
-        name: rig.joints[name].made()
-        for name in {*NECK, *LOWER_NECK, *(other for pair in pairs for other in pair[:2])}
-        & rig.joints.keys()
-    }
-
-    absent = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
-    angles_of = itemgetter(*NECK, *LOWER_NECK)
-
-    def now(_: float) -> tuple[Mat3, Vec3]:
-        steps, angles = true_steps(), absent.copy()
-        for name, linkage in linkages.items():
-            angles[name] = linkage.angle_rad(steps[name])
-        for first, second, coupling in pairs:
-            angles[first], angles[second] = coupling.joint_rad((angles[first], angles[second]))
-        yaw, pitch, roll, lower_yaw, lower_pitch = angles_of(angles)
-        return kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
 
     return now

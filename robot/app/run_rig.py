@@ -1,17 +1,23 @@
-"""The rig of a run: its YAML, with what the command line says otherwise."""
+"""The rig of a run as the command line has it, its scene, and what a recording says of both."""
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import TypeVar
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig, load_rules
+from gazerig.config.text import gestures_text, params_text, walk_text
 from gazerig.drivers.errors import SetupError
+from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.params import choices_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
-from gazerig.robot.app.run_scene import for_surroundings
+from gazerig.robot.app.surroundings import surroundings
+from gazerig.robot.recording.run_info import RunInfo, versions
+from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.scenes.scene import Scene
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
 
@@ -56,3 +62,80 @@ def _chosen(params: P, key: str, value: str, option: str) -> P:
     if value not in choices:
         raise SetupError(f"{option} {value}: unknown; there is {', '.join(choices)}")
     return replace(params, **{key: value})  # type: ignore[arg-type]
+
+
+def scene_of(rig: Rig, options: RunOptions) -> Scene | None:
+    """Return the scene that was asked for, None where a camera looks at something else.
+
+    Raises:
+        SetupError: there is no such scene, or the rig has no rule for something that its action
+            planner would have to choose there.
+    """
+    if options.scene is None:
+        return None
+    known = scenes()
+    if options.scene not in known:
+        raise SetupError(f"--scene {options.scene}: unknown; scenes: {', '.join(sorted(known))}")
+    scene = known[options.scene]
+    refuse_unruled(rig.gaze.top_down, scene, f"--scene {options.scene}")
+    return scene
+
+
+def refuse_unruled(rules: TopDownParams, scene: Scene, option: str) -> None:
+    """Refuse a scene that needs a planner of behaviours that a rig has no rules for.
+
+    Raises:
+        SetupError: names them.
+    """
+    missing = [b for b in scene.behaviours if b not in rules.rules]
+    if missing:
+        raise SetupError(
+            f"{option}: the rig has no rule for {', '.join(missing)}; "
+            "add it under gaze.top_down.rules"
+        )
+
+
+def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
+    """Return the rig with what a boxing match needs, where its surroundings are one.
+
+    Its action planner is switched on, and in a world the finder of red gloves. Rules that lack a
+    behaviour stay as they are: ``scene_of`` refuses the scene.
+    """
+    scene: Scene | None = scenes().get(options.scene or "")
+    if options.world is not None:
+        scene = surroundings(options.world).scene(options)
+    rules = rig.gaze.top_down
+    if scene is None or not scene.behaviours or not {*scene.behaviours} <= rules.rules.keys():
+        return rig
+    planning = replace(rules, planner=replace(rules.planner, enabled=True))
+    rig = replace(rig, gaze=replace(rig.gaze, top_down=planning))
+    return rig if options.world is None else replace(rig, motion=replace(rig.motion, gloves=True))
+
+
+def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:
+    """Return what a recording says of its run."""
+    return RunInfo(
+        rig=options.rig,
+        profile=rig.profile,
+        character=options.character,
+        config_yaml=params_text(rig),
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
+        gestures_yaml=gestures_text(rig.gesture_files),
+        seed=options.seed,
+        rate_hz=rig.loop.rate_hz,
+        started_utc=datetime.now(UTC).isoformat(),
+        scene=options.scene or options.world_name,
+        eyes=options.looks_through or _surroundings(options),
+        mock=options.mock,
+        fast=options.fast,
+        bus=options.bus or "emulated",
+        pictures_hz=options.record_pictures,
+        versions=versions(),
+        stands=stands,
+    )
+
+
+def _surroundings(options: RunOptions) -> str:
+    if options.world is None:
+        return f"scene {options.scene}"
+    return f"world {options.world_name}{', no pictures' if options.no_pictures else ''}"

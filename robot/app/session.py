@@ -2,14 +2,11 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gazerig.config.rig import Rig
-from gazerig.config.text import gestures_text, rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process.bounded_call import LastingReport
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
@@ -24,7 +21,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_figures import SceneScore, run_figures
 from gazerig.robot.app.run_observers import RunObservers
-from gazerig.robot.app.run_rig import run_rig
+from gazerig.robot.app.run_rig import run_info, run_rig
 from gazerig.robot.app.surroundings import RunRoom
 from gazerig.robot.control.event_text import drawn_together, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
@@ -34,7 +31,6 @@ from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.control.switch_interval import SWITCH_INTERVAL
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.recording.run_info import RunInfo, versions
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
@@ -82,35 +78,6 @@ def compose(
     made = assemble(rig, options, substitutes, room)
     names = (options.rig, options.character, options.profile)
     return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)
-
-
-def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:
-    """Return what a recording says of its run."""
-    return RunInfo(
-        rig=options.rig,
-        profile=rig.profile,
-        character=options.character,
-        config_yaml=rig_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
-        gestures_yaml=gestures_text(rig.gesture_files),
-        seed=options.seed,
-        rate_hz=rig.loop.rate_hz,
-        started_utc=datetime.now(UTC).isoformat(),
-        scene=options.scene or options.world_name,
-        eyes=options.looks_through or _surroundings(options),
-        mock=options.mock,
-        fast=options.fast,
-        bus=options.bus or "emulated",
-        pictures_hz=options.record_pictures,
-        versions=versions(),
-        stands=stands,
-    )
-
-
-def _surroundings(options: RunOptions) -> str:
-    if options.world is None:
-        return f"scene {options.scene}"
-    return f"world {options.world_name}{', no pictures' if options.no_pictures else ''}"
 
 
 def run(

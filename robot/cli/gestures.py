@@ -1,14 +1,16 @@
 """The command import-gesture, and how a command writes a gesture."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
+
+if TYPE_CHECKING:
+    from gazerig.robot.model.gesture_fit import FittedGesture
 
 app = typer.Typer()
 
@@ -29,22 +31,19 @@ def import_gesture(
 ) -> None:
     """Make a gesture of key frames from an animation program, as YAML that rigs take."""
     with clear_errors(rig):
-        from gazerig.robot.app.gesture_file import gesture_text
+        from gazerig.robot.app.gesture_file import gesture_text, write_gesture
         from gazerig.robot.app.key_frame_table import read_table
 
         loaded = load_rig(rig)
         text = gesture_text(loaded, read_table(table, fps), f"from {table.name}")
-        finish(loaded, name, text, folder, force)
+        say_written(loaded.name, *write_gesture(loaded, name, text, folder, force))
 
 
-def finish(rig: Rig, name: str, text: str, folder: Path, force: bool) -> None:
-    """Write a gesture, and print how this rig performs it and how to use it."""
-    from gazerig.robot.app.gesture_file import write_gesture
-
-    path, fitted = write_gesture(rig, name, text, folder, force)
+def say_written(rig_name: str, path: Path, fitted: "FittedGesture") -> None:
+    """Print how a rig performs a gesture that was written, and how to use it."""
     slower = (
         f", slower by {fitted.slowed_by:.2f} for {fitted.slow_joint}" if fitted.slow_joint else ""
     )
     smaller = "".join(f", {joint} {share:.0%} as far" for joint, share in fitted.smaller)
-    say(f"{path}: {fitted.played.duration_s:.1f} s on {rig.name}{slower}{smaller}")
-    say(f"use it: gesture_files: [{path}] in the rig, then gazerig ctl play {name}")
+    say(f"{path}: {fitted.played.duration_s:.1f} s on {rig_name}{slower}{smaller}")
+    say(f"use it: gesture_files: [{path}] in the rig, then gazerig ctl play {path.stem}")

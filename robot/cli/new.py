@@ -16,7 +16,7 @@ from gazerig.config.new_rig import (
     MECHANISMS,
     NewRig,
     joints_of,
-    rig_text,
+    params_text,
     usual_port,
 )
 from gazerig.drivers.errors import SetupError
@@ -169,7 +169,7 @@ def _write(rig: NewRig, file: Path, force: bool) -> None:
     """Write a rig's file and check it as ``gazerig check`` does; a faulty one is not left there."""
     from gazerig.robot.cli.rig_check import checked_line
 
-    write_file(file, rig_text(rig), force)
+    write_file(file, params_text(rig), force)
     try:
         say(checked_line(str(file)))
     except ConfigError:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
@@ -36,7 +36,7 @@ def recorder(path: Path, fast: bool) -> Recorder:
     """Make a recorder as ``gazerig run --record`` does."""
     rig = load_rig("desk")
     info = RunInfo(
-        "desk", rig.profile, rig_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
+        "desk", rig.profile, params_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True, fast=fast,
         versions=versions(),
     )  # fmt: skip

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
@@ -160,7 +160,7 @@ def recorder_at(path: Path) -> Recorder:
     """Return a recorder of the desk rig's run."""
     rig = load_rig("desk")
     info = RunInfo(
-        "desk", rig.profile, rig_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
+        "desk", rig.profile, params_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True,
         versions=versions(),
     )  # fmt: skip

@@ -14,10 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text
+from gazerig.config.text import params_text
 from gazerig.features.lab.sweep.axes import Point
-from gazerig.features.lab.sweep.worker import Job
-from gazerig.features.lab.sweep.worker_pool import WorkerPool
+from gazerig.features.lab.sweep.worker_pool import Job, WorkerPool
 from gazerig.robot.app.options import BUSES, RunOptions
 
 LEVELS = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0)
@@ -51,7 +50,7 @@ def main() -> None:
     options = RunOptions(
         mock=True, fast=True, scene="visitor", seconds=given.seconds, bus=given.bus
     )
-    job = Job(options, rig_text(load_rig("desk")))
+    job = Job(options, params_text(load_rig("desk")))
     table = Table(title=f"{given.runs} runs of {given.seconds:g} s, {given.bus} servos")
     for title in ("processes", "wall s", "processor s", "simulated s a wall s"):
         table.add_column(title, justify="right")

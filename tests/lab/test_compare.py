@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import params_text, walk_text
 from gazerig.features.lab.analysis.multiplicity import corrected
 from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import report as build
@@ -83,7 +83,7 @@ def record(path: Path, seconds: float, saccade: str) -> None:
     made = assemble(load_rig("desk"), RunOptions(True, True, 0, "face-to-face", saccade=saccade))
     rig = made.live.rig
     info = RunInfo(
-        "desk", rig.profile, rig_text(rig), 0, 200.0, "2026-01-31T12:00:00+00:00",
+        "desk", rig.profile, params_text(rig), 0, 200.0, "2026-01-31T12:00:00+00:00",
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="face-to-face", mock=True, fast=True,
         versions=versions(),
     )  # fmt: skip

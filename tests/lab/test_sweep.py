@@ -19,7 +19,7 @@ from command_line import Invoked, invoked
 
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
-from gazerig.config.text import rig_text
+from gazerig.config.text import params_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.features.lab.simulated_run import simulate
@@ -29,8 +29,8 @@ from gazerig.features.lab.sweep.response import most_responsive
 from gazerig.features.lab.sweep.response_figure import response_png
 from gazerig.features.lab.sweep.run_store import RUNS, run_store
 from gazerig.features.lab.sweep.table import rows_of, write_tables
-from gazerig.features.lab.sweep.worker import Job, figures_at
-from gazerig.features.lab.sweep.worker_pool import SweepInterrupted, WorkerPool
+from gazerig.features.lab.sweep.worker import figures_at
+from gazerig.features.lab.sweep.worker_pool import Job, SweepInterrupted, WorkerPool
 from gazerig.robot.app.options import RunOptions
 
 pytestmark = pytest.mark.usefixtures("branched_children")
@@ -152,7 +152,7 @@ def test_a_line_that_was_being_written_when_the_power_went_is_done_again(tmp_pat
 def test_two_processes_make_the_table_of_one(tmp_path: Path) -> None:
     points: list[Point] = [{COMFORT: 4.0}, {COMFORT: 12.0}]
     runs = [(point, seed) for point in points for seed in (0, 1)]
-    with WorkerPool(Job(OPTIONS, rig_text(RIG)), 2, lambda: None) as pool:
+    with WorkerPool(Job(OPTIONS, params_text(RIG)), 2, lambda: None) as pool:
         found = dict(pool.outcomes(runs))
         assert len(pool.pids) == 2
         pids = pool.pids
@@ -331,7 +331,7 @@ def test_a_column_of_numbers_and_words_is_text_in_parquet(tmp_path: Path) -> Non
 
 def test_a_run_gives_what_the_report_and_the_summary_give() -> None:
     run = simulate(RIG, OPTIONS)
-    figures = figures_of(run)
+    figures = figures_of(*run)
     assert figures["seconds"] == run.figures["seconds"] and figures["events"] == 0
     assert figures["gaze_error_deg.median"] == run.figures["gaze_error_deg"]["median"]  # type: ignore[index]
     verdicts = [held for name, held in figures.items() if name.startswith("verdict.")]

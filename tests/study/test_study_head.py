@@ -10,8 +10,8 @@ from slow_rigs import at_rate
 
 from gazerig.features.study.presenter import HeadLost
 from gazerig.features.study.records import STEP_DEG, Record, TrialBegan, TrialEnded
-from gazerig.features.study.run.head_main import as_line, options_in
 from gazerig.features.study.run.head_presenter import HeadPresenter
+from gazerig.features.study.run.head_process import as_line, options_in
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.run.trial_measures import SWITCH_S, measured
 from gazerig.features.study.session import ShownTrial

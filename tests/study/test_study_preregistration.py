@@ -56,8 +56,8 @@ def test_a_value_of_the_rig_that_is_seen_changes_the_hash_and_a_port_does_not(
     rig = (SHIPPED / "rigs" / "expressive.yaml").read_text(encoding="utf-8")
     text = TEXT.replace("rig: expressive", "rig: ./r.yaml")
 
-    def sha256(rig_text: str) -> str:
-        (tmp_path / "r.yaml").write_text(rig_text, encoding="utf-8")
+    def sha256(params_text: str) -> str:
+        (tmp_path / "r.yaml").write_text(params_text, encoding="utf-8")
         return study_of(tmp_path, text).sha256
 
     assert sha256(rig) == load_study("nakamoto_1").sha256

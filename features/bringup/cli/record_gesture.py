@@ -18,7 +18,7 @@ from gazerig.features.bringup.hand_recording import LONGEST_S, HandRecording, re
 from gazerig.features.bringup.monitor import Monitor
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.features.bringup.telemetry import SmartServoTelemetry
-from gazerig.robot.cli.gestures import FolderOption, finish
+from gazerig.robot.cli.gestures import FolderOption, say_written
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
     INTERRUPTED,
@@ -51,7 +51,7 @@ def record_gesture(
 ) -> None:
     """Record a gesture by hand: torque off, move the head, and it is written as YAML."""
     with clear_errors(rig, port, mock):
-        from gazerig.robot.app.gesture_file import gesture_text
+        from gazerig.robot.app.gesture_file import gesture_text, write_gesture
 
         loaded = load_rig(rig)
         measured = [one for one in loaded.names if loaded.joints[one].facts.measured]
@@ -69,7 +69,7 @@ def record_gesture(
         for joint in recorded.left_out:
             say(f"{joint}: answered too seldom and is left out")
         text = gesture_text(loaded, recorded.series, "recorded by hand")
-        finish(loaded, name, text, folder, force)
+        say_written(loaded.name, *write_gesture(loaded, name, text, folder, force))
 
 
 def _ask_to_let_go(yes: bool) -> None:

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from typing import NamedTuple
 
+from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.report import measured
 from gazerig.features.lab.report.statistics import MeasureResult, compared
-from gazerig.features.lab.simulated_run import SimulatedRun
 from gazerig.features.lab.sweep.axes import Point
 from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
 
@@ -39,12 +39,12 @@ class Outcome(NamedTuple):
     died: bool = False
 
 
-def figures_of(run: SimulatedRun) -> dict[str, Column]:
+def figures_of(figures: Mapping[str, object], trace: GazeTrace) -> dict[str, Column]:
     """Return the columns of a run, in the order of a table.
 
     A measure KEY of the report stands in ``report.KEY``, its verdict in ``verdict.KEY``.
     """
-    results = [compared(one, BY_KEY[one.key]) for one in measured(run.trace)]
+    results = [compared(one, BY_KEY[one.key]) for one in measured(trace)]
     words = [result.verdict for result in results]
     columns: dict[str, Column] = {
         OUTSIDE: words.count("outside"),
@@ -55,7 +55,7 @@ def figures_of(run: SimulatedRun) -> dict[str, Column]:
     for result in results:
         columns[REPORT + result.band.key] = result.value if isfinite(result.value) else None
         columns[VERDICT + result.band.key] = result.verdict
-    shown = {key: held for key, held in run.figures.items() if key not in _NOT_REPRODUCED}
+    shown = {key: held for key, held in figures.items() if key not in _NOT_REPRODUCED}
     return columns | dict(_flat(shown))
 
 

@@ -8,12 +8,11 @@ from pathlib import Path
 import gazerig
 from gazerig.config.parameters import plain
 from gazerig.config.rig import Rig
-from gazerig.config.text import gestures_text, rig_text, walk_text
+from gazerig.config.text import gestures_text, params_text, walk_text
 from gazerig.features.lab.sweep.axes import Axis, Point
 from gazerig.features.lab.sweep.outcome import Outcome
 from gazerig.features.lab.sweep.run_store import RunStore, run_store
-from gazerig.features.lab.sweep.worker import Job
-from gazerig.features.lab.sweep.worker_pool import Simulation, WorkerPool, processors
+from gazerig.features.lab.sweep.worker_pool import Job, Simulation, WorkerPool, processors
 from gazerig.robot.app.options import RunOptions
 
 Progress = Callable[[int, int], None]
@@ -59,7 +58,7 @@ class SweepSpec:
     @property
     def job(self) -> Job:
         """Return what its processes need to know."""
-        return Job(self.options, rig_text(self.rig))
+        return Job(self.options, params_text(self.rig))
 
 
 class Sweep:

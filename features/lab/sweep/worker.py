@@ -11,33 +11,21 @@ import os
 import pickle
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from gazerig.config.parameters import changed
 from gazerig.config.rig import Rig
-from gazerig.config.text import rig_text
+from gazerig.config.text import params_text
 from gazerig.errors import Error
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import Point
 from gazerig.features.lab.sweep.outcome import Column, figures_of
+from gazerig.features.lab.sweep.worker_pool import Job
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
 
 PARENT_GONE = "the program that asked for it is gone"
 _NICE = 5
-
-
-@dataclass(frozen=True)
-class Job:
-    """What all runs have in common.
-
-    Attributes:
-        options: but for the seed.
-        config: the rig's configuration as the program has read and checked it.
-    """
-
-    options: RunOptions
-    config: str
 
 
 def figures_at(
@@ -49,7 +37,7 @@ def figures_at(
         ConfigError: a rule of the rig forbids the point.
         SetupError: the run cannot be started, or ended by a fault.
     """
-    return figures_of(simulate(changed(rig, point), options, stopped))
+    return figures_of(*simulate(changed(rig, point), options, stopped))
 
 
 def main() -> None:
@@ -60,7 +48,7 @@ def main() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a package prints is no answer
     job: Job = pickle.load(sys.stdin.buffer)
     rig = run_rig(job.options)
-    changed_meanwhile = rig_text(rig) != job.config
+    changed_meanwhile = params_text(rig) != job.config
 
     def stopped() -> str | None:
         return PARENT_GONE if os.getppid() != parent else None

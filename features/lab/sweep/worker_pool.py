@@ -12,6 +12,7 @@ import selectors
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from subprocess import PIPE
 from typing import BinaryIO, NamedTuple, Self
 
@@ -19,7 +20,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.features.lab.sweep.axes import Point
 from gazerig.features.lab.sweep.outcome import Figures, Outcome
-from gazerig.features.lab.sweep.worker import Job
+from gazerig.robot.app.options import RunOptions
 
 _MODULE = "gazerig.features.lab.sweep.worker"
 _ONE_THREAD = {
@@ -32,6 +33,19 @@ _END_S = 2.0
 
 Simulation = tuple[Point, int]
 """A point and a seed."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all runs have in common.
+
+    Attributes:
+        options: but for the seed.
+        config: the rig's configuration as the program has read and checked it.
+    """
+
+    options: RunOptions
+    config: str
 
 
 class SweepInterrupted(Exception):

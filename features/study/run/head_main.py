@@ -4,36 +4,16 @@ Standard input: the options of the run as one line of JSON. It ends, parked and 
 when its input does, so also when the study's program dies.
 """
 
-import json
 import os
 import signal
 import sys
 import threading
-from dataclasses import fields
-from pathlib import Path
-from typing import Any
 
 from gazerig.errors import Error
+from gazerig.features.study.run.head_process import options_in
 from gazerig.robot.app import session
-from gazerig.robot.app.options import RunOptions
 
-_PATHS = ("record", "video", "replay", "heatmap", "heatmap_face")
 _ENDING = (signal.SIGTERM, signal.SIGHUP)
-
-
-def as_line(options: RunOptions) -> bytes:
-    """Return options as the line that ``main`` reads."""
-    plain = {field.name: getattr(options, field.name) for field in fields(options)}
-    said = {name: str(one) if isinstance(one, Path) else one for name, one in plain.items()}
-    return json.dumps(said).encode() + b"\n"
-
-
-def options_in(line: bytes) -> RunOptions:
-    """Return the options of a line."""
-    said: dict[str, Any] = json.loads(line)
-    for name in _PATHS:
-        said[name] = None if said[name] is None else Path(said[name])
-    return RunOptions(**said)
 
 
 def main() -> int:

@@ -1,14 +1,16 @@
 """The process of a study's head, and the connection to it."""
 
 import contextlib
+import json
 import subprocess
+from dataclasses import fields
 from pathlib import Path
 from subprocess import PIPE
+from typing import Any
 
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.process import child_process
 from gazerig.features.study.presenter import HeadLost
-from gazerig.features.study.run.head_main import as_line
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import Clock
@@ -17,6 +19,7 @@ from gazerig.robot.remote.client import NoRobotError, RobotClient
 _MODULE = "gazerig.features.study.run.head_main"
 _STARTS_S, _LOOKS_S = 90.0, 0.05
 _PARKS_S = 20.0
+_PATHS = ("record", "video", "replay", "heatmap", "heatmap_face")
 
 
 class HeadProcess:
@@ -110,3 +113,18 @@ class HeadProcess:
             self._clock.sleep_until(self._clock.now_s() + _LOOKS_S)
         late = f"the head did not begin to move within {_STARTS_S:g} s"
         raise HeadLost(f"{late}: {self.last_words()}")
+
+
+def as_line(options: RunOptions) -> bytes:
+    """Return options as the line that the process reads."""
+    plain = {field.name: getattr(options, field.name) for field in fields(options)}
+    said = {name: str(one) if isinstance(one, Path) else one for name, one in plain.items()}
+    return json.dumps(said).encode() + b"\n"
+
+
+def options_in(line: bytes) -> RunOptions:
+    """Return the options of a line."""
+    said: dict[str, Any] = json.loads(line)
+    for name in _PATHS:
+        said[name] = None if said[name] is None else Path(said[name])
+    return RunOptions(**said)

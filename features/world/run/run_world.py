@@ -26,7 +26,7 @@ from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import BOARDS, CHAINS
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
-from gazerig.robot.app.run_scene import refuse_unruled
+from gazerig.robot.app.run_rig import refuse_unruled
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
                 "move: put its joints on one of our kinds, or use --scene"
             )
     scene, mjcf_file = world_scene(asked, options.seed), mjcf_of(asked)
-    refuse_unruled(rig, scene, f"--world {asked}")
+    refuse_unruled(rig.gaze.top_down, scene, f"--world {asked}")
     script = scene.figures.script
     # Where nothing is rendered, nobody sees the rigs: the page draws them by itself.
     looks = not options.no_pictures

@@ -213,7 +213,7 @@ def world_camera(
 
     try:
         return world.pixels(
-            lambda: poses.state, poses.head, own.find_faces(rig), True,
+            lambda: poses.state, poses.head, own.find_faces(rig.detector), True,
             MotionOfDrawn(rig.motion), locate, poses.begin_s,
         )  # fmt: skip
     except NoRenderer as error:
