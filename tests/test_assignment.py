@@ -106,7 +106,7 @@ def a_track(rng: np.random.Generator) -> TrackRow:
         int(kind), int(mark), *a_direction(rng), rng.uniform(1.0, 2.0), 10.0**across_m2,
         10.0**along_m2, rng.uniform(0.02, 0.4), rng.uniform(0.8, 1.2),
         rng.choice([0.0, 0.2, 1.5]), bool(rng.integers(2)), rng.choice([0.0, 0.5]),
-        rng.choice([0.1, inf]), rng.choice([1e-3, inf]),
+        rng.choice([0.1, inf]), rng.choice([1e-3, inf]), bool(rng.integers(2)),
     )  # fmt: skip
 
 

@@ -32,6 +32,8 @@ _SLOWLY = _NEARLY_UNPAIRED * (UNPAIRED - _NEARLY_UNPAIRED)
 _SURPRISE = 6.0
 # Who is out of sight is found again in one frame of ten.
 _BACK = 4.6
+# What is found in one or two frames is nobody in one case of ten, as between two who overlap.
+_UNPROVED = 4.6
 # Nobody's height surprises by more than about this, in one frame.
 _BOB_M = 0.1
 # Nor by more than this who is about to be hidden.
@@ -74,6 +76,7 @@ class TrackRow(NamedTuple):
     gone_m: how much farther off it may be if it is dressed alike
     fastest_m: how far it may have moved along the view
     upright_m2: variance of its height, where that changes less than its place does
+    proved: whether it was seen in some frames, and is no chance find of the detector
     """
 
     kind: int
@@ -91,6 +94,7 @@ class TrackRow(NamedTuple):
     gone_m: float = 0.0
     fastest_m: float = inf
     upright_m2: float = inf
+    proved: bool = True
 
 
 class DetectionRow(NamedTuple):
@@ -209,6 +213,7 @@ def _all_pairs(
     unlike = (aside - higher) / across_sum + higher / upright_sum + deep / along_sum
     surprising = unlike + np.log(across_sum * upright_sum * along_sum / exact) + _SURPRISE
     costs = np.minimum(expected, surprising) + _OTHER_MARK * other + _BACK * (t[11] == 0.0)
+    costs += _UNPROVED * (t[15] == 0.0)
     costs += _CLOTHES * worn
     unlikely = (hidden | (worn > 0.0)) & (costs > UNPAIRED)
     unlikely |= np.abs(deep_m) > t[13] + _RANGE_SIGMA * np.sqrt(t[7] + along)
@@ -245,7 +250,7 @@ def _pair_cost(
     kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, in_sight, *_ = (
         tracks[k]
     )
-    gone_m, fastest_m, upright_m2 = tracks[k][12:]
+    gone_m, fastest_m, upright_m2, proved = tracks[k][12:]
     its_kind, its_mark, its_x, its_y, its_z, its_m, across_sd, along_sd, its_radius_m, sized = found
     if kind != its_kind:
         return FORBIDDEN
@@ -293,6 +298,8 @@ def _pair_cost(
         cost += _OTHER_MARK
     if not in_sight:
         cost += _BACK
+    if not proved:
+        cost += _UNPROVED
     cost += _CLOTHES * worn
     if (hidden or worn > 0.0) and cost > UNPAIRED:
         return FORBIDDEN

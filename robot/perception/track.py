@@ -126,6 +126,7 @@ class Track:
 
     R_world_face: axes of a face; None of anything else, and while the person's face is not seen
     seen_s, at_s: capture times of its last detection and of its place
+    frames: in how many it was detected
     faced_s: of a person, capture time of the last detection of the face
     face_size: of a face, its size over an adult's, learned where the camera measures depth
     depth_s: capture time of the last measured distance, None before the first
@@ -153,6 +154,7 @@ class Track:
     speech: Speech = NO_SPEECH
     eyes: SeenEyes | None = None
     faced_s: float = -inf
+    frames: int = 1
     clothes: KnownClothes = field(default_factory=KnownClothes)
     box_m: float = 0.0
     lower_face: float = 0.0

@@ -25,6 +25,7 @@ from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter
 from gazerig.robot.perception.track import FACE, UNNAMED, LocalisedDetection, Track
 
 _FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
+_PROVED = 3
 # Below this part of its usual measure the lower half of a face is covered, if that is so many
 # standard deviations of a frame below too.
 _COVERED, _COVERED_SDS = 0.8, 4.0
@@ -152,6 +153,7 @@ class Tracker:
                 _UPRIGHT_M2 + (_STOOPS_M_S * (track.at_s - track.seen_s)) ** 2
                 if track.is_person
                 else inf,
+                track.frames >= _PROVED,
             )
             for track in self._tracks
         ]
@@ -206,6 +208,7 @@ class Tracker:
             track.filter.slow_to(_FASTEST_M_S)
         track.clothes.miss(track.at_s - track.seen_s)
         track.seen_s = track.at_s
+        track.frames += 1
         track.clothes.learn(detection.clothing)
         R = detection.R_world_face
         if R is None and self.shows_face(track):
