@@ -58,7 +58,7 @@ def test_as_many_goals_as_fit_into_a_packet():
     many = [2000] * len(ids)
     packet = GoalWrite(ids[:-1]).packet(many[:-1], many[:-1])
     assert packet[3] == len(packet) - 4 <= 255
-    with pytest.raises(ValueError, match="ask fewer servos at once"):
+    with pytest.raises(ValueError, match="read fewer servos at once"):
         sync_write(ids, 42, 6, [bytes(6)] * len(ids))
 
 

@@ -96,7 +96,7 @@ def test_a_wrong_device_number_is_a_cause():
 def test_a_board_without_the_check_byte_is_not_fed_errors():
     bench = Bench()
     bench.bus = MaestroBus(bench.port, SETUPS, MaestroParams(crc=True))
-    with pytest.raises(ServoMissing, match="wants no CRC: switch Enable CRC on"):
+    with pytest.raises(ServoMissing, match="expects no CRC: switch Enable CRC on"):
         bench.bus.open()
 
 
@@ -167,7 +167,7 @@ def test_channels_without_pulses_go_to_their_rest_one_after_another(bench):
     assert bench.pulses() == [6100, CENTRE, HIGH]
     assert bench.now_s >= 0.2
     said = " ".join(bench.bus.events())
-    assert "tell no positions" in said
+    assert "report no positions" in said
     assert "eyes (channel 0), lid (channel 1), brow (channel 5) had no pulses" in said
     assert all(reading.torque for reading in bench.run(0.01)[-1])
 
@@ -177,7 +177,7 @@ def test_that_nothing_is_measured_is_said_once(bench):
     bench.bus.disable_torque()
     bench.bus.events()
     bench.bus.enable_torque()
-    assert not any("tell no positions" in line for line in bench.bus.events())
+    assert not any("report no positions" in line for line in bench.bus.events())
 
 
 def test_after_a_release_they_begin_where_they_were(bench):

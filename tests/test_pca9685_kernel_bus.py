@@ -115,7 +115,7 @@ def test_a_path_says_what_kind_of_port_it_is(tmp_path):
 
 def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
     for kind in ("maestro", "dynamixel"):
-        with pytest.raises(PortError, match="is an I2C bus and no serial port.*pca9685"):
+        with pytest.raises(PortError, match="is an I2C bus, not a serial port.*pca9685"):
             refuse_owner("/dev/i2c-1", kind, ())
     refuse_owner("/dev/i2c-1", "pca9685", ())
 

@@ -163,7 +163,7 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
     machine.command("plug")
     machine.go(0.5)
     assert not any(machine.holding())
-    assert machine.said("torque switched off, as was asked for while the port was gone")
+    assert machine.said("torque switched off, as requested while the port was gone")
     machine.go(4.0)
     assert not any(machine.holding()) and machine.ticks[-1].stopped
     machine.made.robot.command(Resume("the space bar"))

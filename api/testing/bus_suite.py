@@ -115,7 +115,7 @@ class BusSuite(BusBenches):
         here.run(bus, 0.3, wanted)
         assert here.near(here.truth(), wanted)
         told = bus.events()
-        limp = [line for line in told if "had no pulses: they go to their places at once" in line]
+        limp = [line for line in told if "had no pulses: they move to their goals immediately" in line]
         assert len(limp) == any(hobby)
         for place, setup in enumerate(here.setups):
             assert not any(hobby) or hobby[place] == (servo_label(setup) in limp[0])

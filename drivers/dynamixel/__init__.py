@@ -1,1 +1,1 @@
-"""Dynamixel X servos: Protocol 2.0, from bytes to a bus that recovers by itself."""
+"""Dynamixel X servos (Protocol 2.0): packets, control tables and their bus."""

@@ -17,17 +17,17 @@ VELOCITY_UNIT_STEPS_S = 0.229 / 60.0 * STEPS_PER_TURN
 ACCELERATION_UNIT_STEPS_S2 = 214.577 / 3600.0 * STEPS_PER_TURN
 WATCHDOG_UNIT_S = 0.02
 PWM_FULL = 885
-"""Units of PWM at 100 %."""
+"""PWM register value for 100 %."""
 
 BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
-"""Bit/s by the value of Baud Rate (8); the last one on X430 alone."""
+"""Bit/s by the value of Baud Rate (8); the last one only on the X430."""
 
 RETURN_DELAY_UNIT_S = 2e-6
 SHADOW_OFF = 253
-"""Secondary ID (12) from here on means none."""
+"""Smallest value of Secondary ID (12) that disables it."""
 
 EEPROM_END = 64
-"""Addresses below are kept without power and locked while the torque is on."""
+"""Addresses below keep their values without power and are locked while torque is on."""
 
 FAST_READ_SINCE: dict[Family, int] = {"x330": 46, "x430": 45}
 """First firmware with Fast Sync Read and Fast Bulk Read."""
@@ -58,11 +58,11 @@ GAINS = (
 
 
 class DynamixelRegister(NamedTuple):
-    """One entry of the control table.
+    """An entry of the control table.
 
-    initial: factory value of the EEPROM area, start value of the RAM area;
-        None where the device itself decides
-    low, high: range a write must keep to; None where the model or other registers decide
+    initial: factory value of the EEPROM area, start value of the RAM area; None if the device
+        itself decides
+    low, high: range of valid values; None if the model or other registers decide
     """
 
     name: str
@@ -76,25 +76,25 @@ class DynamixelRegister(NamedTuple):
 
     @property
     def area(self) -> Literal["eeprom", "ram"]:
-        """Name the memory the register lives in."""
+        """Return the memory area of the register."""
         return "eeprom" if self.address < EEPROM_END else "ram"
 
     def encode(self, value: int) -> bytes:
-        """Return a value as it is written; a negative one of a register without sign wraps."""
+        """Return a value as bytes; a negative value of an unsigned register wraps."""
         return (value & (1 << 8 * self.size) - 1).to_bytes(self.size, "little")
 
     def decode(self, data: bytes) -> int:
-        """Return the value that bytes stand for."""
+        """Return the value of bytes."""
         return int.from_bytes(data, "little", signed=self.signed)
 
 
 class DynamixelModel(NamedTuple):
-    """What differs from model to model.
+    """Properties of a servo model.
 
-    temperature_limit .. shutdown: factory values of the registers of that name
-    current_limit: None where the model measures load instead of current
+    temperature_limit .. shutdown: factory values of the registers with these names
+    current_limit: None if the model measures load instead of current
     gains: factory values of velocity I and P, position D, I and P
-    stall_torque_nm, stall_current_a, no_load_rpm: at rated_v
+    stall_torque_nm, stall_current_a, no_load_rpm: values at rated_v
     """
 
     name: str
@@ -114,17 +114,17 @@ class DynamixelModel(NamedTuple):
 
     @property
     def steps_per_turn(self) -> int:
-        """Return the steps of its encoder."""
+        """Return the number of steps of the encoder."""
         return STEPS_PER_TURN
 
     @property
     def no_load_steps_s(self) -> float:
-        """Return the speed without load at the rated voltage."""
+        """Return the no-load speed at the rated voltage."""
         return self.no_load_rpm / 60.0 * STEPS_PER_TURN
 
     @property
     def current_unit_ma(self) -> float:
-        """Return one unit of Present Current, 0 where the model has none."""
+        """Return the unit of Present Current, 0 if the model has none."""
         if self.current_limit is None:
             return 0.0
         if self.family == "x330":
@@ -133,9 +133,9 @@ class DynamixelModel(NamedTuple):
 
     @property
     def load_unit(self) -> float:
-        """Return the share of the stall torque that one unit of Present Current is.
+        """Return the share of the stall torque per unit of Present Current.
 
-        Models without a current sensor report load in 0.1 % there.
+        Models without a current sensor report load in 0.1 % in that register.
         """
         if not self.current_unit_ma:
             return 0.001
@@ -208,7 +208,7 @@ _BASE = (
     DynamixelRegister("position_p_gain",        84, 2, "rw", None, 0, 16383),
     DynamixelRegister("feedforward_2nd_gain",   88, 2, "rw", 0, 0, 16383),
     DynamixelRegister("feedforward_1st_gain",   90, 2, "rw", 0, 0, 16383),
-    # The range is that of the written byte: 0 off or clear, 1..127 armed; reads 255 once tripped.
+    # Range of written values: 0 off or clear, 1..127 armed. It reads 255 once tripped.
     DynamixelRegister("bus_watchdog",           98, 1, "rw", 0, 0, 127),
     DynamixelRegister("goal_pwm",              100, 2, "rw", None, None, None, True),
     DynamixelRegister("goal_current",          102, 2, "rw", None, None, None, True),
@@ -232,14 +232,14 @@ _BASE = (
 # fmt: on
 
 REGISTERS: dict[str, DynamixelRegister] = {r.name: r for r in _BASE}
-"""Registers by name with the values all models share; addresses hold for every model."""
+"""Registers by name, with values common to all models; addresses are the same in every model."""
 
 
 class IndirectBlock(NamedTuple):
-    """A window of RAM whose bytes stand for other bytes, chosen by two-byte addresses.
+    """A window of RAM whose bytes mirror other bytes, selected by two-byte addresses.
 
-    Entry i has its address at ``address_base + 2 i`` and its byte at ``data_base + i``;
-    addresses must lie in target_low .. target_high.
+    Entry i has its address at ``address_base + 2 i`` and its byte at ``data_base + i``; addresses
+    must be within target_low .. target_high.
     """
 
     address_base: int
@@ -250,7 +250,7 @@ class IndirectBlock(NamedTuple):
 
 
 def indirect_blocks(model: DynamixelModel, firmware: int) -> tuple[IndirectBlock, ...]:
-    """List the indirect windows of a model with a firmware version."""
+    """Return the indirect windows of a model with a firmware version."""
     if model.family == "x430":
         return (IndirectBlock(168, 224, 28, 64, 661), IndirectBlock(578, 634, 28, 64, 661))
     if firmware >= X330_WIDE_INDIRECT_SINCE:
@@ -259,13 +259,13 @@ def indirect_blocks(model: DynamixelModel, firmware: int) -> tuple[IndirectBlock
 
 
 def registers_of(model: DynamixelModel) -> tuple[DynamixelRegister, ...]:
-    """List a model's registers with its own initial values and ranges (no indirect windows)."""
+    """Return a model's registers with its initial values and ranges (no indirect windows)."""
     fitted = (_fit(register, model) for register in _BASE)
     return tuple(register for register in fitted if register is not None)
 
 
 def _fit(register: DynamixelRegister, model: DynamixelModel) -> DynamixelRegister | None:
-    """Return the register as this model has it, None where it has none."""
+    """Return the model's version of a register, None if it has none."""
     name = register.name
     if model.current_limit is None and name in ("current_limit", "goal_current"):
         return None
@@ -277,7 +277,7 @@ def _fit(register: DynamixelRegister, model: DynamixelModel) -> DynamixelRegiste
 
 
 def _initials(model: DynamixelModel) -> dict[str, int | None]:
-    """Return the start values that depend on the model."""
+    """Return the model-dependent initial values."""
     return {
         "model_number": model.number,
         "temperature_limit": model.temperature_limit,
@@ -292,7 +292,7 @@ def _initials(model: DynamixelModel) -> dict[str, int | None]:
 
 
 def _ranges(model: DynamixelModel) -> dict[str, tuple[int, int]]:
-    """Return the ranges that depend on the model."""
+    """Return the model-dependent ranges."""
     small = model.family == "x330"
     return {
         "baud_rate": (0, 6 if small else 7),
@@ -305,18 +305,18 @@ def _ranges(model: DynamixelModel) -> dict[str, tuple[int, int]]:
 
 
 def _lowest_voltage(model: DynamixelModel) -> int:
-    """Return the low end of both voltage limits, 0.1 V; the 5 V models go below their initial."""
+    """Return the lower bound of both voltage limits, 0.1 V; below the initial one on 5 V models."""
     return 31 if model.rated_v == 5.0 else model.min_voltage
 
 
 def name_errors(status: int) -> tuple[str, ...]:
-    """Name the bits of Hardware Error Status that are set."""
+    """Return the names of the set bits of Hardware Error Status."""
     bits = [bit for bit in range(8) if status >> bit & 1]
     return tuple(HARDWARE_ERRORS.get(bit, f"error bit {bit}") for bit in bits)
 
 
 def speed_units(speed_steps_s: float) -> int:
-    """Return a speed in units of Profile Velocity, at least 1: there 0 means no limit."""
+    """Return a speed in units of Profile Velocity, at least 1, as 0 means no limit."""
     return max(1, int(speed_steps_s / VELOCITY_UNIT_STEPS_S))
 
 
@@ -325,7 +325,7 @@ MOST_ACCELERATION = 32767
 
 
 def acceleration_units(accel_steps_s2: float | None) -> int:
-    """Return an acceleration in units of Profile Acceleration; 0, which is no limit, for none."""
+    """Return an acceleration in units of Profile Acceleration; 0 (no limit) for None."""
     if accel_steps_s2 is None:
         return 0
     return min(MOST_ACCELERATION, max(1, ceil(accel_steps_s2 / ACCELERATION_UNIT_STEPS_S2)))

@@ -26,24 +26,24 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 POSITION_MODE = 3
 
 STEEPEST_PWM = 255
-"""PWM Slope: with the factory's 140 a motor needs 36 ms from full drive to full brake, in which a
-lid at 600 deg/s runs 4 deg too far."""
+"""PWM Slope. With the factory value 140 a motor needs 36 ms from full drive to full brake, during
+which a lid at 600 deg/s overshoots by 4 deg."""
 
 USUAL_RATES = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600, 4_500_000)
 """Every baud rate of the servos, the usual ones first."""
 
 THOROUGH_S = 0.016 + 0.003 * 253
-"""What the maker's SDK allows for all ids: 3 ms each and the adaptor's latency."""
+"""Time that the manufacturer's SDK allows for all ids: 3 ms each and the adaptor's latency."""
 
 
 def goal_packets(ids: Sequence[int]) -> protocol.SyncWrite:
-    """Return what builds packets of goal positions."""
+    """Return the builder of goal packets."""
     goal = REGISTERS["goal_position"]
     return protocol.SyncWrite(ids, goal.address, goal.size)
 
 
 def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
-    """Return the registers a servo must have, by name, in register units."""
+    """Return the required register values by name, in register units."""
     model = MODELS[setup.model]
     speed = speed_units(setup.max_speed_steps_s)
     wanted = {"return_delay_time": 0, "drive_mode": 0, "operating_mode": POSITION_MODE}
@@ -63,7 +63,7 @@ def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
 
 
 def _target(name: str, found: int, wanted: int) -> int:
-    """Return the wanted value; a velocity limit that is higher than needed may stay."""
+    """Return the value to write; a velocity limit higher than needed may stay."""
     return max(found, wanted) if name == "velocity_limit" else wanted
 
 
@@ -89,7 +89,7 @@ DYNAMIXEL = Family(
     effort_register="present_current",
     armed=lambda setup: {},
     weak_check=False,
-    # Written in this order, as a new operating mode puts gains and profile back.
+    # In this order, as a new operating mode resets gains and profile.
     spans=(
         ("return_delay_time", "operating_mode"),
         ("pwm_limit", "pwm_limit"),

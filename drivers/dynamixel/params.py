@@ -1,4 +1,4 @@
-"""How to speak with the servos of one bus: what a rig file may choose."""
+"""Communication parameters of a Dynamixel bus, set in a rig file."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -8,7 +8,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True, slots=True)
 class DynamixelParams:
-    """How to speak with the servos."""
+    """Communication parameters of the servos."""
 
     # fmt: off
     baud: Annotated[Literal[57600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000],
@@ -25,6 +25,6 @@ class DynamixelParams:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Refuse a watchdog shorter than its smallest step."""
+        """Reject a watchdog shorter than its smallest step."""
         if 0 < self.watchdog_ms < 20:
             raise ValueError(f"watchdog_ms {self.watchdog_ms} is too short: 0 or 20..2540")

@@ -1,11 +1,11 @@
 """Packets of Dynamixel Protocol 2.0 as bytes: build instructions, parse statuses.
 
-The SDK's own builder does not stuff what it sends and its group reads lose every answer
-after a missing one, so the exchanges of the control loop are made here.
+The SDK does not stuff its packets, and its group reads lose every answer after a missing one, so
+the packets of the control loop are built here.
 
-instruction  FF FF FD 00 | id | length | instruction | params    | CRC
-status       FF FF FD 00 | id | length | 55 | error  | params    | CRC
-length counts what follows it. Inside, FF FF FD is sent as FF FF FD FD (stuffing).
+instruction FF FF FD 00 | id | length | instruction | params | CRC status FF FF FD 00 | id | length
+| 55 | error | params | CRC length counts the bytes after it. After it, FF FF FD is sent as FF FF FD
+FD (stuffing).
 """
 
 import struct
@@ -23,18 +23,18 @@ PING, READ, WRITE, REBOOT = 0x01, 0x02, 0x03, 0x08
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
 
 STATUS_OVERHEAD = 11
-"""Bytes of a status without params."""
+"""Bytes of a status in addition to its params."""
 
 ERROR_NUMBER, ALERT = 0x7F, 0x80
-"""Parts of the error byte: why an instruction failed; a hardware error is latched."""
+"""Parts of the error byte: reason of a failed instruction; flag of a latched hardware error."""
 
 REFUSAL = ERROR_NUMBER
 
 ECHO_LENGTH = None
-"""An answer has a byte that no instruction has, so an echo never looks like one."""
+"""An answer contains a byte that no instruction has, so an echo never looks like an answer."""
 
 LONGEST_STATUS = 256
-"""No answer asked for here is longer; a larger length is noise."""
+"""Length of the longest expected answer; a larger length is noise."""
 
 _IDENTITY = struct.Struct("<HB")
 IDENTITY_LENGTH = _IDENTITY.size
@@ -46,7 +46,7 @@ _VALUE = {1: "B", 2: "h", 4: "i"}
 
 
 def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
-    """Build an instruction packet, stuffed where needed."""
+    """Build an instruction packet, stuffed if needed."""
     if RAW in params:
         params = params.replace(RAW, STUFFED)
     packet = _HEAD.pack(HEADER, servo_id, len(params) + 3, code) + params
@@ -59,7 +59,7 @@ def ping(servo_id: int) -> bytes:
 
 
 identify = ping
-"""A ping's answer tells model and firmware."""
+"""The answer to a ping contains model and firmware."""
 
 
 def identity(status: Status) -> Identity | None:
@@ -97,7 +97,7 @@ def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes
 
 
 class SyncWrite:
-    """Builds the packets that write one register of several servos, everything fixed once."""
+    """Builder of packets that write one register of a fixed set of servos."""
 
     def __init__(self, ids: Sequence[int], address: int, size: int) -> None:
         self._params = _SPAN.pack(address, size)
@@ -107,7 +107,7 @@ class SyncWrite:
         self._row = [number for servo_id in ids for number in (servo_id, 0)]
 
     def packet(self, values: Sequence[int], speeds: Sequence[int] = ()) -> bytes:
-        """Build the packet for one value a servo; speeds are in the servos' own profiles."""
+        """Build the packet with one value per servo; speeds are in the servos' own profiles."""
         row = self._row
         row[1::2] = values
         body = self._rows.pack(*row)
@@ -118,7 +118,7 @@ class SyncWrite:
 
 
 def statuses(raw: bytes) -> list[Status]:
-    """Return every complete status packet in received bytes; noise, echo and parts are skipped."""
+    """Return every complete status packet in received bytes; skip noise, echoes and fragments."""
     found = []
     at = raw.find(HEADER)
     while at >= 0:
@@ -138,23 +138,23 @@ CHECK = "H"
 
 
 def status_head(servo_id: int, length: int) -> bytes:
-    """Return a status's bytes before its error byte; ``length``: of its params."""
+    """Return a status's bytes before its error byte; ``length``: number of params."""
     return _HEAD.pack(HEADER, servo_id, length + 4, STATUS)
 
 
 CHECKED = (0, 2)
-"""So many bytes at the beginning and at the end of a status are not under its CRC."""
+"""Bytes at the beginning and at the end of a status that its CRC does not cover."""
 
 
 def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
-    """Return whether the CRCs of statuses are right, from what is under them."""
+    """Return whether the CRCs of statuses match the parts that they cover."""
     return tuple(map(umts, parts)) == checks
 
 
 def bytes_missing(raw: bytes, count: int, length: int) -> int:
-    """Count the bytes still to come of ``count`` statuses with ``length`` bytes of params each.
+    """Return how many bytes of ``count`` statuses with ``length`` params have not arrived yet.
 
-    Stuffing makes a status longer than that; its own length field counts once it has arrived.
+    Stuffing makes a status longer; its own length field is used once it has arrived.
     """
     nominal = length + STATUS_OVERHEAD
     seen, done = 0, 0
@@ -174,12 +174,12 @@ def bytes_missing(raw: bytes, count: int, length: int) -> int:
 
 
 def _begun_header(tail: bytes) -> int:
-    """Count the bytes at the very end that may be the first of a header."""
+    """Return the number of bytes at the end that may be the first of a header."""
     return next((n for n in (3, 2, 1) if tail.endswith(HEADER[:n])), 0)
 
 
 def _end(raw: bytes, at: int) -> int | None:
-    """Return where the status that starts at ``at`` ends, None where none does."""
+    """Return the end of the status that starts at ``at``, None if no status does."""
     if len(raw) - at < STATUS_OVERHEAD or raw[at + 7] != STATUS:
         return None
     length = int.from_bytes(raw[at + 5 : at + 7], "little")

@@ -1,6 +1,6 @@
-"""Dynamixel Protocol 1.0, as far as needed to find servos that are set to it.
+"""Dynamixel Protocol 1.0: detection of servos that are set to it.
 
-Other makers' servos speak it, too. Source of the packets: ROBOTIS e-Manual, Protocol 1.0.
+Servos of other manufacturers use it too. Source of the packets: ROBOTIS e-Manual, Protocol 1.0.
 """
 
 from gazerig.drivers.serial.port import BusPort
@@ -17,7 +17,7 @@ def ask_protocol_1(port: BusPort) -> tuple[int, ...]:
 
 
 def protocol_1_ids(raw: bytes) -> tuple[int, ...]:
-    """Return the ids of ping answers of Protocol 1.0: FF FF id 02 error checksum."""
+    """Return the ids of Protocol 1.0 ping answers: FF FF id 02 error checksum."""
     ids = []
     at = raw.find(b"\xff\xff")
     while 0 <= at <= len(raw) - 6:

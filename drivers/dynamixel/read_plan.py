@@ -1,13 +1,13 @@
-"""Which registers of Dynamixel servos one reading covers, byte by byte.
+"""Registers of Dynamixel servos that a read covers, byte by byte.
 
-Directly readable are current, velocity and position, which lie side by side. Everything
-else a control loop should know (is the torque on, has an error latched, how warm, how
-much voltage) lies apart; servos with an indirect block can lay it beside the three:
+Current, velocity and position have adjacent addresses. Everything else that a control loop needs
+(torque, latched errors, temperature, voltage) is elsewhere. Servos with an indirect block can map
+it next to the three:
 
     146 | 64 70 126..135 | 144 145 | 120..124
     temperature | torque, hardware error, current, velocity, position | voltage | live bytes
 
-Reading 13 bytes from the first or 14 from the second returns temperature and voltage in turn.
+Reads of 13 bytes from the first or 14 from the second return temperature and voltage alternately.
 """
 
 import struct
@@ -32,11 +32,11 @@ SENSED = ("effort", "velocity", "position")
 ARMED = ("torque", "status")
 
 INDIRECT_MAP = (146, 64, 70, *range(126, 136), 144, 145, *range(120, 125))
-"""Address behind every byte of the indirect block."""
+"""Source address of every byte of the indirect block."""
 
 DIRECT = ReadWindow(126, 10, "hii", SENSED)
 LONGER = ReadWindow(126, 11, "hiix", SENSED)
-"""The same in another length: a line that says its last answer again is not taken at its word."""
+"""The same with another length, so that a line that repeats its last answer is not believed."""
 
 _DIRECT_SPARE = (
     ReadWindow(124, 12, "2xhii", SENSED),
@@ -60,13 +60,13 @@ _ALONE = (
     ReadWindow(108, 36, "18xhii8x", SENSED),
     ReadWindow(108, 38, "18xhii8xH", _WARM[:-1]),
 )
-"""For servos asked alone: never as long as a reading of the group, and never twice the same."""
+"""For servos read alone: never as long as a group read, and never twice the same."""
 
 
 def read_plan(
     setups: "Sequence[ServoConfig]", params: DynamixelParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
-    """Return how servos with this firmware are read; None: before it is known."""
+    """Return the read plan for servos with this firmware; None: not known yet."""
     alone = WindowSchedule(_ALONE, _ALONE)
     block = _common_block(setups, firmware) if params.indirect_block else None
     fast = params.fast_sync_read and _all_fast(setups, firmware)
@@ -79,7 +79,7 @@ def read_plan(
 
 
 def _all_fast(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> bool:
-    """Return whether all understand fast sync read."""
+    """Return whether all servos support fast sync read."""
     if not firmware:
         return False
     return all(firmware[s.id] >= FAST_READ_SINCE[MODELS[s.model].family] for s in setups)
@@ -88,7 +88,7 @@ def _all_fast(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | Non
 def _common_block(
     setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None
 ) -> IndirectBlock | None:
-    """Return the indirect block that all have at the same address, None if there is none."""
+    """Return the indirect block that all servos have at the same address, None if there is none."""
     if not firmware:
         return None
     blocks = [indirect_blocks(MODELS[s.model], firmware[s.id])[0] for s in setups]
@@ -97,7 +97,7 @@ def _common_block(
 
 
 def direct_windows() -> WindowSchedule:
-    """Return the windows of servos whose registers are read where they are."""
+    """Return the windows of servos whose registers are read directly."""
     return WindowSchedule((DIRECT, LONGER), _DIRECT_SPARE)
 
 

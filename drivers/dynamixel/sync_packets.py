@@ -1,8 +1,8 @@
-"""Fast sync reads: one packet for all servos, in which every servo's block has a CRC of its own.
+"""Fast sync reads: one packet for all servos, with a CRC after every servo's block.
 
-Each block ends with the CRC over all bytes since the header. Where the whole answer is right, one
-unpacking gives all values; otherwise what can be proved right is taken out block by block, so that
-a bad servo costs only itself.
+Each block ends with the CRC over all bytes since the header. If the whole answer is intact, one
+unpacking returns all values. Otherwise the verified blocks are extracted one by one, so that a
+faulty servo affects only itself.
 """
 
 import struct
@@ -16,7 +16,7 @@ from gazerig.drivers.servo_bus.sync_packets import PartialReply, WholeAnswer
 
 
 class FastSyncRead:
-    """A fast sync read; a ``GroupRead``."""
+    """A fast sync read; implements ``GroupRead``."""
 
     def __init__(self, ids: Sequence[int], window: ReadWindow) -> None:
         self.ids, self.window = tuple(ids), window
@@ -34,19 +34,19 @@ class FastSyncRead:
         self.reply_length, self.covers_torque = answer.length, "torque" in window.fields
 
     def missing(self, raw: bytes) -> int:
-        """Count the bytes still to come."""
+        """Return how many bytes have not arrived yet."""
         at = raw.find(self._head)
         if at < 0:
-            # An answer of another length is one of before, and stands in front of ours.
+            # An answer of another length is an earlier one, in front of the expected one.
             at = _past_packet(raw)
         return max(0, at + self.reply_length - len(raw))
 
     def pieces(self, raw: bytes) -> PartialReply:
-        """Return the blocks whose CRC is right.
+        """Return the blocks with a correct CRC.
 
-        Every block's CRC continues from the CRC before it as it was sent, so a damaged
-        block does not spoil the proof of the next. Of several damaged in a row the first
-        is to blame: a lost byte moves all that follows, a spoilt CRC spoils the next proof.
+        Every block's CRC continues from the previous CRC as sent, so a damaged block does not
+        invalidate the next one. Of several consecutive damaged blocks the first is the cause: a
+        lost byte shifts all that follow, and a damaged CRC invalidates the next block.
         """
         samples: dict[int, Sample] = {}
         damaged, unproved, elsewhere = set[int](), set[int](), set[int]()
@@ -80,10 +80,10 @@ class FastSyncRead:
 
 
 def _all_intact(parts: tuple[bytes, ...], checks: tuple[int, ...]) -> bool:
-    """Return whether all CRCs of an answer are right, each made on from the one before.
+    """Return whether all CRCs of an answer are correct, each continued from the previous one.
 
-    The last CRC alone proves too little: it is made of the bytes as they were on the line, so it is
-    right even where two servos with one id spoilt each other's block.
+    The last CRC alone is not enough: it is computed from the bytes on the line, so it is correct
+    even if two servos with one id corrupted each other's block.
     """
     return tuple(map(umts, parts, (0, *checks))) == checks
 
@@ -92,7 +92,7 @@ _OTHERS = HEADER + bytes((BROADCAST,))
 
 
 def _past_packet(raw: bytes) -> int:
-    """Return where a packet of all that stands in front ends, 0 where none does."""
+    """Return the end of a broadcast packet at the beginning, 0 if there is none."""
     if not raw.startswith(_OTHERS) or len(raw) < len(_OTHERS) + 2:
         return 0
     length = int.from_bytes(raw[5:7], "little")
@@ -100,4 +100,4 @@ def _past_packet(raw: bytes) -> int:
 
 
 _LONGEST = 2048
-"""Length of a fast answer of more servos than there can be: noise."""
+"""Longest possible fast answer; a larger length is noise."""

@@ -30,15 +30,15 @@ POSITION_MODE = 0
 
 
 def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
-    """Return the registers a servo must have, by name, in register units.
+    """Return the required register values by name, in register units.
 
-    Of "phase" only the bit for many turns is meant: it must be 0.
+    Of "phase" only the multi-turn bit is meant: it must be 0.
     """
     wanted = {
         "return_delay_time": 0,
         "status_return_level": 1,
         "min_position_limit": max(0, setup.min_steps),
-        # Both limits 0 would mean none at all.
+        # 0 for both limits would mean no limits.
         "max_position_limit": max(1, setup.max_steps),
         "phase": 0,
         "angular_resolution": 1,
@@ -62,9 +62,9 @@ _END = REGISTERS["present_current"].address + REGISTERS["present_current"].size
 
 
 def window(address: int) -> ReadWindow:
-    """Return a window up to Present Current (69).
+    """Return a window that ends at Present Current (69).
 
-    address: 56 or below; from 40 or below torque and armed limits are read as well
+    address: at most 56; up to 40 it includes torque and armed limits
     """
     armed = address <= ARMED_AT
     pad = (ARMED_AT if armed else SENSED_AT) - address
@@ -76,20 +76,20 @@ def window(address: int) -> ReadWindow:
 def read_plan(
     setups: "Sequence[ServoConfig]", params: FeetechParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
-    """Return how servos are read: what a loop needs every tick lies side by side in 56..70.
+    """Return the read plan: the values of every tick are adjacent in 56..70.
 
-    Torque and the armed limits lie before it, so now and then the reading begins at 40 and
-    includes them.
+    Torque and the armed limits precede them, so at intervals the read begins at 40 and includes
+    them.
     """
     return plan_of(window, params.torque_every)
 
 
 def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
-    """Return how servos of a series are read.
+    """Return the read plan of a series of servos.
 
     Args:
-        window: makes a window from its address.
-        every: the torque is read in every so many readings.
+        window: Creates a window from its address.
+        every: Torque is read in every n-th read.
     """
     armed, sensed = window(ARMED_AT), (window(SENSED_AT), window(SENSED_AT - 1))
     usual = [armed, *sensed * every][:every]
@@ -97,7 +97,7 @@ def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
         usual.append(window(ARMED_AT - 1))
     spare = [window(SENSED_AT - more) for more in range(2, 7)]
     second = [window(SENSED_AT - more) for more in range(7, 11)]
-    # Of servos asked alone: never as long as a reading of all, and never twice the same.
+    # For servos read alone: never as long as a group read, and never twice the same.
     alone = [window(ARMED_AT - more) for more in range(1, 11)]
     return ReadPlan(
         WindowSchedule(usual, spare),
@@ -108,14 +108,14 @@ def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
 
 
 def armed_limits(setup: "ServoConfig") -> dict[str, int | None]:
-    """Return what is written before the torque comes on, in units of the readings."""
+    """Return the values written before torque is switched on, in register units."""
     limit = None if setup.strength is None else round(setup.strength * TORQUE_FULL)
     acceleration = acceleration_units(setup.max_accel_steps_s2)
     return {"acceleration": acceleration, "torque_limit": limit}
 
 
 def _target(name: str, found: int, wanted: int) -> int:
-    """Return the wanted value; of Phase only one bit is changed, the others are the maker's."""
+    """Return the value to write; of Phase only one bit is changed, the others stay as set."""
     return found & ~MULTI_TURN if name == "phase" else wanted
 
 

@@ -1,8 +1,8 @@
-"""Setting the present position of an STS servo as its middle, away from the encoder's zero.
+"""Homing of an STS servo: its present position becomes the middle, away from the encoder's zero.
 
-The servo computes the offset (31) itself on request (Torque Enable := 128) and keeps
-it in its EEPROM. Everything that was calibrated in steps before is void afterwards.
-Source: Feetech memory table STS3215, register 40.
+The servo computes the offset (31) itself on request (Torque Enable := 128) and keeps it in its
+EEPROM. Earlier calibrations in steps are invalid afterwards. Source: Feetech memory table STS3215,
+register 40.
 """
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
@@ -13,11 +13,11 @@ from gazerig.drivers.servo_bus.registers import Registers
 
 MIDDLE = STEPS_PER_TURN // 2
 NEAR_STEPS = 8
-"""The joint may be moved by a hand's tremor meanwhile."""
+"""Motion of the joint by a hand's tremor meanwhile."""
 
 
 def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
-    """Make the present position of a servo without torque 2048; return its offset in steps.
+    """Set the present position of a servo without torque to 2048; return its offset in steps.
 
     Raises:
         ServoMissing: it does not answer.
@@ -34,7 +34,7 @@ def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
     if not registers.write(servo_id, "lock", 0):
         raise ServoMissing(f"{where} does not answer: check its cable and servo power")
     registers.write(servo_id, "torque_enable", SET_MIDDLE)
-    # Some firmware is left with the torque on.
+    # Some firmware leaves torque on.
     off = registers.write(servo_id, "torque_enable", 0)
     locked = registers.write(servo_id, "lock", 1)
     place, offset = registers.read(servo_id, "present_position"), None

@@ -2,10 +2,10 @@
 
 Units: position 1 step = 1/4096 turn; speed steps/s; acceleration 100 steps/s^2; load and
 torque limits 0.1 %; voltage 0.1 V; temperature 1 degC; current 6.5 mA; return delay 2 us;
-protection times 10 ms. Numbers with a sign are sign and magnitude: one bit says "below 0".
-Two bytes lie low byte first.
+protection times 10 ms. Signed numbers have a sign bit and a magnitude. Of two bytes the low one
+comes first.
 
-Sources: Feetech memory table STS3215, and the tables of public clients where it is silent.
+Sources: Feetech memory table STS3215, and for missing entries the tables of public clients.
 """
 
 from typing import Literal, NamedTuple
@@ -20,10 +20,10 @@ CURRENT_UNIT_MA = 6.5
 LOAD_UNIT = 0.001
 RETURN_DELAY_UNIT_S = 2e-6
 TORQUE_FULL = 1000
-"""Units of Torque Limit and Max Torque at 100 %."""
+"""Register value of Torque Limit and Max Torque for 100 %."""
 
 FASTEST, HARDEST = 32767, 254
-"""Largest values of Goal Speed and Acceleration; 0 in either means: as fast as it can."""
+"""Largest values of Goal Speed and Acceleration; 0 in either means no limit."""
 
 BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
 """Bit/s by the value of Baud Rate (6)."""
@@ -31,13 +31,13 @@ BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_
 HIGHEST_ID = 253
 
 EEPROM_END = 40
-"""Addresses below are kept without power, if the lock (55) was open when they were written."""
+"""Addresses below keep their values without power, if the lock (55) was open during the write."""
 
 SET_MIDDLE = 128
-"""Written to Torque Enable (40): the present place becomes 2048, kept in the offset (31)."""
+"""Value of Torque Enable (40) that sets the present position to 2048 by the offset (31)."""
 
 MULTI_TURN = 0x10
-"""Bit of Phase (18): positions go on counting beyond a turn."""
+"""Bit of Phase (18): positions continue to count beyond a turn."""
 
 STATUS_ERRORS = {
     0x01: "input voltage",
@@ -46,19 +46,18 @@ STATUS_ERRORS = {
     0x08: "overcurrent",
     0x20: "overload",
 }
-"""Bits of the error byte in every answer, and of Status (65). They come and go: nothing latches.
-
-Overload protection leaves a part of the torque (34) until a goal leads away from what holds
-the joint."""
+"""Bits of the error byte in every answer, and of Status (65). They are transient: nothing latches.
+Overload protection reduces torque to a share (34) until a goal moves the joint away from the
+obstacle."""
 
 
 class FeetechModel(NamedTuple):
-    """What differs from model to model.
+    """Properties of a servo model.
 
-    number: as in register 3; steps_per_turn: of the encoder
+    number: value of register 3; steps_per_turn: steps per turn of the encoder
     temperature_limit: degC; min_voltage, max_voltage: 0.1 V; factory values of registers 13,
         15 and 14
-    stall_torque_nm, stall_current_a, no_load_rpm: at rated_v
+    stall_torque_nm, stall_current_a, no_load_rpm: values at rated_v
     """
 
     name: str
@@ -74,12 +73,12 @@ class FeetechModel(NamedTuple):
 
     @property
     def no_load_steps_s(self) -> float:
-        """Return the speed without load at the rated voltage."""
+        """Return the no-load speed at the rated voltage."""
         return self.no_load_rpm / 60.0 * self.steps_per_turn
 
     @property
     def load_unit(self) -> float:
-        """Return the share of the stall torque that one unit of Present Load is."""
+        """Return the share of the stall torque per unit of Present Load."""
         return LOAD_UNIT
 
 
@@ -92,15 +91,15 @@ MODELS = {
 }
 
 SCS_STEPS = 1024
-"""Of the potentiometer of an SCS servo."""
+"""Steps of the potentiometer of an SCS servo."""
 
 SCS_BAUD_RATES = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400, 19_200)
-"""Bit/s by the value of their Baud Rate (6)."""
+"""Bit/s by the value of an SCS servo's Baud Rate (6)."""
 
 SCS_MODELS = {
     model.name: model
     for model in (
-        # 1024 steps over 300 and 200 deg: so many would be a turn.
+        # 1024 steps cover 300 and 200 deg; the number is extrapolated to a full turn.
         FeetechModel("scs0009", 1284, 1229, 70, 40, 80, 0.226, 6.0, 1.0, 100.0),
         # Number and stall current of the SCS15 are assumed.
         FeetechModel("scs15", 1295, 1843, 70, 40, 80, 1.47, 6.0, 2.0, 62.5),
@@ -109,13 +108,13 @@ SCS_MODELS = {
 
 
 class FeetechRegister(NamedTuple):
-    """One entry of the control table.
+    """An entry of the control table.
 
-    initial: factory value of the EEPROM area, start value of the RAM area; None where the
-        device itself decides
-    low, high: what may be written; None where there is no range of its own
-    sign: the bit that says "below 0"; None where there is no sign
-    order: which byte of two comes first
+    initial: factory value of the EEPROM area, start value of the RAM area; None if the device
+        itself decides
+    low, high: range of valid values; None without a range
+    sign: index of the sign bit; None if unsigned
+    order: byte order
     """
 
     name: str
@@ -130,11 +129,11 @@ class FeetechRegister(NamedTuple):
 
     @property
     def area(self) -> Literal["eeprom", "ram"]:
-        """Name the memory the register lives in."""
+        """Return the memory area of the register."""
         return "eeprom" if self.address < EEPROM_END else "ram"
 
     def encode(self, value: int) -> bytes:
-        """Return a value as it is written.
+        """Return a value as bytes.
 
         Raises:
             ValueError: it does not fit.
@@ -145,13 +144,13 @@ class FeetechRegister(NamedTuple):
         return raw.to_bytes(self.size, self.order)
 
     def decode(self, data: bytes) -> int:
-        """Return the value that bytes stand for."""
+        """Return the value of bytes."""
         raw = int.from_bytes(data, self.order)
         return raw if self.sign is None else from_sign_magnitude(raw, self.sign)
 
 
 def to_sign_magnitude(value: int, sign: int) -> int:
-    """Return a number as magnitude with its sign in bit ``sign``.
+    """Return a number as a magnitude with its sign in bit ``sign``.
 
     Raises:
         ValueError: the magnitude does not fit below that bit.
@@ -170,18 +169,18 @@ _ALL: tuple[FeetechRegister, ...] = (
     FeetechRegister("id",                       5, 1, "rw", 1, 0, HIGHEST_ID),
     FeetechRegister("baud_rate",                6, 1, "rw", 0, 0, 7),
     FeetechRegister("return_delay_time",        7, 1, "rw", 0, 0, 254),
-    # 0: only pings and reads are answered; 1: everything.
+    # 0: only pings and reads are answered; 1: every instruction.
     FeetechRegister("status_return_level",      8, 1, "rw", 1, 0, 1),
-    # Both 0: no limits and many turns.
+    # Both 0: no limits and multi-turn.
     FeetechRegister("min_position_limit",       9, 2, "rw", 0, 0, 4094),
     FeetechRegister("max_position_limit",      11, 2, "rw", 4095, 0, 4095),
     FeetechRegister("temperature_limit",       13, 1, "rw", 70, 0, 100),
     FeetechRegister("max_voltage_limit",       14, 1, "rw", 80, 0, 254),
     FeetechRegister("min_voltage_limit",       15, 1, "rw", 40, 0, 254),
-    # Copied to Torque Limit (48) at every start.
+    # Copied to Torque Limit (48) at power-up.
     FeetechRegister("max_torque",              16, 2, "rw", 1000, 0, TORQUE_FULL),
     FeetechRegister("phase",                   18, 1, "rw", 12, 0, 254),
-    # Bits as STATUS_ERRORS: which of them take the torque away, and which light the LED.
+    # Bits as in STATUS_ERRORS: errors that switch torque off, and errors that light the LED.
     FeetechRegister("unloading_condition",     19, 1, "rw", 44, 0, 254),
     FeetechRegister("led_alarm_condition",     20, 1, "rw", 47, 0, 254),
     FeetechRegister("position_p_gain",         21, 1, "rw", 32, 0, 254),
@@ -217,7 +216,7 @@ _ALL: tuple[FeetechRegister, ...] = (
     FeetechRegister("status",                  65, 1),
     FeetechRegister("moving",                  66, 1),
     FeetechRegister("present_current",         69, 2, sign=15),
-    # Set in the factory.
+    # Factory settings.
     FeetechRegister("moving_threshold",        80, 1, initial=1),
     FeetechRegister("dts",                     81, 1, initial=1),
     FeetechRegister("velocity_unit_factor",    82, 1, initial=50),
@@ -229,14 +228,14 @@ _ALL: tuple[FeetechRegister, ...] = (
 # fmt: on
 
 TABLE_END = 87
-"""First address that is none."""
+"""First address after the table."""
 
 REGISTERS: dict[str, FeetechRegister] = {register.name: register for register in _ALL}
-"""Registers by name with the values all models share; addresses hold for every model."""
+"""Registers by name, with values common to all models; addresses are the same in every model."""
 
 
 def registers_of(model: FeetechModel) -> tuple[FeetechRegister, ...]:
-    """List a model's registers with its own initial values."""
+    """Return a model's registers with its initial values."""
     own = {
         "model_number": model.number,
         "temperature_limit": model.temperature_limit,
@@ -251,22 +250,22 @@ def registers_of(model: FeetechModel) -> tuple[FeetechRegister, ...]:
 
 
 def name_errors(status: int) -> tuple[str, ...]:
-    """Name the bits of an error byte that are set."""
+    """Return the names of the set bits of an error byte."""
     bits = [1 << bit for bit in range(8) if status >> bit & 1]
     return tuple(STATUS_ERRORS.get(bit, f"error bit {bit:#04x}") for bit in bits)
 
 
 def speed_units(speed_steps_s: float) -> int:
-    """Return a speed in units of Goal Speed, at least 1: there 0 means no limit."""
+    """Return a speed in units of Goal Speed, at least 1, as 0 means no limit."""
     return max(1, min(FASTEST, int(speed_steps_s)))
 
 
 def acceleration_units(accel_steps_s2: float | None) -> int:
-    """Return an acceleration in units of Acceleration, never more than asked for but at least 1.
+    """Return an acceleration in units of Acceleration, rounded down but at least 1.
 
-    0, as fast as it can, for None and for more than the register can hold: its greatest value,
-    2232 deg/s2, would make a saccade of 10 deg twice as long. Goals are planned within the joint's
-    own acceleration anyway.
+    It is 0, which means no limit, for None and for more than the register can hold: its greatest
+    value, 2232 deg/s2, would double the duration of a 10 deg saccade. Goals are planned within the
+    joint's own acceleration anyway.
     """
     if accel_steps_s2 is None or accel_steps_s2 > HARDEST * ACCELERATION_UNIT_STEPS_S2:
         return 0

@@ -1,4 +1,4 @@
-"""How to speak with the Feetech servos of one bus: what a rig file may choose."""
+"""Communication parameters of a Feetech bus, set in a rig file."""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -9,7 +9,7 @@ from gazerig.params import Bounds, Choices, Unit
 
 @dataclass(frozen=True, slots=True)
 class FeetechParams:
-    """How to speak with the servos."""
+    """Communication parameters of the servos."""
 
     # fmt: off
     baud: Annotated[int, Choices(*BAUD_RATES[::-1]), "Speed of the bus; the servos must be set to the same."] = 1_000_000
@@ -22,4 +22,4 @@ class FeetechParams:
         "Every n-th read also checks whether torque and settings are still as they were set."] = 8
     # fmt: on
     watchdog_ms: ClassVar[int] = 0
-    """These servos have none."""
+    """These servos have no watchdog."""

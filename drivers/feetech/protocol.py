@@ -1,15 +1,13 @@
 """Packets of the Feetech STS servos as bytes: build instructions, parse statuses.
 
-instruction  FF FF | id | length | instruction | params | checksum
-status       FF FF | id | length | error       | params | checksum
-length counts what follows it; checksum is the inverse of the sum from the id to the last
-param. A status looks like an instruction: an adapter that echoes what is sent gives back a
-ping that looks like its own answer, so nothing here trusts a status by its form alone, and
-a read asks for a length that the question does not have.
+instruction FF FF | id | length | instruction | params | checksum status FF FF | id | length | error
+| params | checksum length counts the bytes after it; checksum is the inverse of the sum from the id
+to the last param. A status has the form of an instruction: the echo of a ping looks like its
+answer. So no status is accepted by its form alone, and a read requests a length that differs from
+its own.
 
-The checksum is one byte wide and a sum: a lost byte whose place the next header takes
-passes it now and then. Such a status overlaps the next one, so statuses that overlap are
-rejected.
+The checksum is a sum of one byte: it sometimes matches if a byte is lost and the next header takes
+its place. Such a status overlaps the next one, so overlapping statuses are rejected.
 
 Source: Feetech, communication protocol of the SCS and STS series.
 """
@@ -27,25 +25,25 @@ PING, READ, WRITE, REG_WRITE, ACTION, RESET, REBOOT = 0x01, 0x02, 0x03, 0x04, 0x
 SYNC_READ, SYNC_WRITE = 0x82, 0x83
 
 STATUS_OVERHEAD = 6
-"""Bytes of a status without params."""
+"""Bytes of a status in addition to its params."""
 
 REFUSAL = 0
-"""No bit of the error byte says that an order was refused: it says how the servo is."""
+"""No bit of the error byte reports a rejected instruction; all report faults of the servo."""
 
 ALERT = 0xFF
-"""Bits of the error byte that say that something ails the servo."""
+"""Bits of the error byte that report a fault of the servo."""
 
 ECHO_LENGTH = 2
-"""A question about registers has two params, as an answer of two bytes has."""
+"""A read request has two params, as an answer of two bytes has."""
 
 IDENTITY_LENGTH = 9
 """Registers 0..8: firmware, model, id, baud rate, return delay, status level."""
 
 SCS_SERIES = 5
-"""First byte of the model number (3) of the servos whose high byte comes first."""
+"""First byte of the model number (3) of servos with the high byte first."""
 
 LONGEST_STATUS = 128
-"""Length of a status with more than the whole table: noise."""
+"""Longest possible status; a larger length is noise."""
 
 
 def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
@@ -56,7 +54,7 @@ def instruction(servo_id: int, code: int, params: bytes = b"") -> bytes:
     """
     if len(params) > 253:
         raise ValueError(
-            f"{len(params)} bytes do not fit into one packet: ask fewer servos at once"
+            f"{len(params)} bytes do not fit into one packet: read fewer servos at once"
         )
     body = bytes((servo_id, len(params) + 2, code)) + params
     return HEADER + body + bytes((checksum(body),))
@@ -78,14 +76,14 @@ def reboot(servo_id: int) -> bytes:
 
 
 def identify(servo_id: int) -> bytes:
-    """Build a read of the first registers, which hold model and firmware."""
+    """Build a read of the first registers, which contain model and firmware."""
     return read(servo_id, 0, IDENTITY_LENGTH)
 
 
 def identity(status: Status) -> Identity | None:
-    """Return model and firmware from the first registers, None if the status holds others.
+    """Return model and firmware from the first registers, None if the status contains others.
 
-    The firmware is a hundred times the major version and the minor one, 310 for 3.10. The model
+    The firmware is 100 times the major version plus the minor version, 310 for 3.10. The model
     number of an SCS servo has the high byte first.
     """
     data = status.params
@@ -122,11 +120,11 @@ def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes
 
 
 MOST_GOALS = 35
-"""So many servos' goals fit into one packet: 7 bytes each."""
+"""Largest number of goals in one packet, 7 bytes each."""
 
 
 class GoalWrite:
-    """Builds the packets that write goal, time and speed (42..47) of several servos at once."""
+    """Builder of packets that write goal, time and speed (42..47) of several servos."""
 
     ADDRESS, SIZE, ORDER = 42, 6, "<"
 
@@ -136,7 +134,7 @@ class GoalWrite:
         self._row = [number for servo_id in ids for number in (servo_id, 0, 0, 0)]
 
     def packet(self, goals: Sequence[int], speeds: Sequence[int]) -> bytes:
-        """Build the packet for one goal, 0 or above, and one speed a servo."""
+        """Build the packet with one goal, 0 or above, and one speed per servo."""
         row = self._row
         row[1::4] = goals
         row[3::4] = speeds
@@ -145,10 +143,9 @@ class GoalWrite:
 
 
 def statuses(raw: bytes) -> list[Status]:
-    """Return every complete status packet in received bytes; noise, echo and parts are skipped.
+    """Return every complete status packet in received bytes; skip noise, echoes and fragments.
 
-    Of two that overlap and are both right by their checksum neither can be believed: they
-    are given as not intact.
+    If two statuses with correct checksums overlap, both are returned as not intact.
     """
     found: list[tuple[int, int, Status]] = []
     at = _header(raw, 0)
@@ -167,25 +164,25 @@ CHECK = "B"
 
 
 def status_head(servo_id: int, length: int) -> bytes:
-    """Return a status's bytes before its error byte; ``length``: of its params."""
+    """Return a status's bytes before its error byte; ``length``: number of params."""
     return HEADER + bytes((servo_id, length + 2))
 
 
 CHECKED = (2, 0)
-"""So many bytes at the beginning and at the end of a status are not under its checksum."""
+"""Bytes at the beginning and at the end of a status that its checksum does not cover."""
 
 
 def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
-    """Return whether the checksums of statuses are right, from the id to the checksum of each.
+    """Return whether the checksums of statuses are correct, from the id to the checksum of each.
 
-    A checksum is the inverse of the sum before it, so all of them add up to 0xFF. The lower half
-    of Adler-32 is one more than the sum, and is counted nine times as fast.
+    A checksum is the inverse of the preceding sum, so they add up to 0xFF. The lower half of
+    Adler-32 is the sum plus 1, and is computed nine times as fast.
     """
     return not any(map((0xFF).__and__, map(adler32, parts)))
 
 
 def _apart(found: Sequence[tuple[int, int, Status]]) -> list[Status]:
-    """Leave out what looked like a status inside a right one; spoil right ones that overlap."""
+    """Remove statuses found inside an intact one; mark overlapping intact ones as damaged."""
     right = [(at, end) for at, end, status in found if status.intact]
     kept = []
     for at, end, status in found:
@@ -198,7 +195,7 @@ def _apart(found: Sequence[tuple[int, int, Status]]) -> list[Status]:
 
 
 def bytes_missing(raw: bytes, count: int, length: int) -> int:
-    """Count the bytes still to come of ``count`` statuses with ``length`` bytes of params each."""
+    """Return how many bytes of ``count`` statuses with ``length`` params have not arrived yet."""
     nominal = length + STATUS_OVERHEAD
     seen, done = 0, 0
     at = _header(raw, 0)
@@ -215,7 +212,7 @@ def bytes_missing(raw: bytes, count: int, length: int) -> int:
 
 
 def _header(raw: bytes, start: int) -> int:
-    """Return where the next header is: the last FF FF of a row; -1 where none is."""
+    """Return the position of the next header, the last FF FF of a row; -1 if there is none."""
     at = raw.find(HEADER, start)
     while 0 <= at < len(raw) - 2 and raw[at + 2] == 0xFF:
         at = raw.find(HEADER, at + 1)
@@ -223,7 +220,7 @@ def _header(raw: bytes, start: int) -> int:
 
 
 def _end(raw: bytes, at: int) -> int | None:
-    """Return where the status that starts at ``at`` ends, None where none does."""
+    """Return the end of the status that starts at ``at``, None if no status does."""
     if len(raw) - at < STATUS_OVERHEAD:
         return None
     length = raw[at + 3]

@@ -1,10 +1,10 @@
-"""Feetech SCS servos as a family of the servo bus: the small servos of many little heads.
+"""Feetech SCS servos, used in many small heads, as a family of the servo bus.
 
-They speak the packets of the STS series with the high byte of two first. Their position comes from
-a potentiometer of 1024 steps over less than a turn, so no position is ambiguous. They have neither
-sync read (each is asked by itself), nor an offset, nor a torque limit that is not kept, nor a
-present current. What is marked [A] is assumed: not documented.
-Sources: Feetech, SCSCL of its SDK (addresses); rustypot's table of the SCS0009.
+They use the packets of the STS series with the high byte first. Their position comes from a
+potentiometer of 1024 steps over less than a turn, so no position is ambiguous. They have no sync
+read (each is read alone), no offset, no volatile torque limit, and no present current. Values
+marked [A] are assumptions, as they are not documented. Sources: Feetech, SCSCL of its SDK
+(addresses); rustypot's table of the SCS0009.
 """
 
 from collections.abc import Mapping, Sequence
@@ -63,15 +63,15 @@ _END = 67
 
 
 class ScsGoalWrite(GoalWrite):
-    """Builds the packets of goals, high byte first."""
+    """Builder of goal packets, high byte first."""
 
     ORDER = ">"
 
 
 def window(address: int) -> ReadWindow:
-    """Return a window up to Moving (66).
+    """Return a window that ends at Moving (66).
 
-    address: 56 or below; from 40 or below the torque is read as well
+    address: at most 56; up to 40 it includes torque
     """
     armed = address <= ARMED_AT
     pad = (ARMED_AT if armed else SENSED_AT) - address
@@ -84,12 +84,12 @@ def window(address: int) -> ReadWindow:
 def read_plan(
     setups: "Sequence[ServoConfig]", params: FeetechParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
-    """Return how servos are read: as STS servos, but one by one."""
+    """Return the read plan: as for STS servos, but one by one."""
     return plan_of(window, params.torque_every)
 
 
 def scs_settings(setup: "ServoConfig") -> dict[str, int]:
-    """Return the registers a servo must have; its share of full drive is Max Torque (16), kept."""
+    """Return the required register values; strength is Max Torque (16), in EEPROM."""
     wanted = {name: v for name, v in wanted_settings(setup).items() if name in SCS_REGISTERS}
     if setup.strength is not None:
         wanted["max_torque"] = round(setup.strength * TORQUE_FULL)

@@ -1,1 +1,1 @@
-"""Boards that send pulses to hobby servos, which give no feedback: what they share."""
+"""Parts shared by boards that send pulses to hobby servos, which have no feedback."""

@@ -1,8 +1,8 @@
-"""Interface of a board that sends pulses to hobby servos: each make implements it in one class.
+"""Interface of a board that sends pulses to hobby servos; one class per kind of board.
 
-A board either leads its pulses to their goals itself, at limits that are armed in it (Maestro), or
-takes pulses as they are, and the driver leads them (PCA9685): then ``send_goals`` sends where
-the pulses are on their way, and ``lead`` is called again and again.
+A board either ramps its pulses to their goals itself, within limits armed in it (Maestro), or
+applies pulses immediately, and the driver ramps them (PCA9685). In that case ``send_goals`` sends
+intermediate pulses, and ``lead`` is called repeatedly.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,11 +18,11 @@ from gazerig.drivers.types import ServoConfig
 
 
 class BoardLine(Exchange, Protocol):
-    """The line to the board: counts of every bus, and answers that came late."""
+    """The line to the board: byte and error counts, and late answers."""
 
     @property
     def lateness(self) -> HostLateness:
-        """Return the answers that came after waiting had ended."""
+        """Return the counter of answers after their time-outs."""
         ...
 
     @property
@@ -32,13 +32,13 @@ class BoardLine(Exchange, Protocol):
 
 
 class BoardTexts(NamedTuple):
-    """Texts of messages about a make of board.
+    """Texts of messages about a kind of board.
 
-    name: of the board, with its number or address
-    no_pulses, other_pulse: the remedy where a channel gives no pulses, or others than it is sent
-    noise: the remedy where its line is disturbed
-    no_answer: the remedy where it does not answer
-    left_alone: what the servos do when the board cannot be reached any more
+    name: name of the board, with its number or address
+    no_pulses, other_pulse: remedies if a channel outputs no pulses, or other ones than commanded
+    noise: remedy for a disturbed line
+    no_answer: remedy if it does not answer
+    left_alone: behaviour of the servos when the board cannot be reached any more
     """
 
     name: str
@@ -50,10 +50,10 @@ class BoardTexts(NamedTuple):
 
 
 class ChannelStatus(NamedTuple):
-    """What a board has reported of one channel and of itself.
+    """Status of a channel and of its board.
 
-    pulse_steps: what the channel gives now, quarter microseconds; 0: none
-    errors: that it has found since it was asked last, by name
+    pulse_steps: present pulse of the channel, quarter microseconds; 0: none
+    errors: names of the board's errors since the last read
     """
 
     pulse_steps: int
@@ -63,12 +63,12 @@ class ChannelStatus(NamedTuple):
 class Timing(NamedTuple):
     """Times and rates of a board.
 
-    baud: bit/s of its port
+    baud: baud rate of its port, bit/s
     watch_s: period of its status requests
-    stagger_s: between the first pulses of two servos
-    give_up_s: longest silence or absence
-    longest_lead_s: pulses that the driver leads go on for no longer than this where nothing was
-        sent for a while; inf where the board itself leads them
+    stagger_s: time between the first pulses of two servos
+    give_up_s: longest silence or loss
+    longest_lead_s: longest time for which the driver's ramps advance while nothing is sent; inf if
+        the board itself ramps pulses
     """
 
     baud: int
@@ -79,9 +79,9 @@ class Timing(NamedTuple):
 
 
 class Board(Protocol):
-    """One board, or several on one line; all may raise BusLost.
+    """One board, or several on one line; all methods may raise BusLost.
 
-    line: carries the bytes; texts: of messages
+    line: line to the board; texts: texts of messages
     damage: kinds of errors that noise causes
     """
 
@@ -107,19 +107,19 @@ class Board(Protocol):
 
     @property
     def params(self) -> HobbyBoardParams:
-        """Return what a rig file has chosen for it."""
+        """Return its parameters from the rig file."""
         ...
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
-        """Find the board; return the pulses of these servos. Nothing moves.
+        """Find the board and return the pulses of these servos; nothing moves.
 
         Raises:
-            ServoMissing: it does not answer, or a channel is no servo's.
+            ServoMissing: it does not answer, or a channel is not a servo channel.
         """
         ...
 
     def prepare(self, log: EventLog) -> None:
-        """Make it ready for goals, before any is sent.
+        """Prepare the board for goals, before any is sent.
 
         Raises:
             ServoMissing: it does not answer.
@@ -127,42 +127,42 @@ class Board(Protocol):
         ...
 
     def look(self, channel: Channel) -> ChannelStatus | None:
-        """Ask for one channel's pulse and the board's errors; None where no answer came."""
+        """Read one channel's pulse and the board's errors; None without an answer."""
         ...
 
     def wake(self) -> tuple[str, ...] | None:
-        """Ask a board that has long been silent for its errors; None where no answer came."""
+        """Read the errors of a board after a long silence; None without an answer."""
         ...
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return what channels give now, confirmed; None where that did not succeed."""
+        """Return the confirmed present pulses of channels; None after a failure."""
         ...
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
-        """Arm what limits the speed of channels; False where it is to be confirmed and is not."""
+        """Arm the speed limits of channels; return False if a requested confirmation fails."""
         ...
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
-        """Send channels to their goals."""
+        """Send the goals of channels."""
         ...
 
     def steady(self, channels: Sequence[Channel]) -> None:
-        """Hold the pulses while the board does not answer, if that is harmless."""
+        """Hold the pulses while the board does not answer, if that is safe."""
         ...
 
     def lead(self, channels: Sequence[Channel]) -> None:
-        """Move pulses on towards their goals if the board does not do so itself."""
+        """Advance pulses towards their goals if the board does not do so itself."""
         ...
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
-        """Stop pulses; on the last try by whatever else may help."""
+        """Stop pulses; on the last try also by stronger means."""
         ...
 
     def wait(self, until_s: float) -> None:
-        """Let time pass."""
+        """Wait."""
         ...
 
 
 def goals_of(channels: Sequence[Channel]) -> Mapping[int, int]:
-    """Return the goals of channels by their numbers."""
+    """Return the goals of channels by channel number."""
     return {channel.id: channel.goal_steps for channel in channels}

@@ -1,14 +1,14 @@
-"""Hobby servos behind a board without feedback: a short request and goals in every tick.
+"""Bus of hobby servos on a board without feedback: a short request and goals in every tick.
 
-What such a board cannot do, and so this bus cannot promise:
+Limits of such a board, and so of this bus:
 
-- Servo positions are not measured. They are goals moved at known speeds (``measured`` is
-  False), no load and no current is known, and a stuck servo is not noticed.
-- Where a servo is before its pulses begin is unknown. It goes to the first pulse at its
-  own speed, whatever limit is armed.
-- No watchdog can be armed over the line: when this program dies the servos hold their last
-  goals, unless a guardian beside it stops the pulses (gazerig.robot.guardian).
-- The board knows nothing of its servos' supply: servos that restart alone go unnoticed.
+- Servo positions are not measured. They are estimated from goals and known speeds (``measured`` is
+False), load and current are unknown, and a stuck servo is not detected.
+- The position of a servo before its pulses begin is unknown. It moves to the first pulse at its own
+speed, whatever limit is armed.
+- No watchdog can be armed over the line: when this program dies the servos hold their last goals,
+unless the guardian process stops the pulses (gazerig.robot.guardian).
+- The board does not measure the servos' supply: a restart of a single servo is not detected.
 """
 
 from collections.abc import Sequence
@@ -28,19 +28,19 @@ from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
 
-UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"
+UNMEASURED = "hobby servos report no positions: those shown are their goals"
 
 
 class HobbyBoardBus(PortBus):
     """The channels of one board; implements gazerig.drivers.types.ServoBus.
 
     Args:
-        board: what carries its pulses.
-        setups: the servos, in the order of every sequence given and taken; a servo's id is
-            its channel, and steps are quarter microseconds.
+        board: Board that sends the pulses.
+        setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
+            are quarter microseconds.
 
     Raises:
-        ValueError: a servo is on a channel or at a pulse width that the board cannot have.
+        ValueError: a servo has a channel or a pulse width that the board does not have.
     """
 
     holding = "pulses still on"
@@ -74,7 +74,7 @@ class HobbyBoardBus(PortBus):
         )
         self._heard_s = -inf
 
-    # --- the bus as others see it
+    # --- public interface
 
     def open(self) -> None:
         """Open the port, find the board and every channel; nothing moves.
@@ -100,14 +100,14 @@ class HobbyBoardBus(PortBus):
         self._opened = True
 
     def read(self, now_s: float) -> Feedback:
-        """Ask the board for its errors and one pulse; return the estimated state of all servos.
+        """Read the board's errors and one pulse; return the estimated state of all servos.
 
-        All are missing if the board did not answer, and so are channels that lost their
-        pulses until they are held again. Whatever is wrong, a read takes a bounded time. While
-        the port is gone all are missing, and the port is tried again now and then.
+        All servos are missing if the board did not answer, and channels that lost their pulses are
+        missing until they are held again. A read always takes a bounded time. While the port is
+        lost all servos are missing, and the port is tried again at intervals.
 
         Raises:
-            BusLost: port or board have been gone for longer than ``give_up_s``.
+            BusLost: port or board have been lost for longer than ``give_up_s``.
         """
         self._now_s = now_s
         link = self._link
@@ -148,17 +148,18 @@ class HobbyBoardBus(PortBus):
         )  # fmt: skip
 
     def enable_torque(self) -> tuple[int, ...]:
-        """Hold every channel at the pulse that it gives, clipped to its limits.
+        """Hold every channel at its present pulse, clipped to its limits.
 
-        A channel without pulses begins at its servo's last position, or at rest if it
-        has not been held yet: the servo goes there at once, at its own speed, and the next
-        such channel follows ``stagger_ms`` later. A joint outside its limits is brought
-        inside at 30 deg/s. Returns the goals that are now in force, in steps.
+        A channel without pulses begins at its servo's last position, or at rest if it has not been
+        held yet: the servo moves there immediately at its own speed, and the next such channel
+        follows ``stagger_ms`` later. A joint outside its limits moves inside at 30 deg/s.
+
+        Returns:
+            The goals that are now active, in steps.
 
         Raises:
             BusLost: the port is lost.
-            ServoMissing: the board does not answer, or a channel does not take
-                its goal.
+            ServoMissing: the board does not answer, or a channel does not accept its goal.
         """
         self._apply_wanted()
         try:
@@ -170,7 +171,7 @@ class HobbyBoardBus(PortBus):
             self.disable_torque()
             raise
         except BusLost:
-            self._link.refused_release()  # some may have their pulses already
+            self._link.refused_release()  # some channels may already have pulses
             raise
         self._link.release_due = False
         self._supervisor.torque_enabled()
@@ -179,12 +180,12 @@ class HobbyBoardBus(PortBus):
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every channel in one write; goals are clipped to the limits.
 
-        Sends nothing while nothing is held or the port is gone. While the board does not answer
-        pulses stay where they are: it may have restarted, and would take goals without any limit
-        of speed.
+        Nothing is sent while no channel is held or the port is lost. While the board does not
+        answer, pulses do not change: it may have restarted, and would apply goals without any speed
+        limit.
 
         Raises:
-            ValueError: a goal is not a number, or there are not as many as servos.
+            ValueError: a goal is not a number, or their number is wrong.
         """
         goals = [*map(int, clipped(goals_steps, self._lowest, self._highest))]
         held = [channel for channel in self._channels if channel.held]
@@ -215,12 +216,12 @@ class HobbyBoardBus(PortBus):
             self._board.params.check(setup)
 
     def _apply_limits(self) -> None:
-        """Apply the ranges of the setups in force."""
+        """Apply the ranges of the active setups."""
         self._lowest = tuple(setup.min_steps for setup in self._setups)
         self._highest = tuple(setup.max_steps for setup in self._setups)
 
     def _apply_wanted(self) -> None:
-        """Apply the setups requested since the servos were held last."""
+        """Apply the setups stored since the servos were last held."""
         self._setups = self._wanted
         self._apply_limits()
         for channel, setup in zip(self._channels, self._setups, strict=True):
@@ -229,7 +230,7 @@ class HobbyBoardBus(PortBus):
     # --- reading
 
     def _watch(self, now_s: float) -> bool:
-        """Ask the board, where that is due; return whether it is known to be alive."""
+        """Read the board's status if it is due; return whether the board is known to be alive."""
         if self._supervisor.sure and now_s - self._heard_s < self._board.timing.watch_s:
             self._supervisor.advance(self._port.now_s())
             self._supervisor.lead()
@@ -247,7 +248,7 @@ class HobbyBoardBus(PortBus):
         return True
 
     def _wake(self, now_s: float) -> bool:
-        """Ask a board that has long been silent; it may have to detect its baud rate again."""
+        """Wake a board after a long silence; it may have to detect its baud rate again."""
         errors = self._board.wake()
         if errors is None:
             self._silence.miss(now_s, self._any_byte_s(now_s))
@@ -256,7 +257,7 @@ class HobbyBoardBus(PortBus):
         return True
 
     def _any_byte_s(self, now_s: float) -> float:
-        """Return when any byte was received last, damaged or not."""
+        """Return the time of the last received byte, damaged or not."""
         if self._board.line.rx_bytes != self._rx_bytes:
             self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
         return self._byte_s
@@ -267,7 +268,7 @@ class HobbyBoardBus(PortBus):
         Raises:
             BusLost: no answer within the limit.
         """
-        # Where anything arrives the board is there: it is noise that keeps it from being read.
+        # If any byte arrives the board is present, and noise prevents its answers from being read.
         silent_s = min(self._silence.seconds(now_s), now_s - self._byte_s)
         if silent_s >= self._board.timing.give_up_s:
             raise BusLost(
@@ -275,10 +276,10 @@ class HobbyBoardBus(PortBus):
                 "check its power and the cable"
             )
 
-    # --- a port that goes away
+    # --- loss of the port
 
     def _reset_trust(self) -> None:
-        """Reset after the port has come back."""
+        """Reset the state after the port reconnects."""
         self._supervisor.mark_all_for_recovery()
 
     def _switch_off(self) -> ReleaseResult:
@@ -292,7 +293,7 @@ class HobbyBoardBus(PortBus):
         return next(c.setup for c in self._channels if c.id == servo_id).label("channel")
 
     def _cannot_release(self) -> str:
-        """Return what the servos do when their pulses cannot be switched off."""
+        """Return the text about servos whose pulses cannot be switched off."""
         return (
             f"{self._port.port_name} is gone: pulses could not be stopped; "
             f"{self._board.texts.left_alone}: {CUT} to free them"

@@ -1,4 +1,4 @@
-"""One channel of a board: its commanded pulse and its servo's estimated position."""
+"""Channel of a board: its commanded pulse and its servo's estimated position."""
 
 from collections import deque
 from math import inf
@@ -9,28 +9,28 @@ from gazerig.drivers.hobby_board.ramp import Ramp
 from gazerig.drivers.types import ServoConfig
 
 RECENT_S = 0.1
-"""The board may be so far behind the last goals: its own period is 20 ms, and lines are slow."""
+"""Longest delay of the board behind the last goals: its period is 20 ms, and lines are slow."""
 
 BEHIND_S = 0.04
 FINE_STEPS = 8
-"""A pulse is as expected within so much time of travel and so many steps."""
+"""Tolerance of an expected pulse: time of travel in seconds, and steps."""
 
 
 class Channel:
-    """A servo without feedback; its position is computed by the ramp.
+    """A servo without feedback; the ramp estimates its position.
 
-    on: whether it gives pulses, as far as known
-    held: it follows the goals that are written
-    entering: it is on its slow way into its limits
-    rearmed: it was enabled again, not yet reported
-    fault: why it stays without pulses; "" where nothing is wrong
-    reported: whether it has been reported that it does not give the pulses it should
-    sent_steps: the pulse that it was sent last, where the driver leads it
+    on: whether it outputs pulses, as far as known
+    held: whether it follows goals
+    entering: whether it moves slowly into its limits
+    rearmed: whether it was enabled again and that is not yet reported
+    fault: reason why it stays without pulses; "" for none
+    reported: whether a difference between its pulses and the commanded ones was reported
+    sent_steps: pulse that was last sent, if the driver ramps it
 
     Args:
-        setup: the servo.
-        longest_lead_s: its pulses go on their way for no longer than this where nothing was sent
-            for a while: the driver leads them.
+        setup: The servo.
+        longest_lead_s: Longest time for which the driver's ramp advances while nothing is sent,
+            seconds.
     """
 
     def __init__(self, setup: ServoConfig, longest_lead_s: float = inf) -> None:
@@ -61,7 +61,7 @@ class Channel:
         """Return the nearest goal within the limits.
 
         Raises:
-            ValueError: it is not a number.
+            ValueError: ``steps`` is not a number.
         """
         low, high = self.setup.min_steps, self.setup.max_steps
         if low <= steps <= high:
@@ -74,7 +74,7 @@ class Channel:
 
     @property
     def top_speed_steps_s(self) -> float:
-        """Return the speed that its pulses may have now: on its way inside a low one."""
+        """Return the present speed limit of its pulses, low while it enters its limits."""
         if self.entering:
             return entry_speed_steps_s(self.setup, HOBBY["hobby"].steps_per_turn)
         return self.setup.max_speed_steps_s
@@ -84,7 +84,7 @@ class Channel:
         self.goal_steps = self.clip(pulse_steps or round(self.ramp.shaft_steps))
         self.entering = pulse_steps not in (0, self.goal_steps)
         if not (self.on and pulse_steps):
-            # A first pulse is not ramped: there is nothing to ramp it from.
+            # A first pulse is not ramped, as there is no pulse to ramp from.
             self.ramp.begin(pulse_steps or self.goal_steps)
         self.on, self.fault, self.off_goal_reported = True, "", False
         self._at_s = now_s
@@ -94,15 +94,15 @@ class Channel:
         return self.goal_steps
 
     def hold(self) -> None:
-        """Record that it holds its goal and follows others."""
+        """Record that it holds its goal and follows new ones."""
         self.held = self._placed = True
 
     def release(self) -> None:
-        """Record that it follows no goals any more; its pulses may go on."""
+        """Record that it follows no goals any more; its pulses may continue."""
         self.held = self.entering = self.rearmed = False
 
     def stop(self) -> None:
-        """Record that it gives no pulses: its servo has no torque."""
+        """Record that it outputs no pulses: its servo has no torque."""
         self.release()
         self.on = False
         self.ramp.stop()
@@ -119,14 +119,14 @@ class Channel:
             self._settled_s = now_s + self.ramp.longest_s(way) + RECENT_S
         self.goal_steps = goal_steps
 
-    # --- what is known of it
+    # --- estimated state
 
     def advance(self, now_s: float) -> None:
-        """Let time pass."""
+        """Advance the estimate to ``now_s``."""
         spent_s = now_s - self._at_s
         if self.on and 0.0 < spent_s < inf:
             if spent_s > self._longest_lead_s:
-                # It was not led on: it stood, and begins from rest.
+                # The ramp was paused, so it begins from rest.
                 self.ramp.move(self.ramp.pulse_steps, spent_s - self._longest_lead_s)
                 spent_s = self._longest_lead_s
             goal = self.goal_steps
@@ -136,9 +136,9 @@ class Channel:
         self._at_s = now_s
 
     def implausible(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
-        """Return whether a pulse cannot come from the goals of late.
+        """Return whether a pulse cannot result from recent goals.
 
-        led_away: an error or a restart has led it towards its home for a moment
+        led_away: whether an error or a restart has briefly moved it towards its home
         """
         if not pulse_steps:
             return True
@@ -155,7 +155,7 @@ class Channel:
         return not low - room <= pulse_steps <= high + room
 
     def _reached(self, steps: float) -> float:
-        """Return where a goal ends, as far as the board's own range is known."""
+        """Return the pulse that a goal ends at, as far as the board's own range is known."""
         return min(self._top, max(self._bottom, steps))
 
     def _forget(self, now_s: float) -> None:
@@ -163,7 +163,7 @@ class Channel:
             self._recent.popleft()
 
     def room_steps(self) -> float:
-        """Return how far a pulse may be from where it is expected."""
+        """Return the tolerance of an expected pulse, steps."""
         return FINE_STEPS + self.ramp.speed_steps_s * BEHIND_S
 
     def found(self, pulse_steps: int) -> None:
@@ -171,20 +171,20 @@ class Channel:
         if pulse_steps and not self.held:
             self.goal_steps = pulse_steps
         if pulse_steps and self.held and not self.entering:
-            # No goal lies outside: a byte was damaged, and answers carry no check.
+            # No goal is outside, so a byte was damaged; answers have no checksum.
             pulse_steps = self.clip(pulse_steps)
         self.gives(pulse_steps)
 
     def confirmed(self, pulse_steps: int) -> None:
-        """Record that it gives a pulse as expected.
+        """Record that its pulse is as expected.
 
-        One that the driver leads is farther by now than what it was sent last.
+        A pulse that the driver ramps is by now beyond the last one sent.
         """
         if self._longest_lead_s == inf:
             self.found(pulse_steps)
 
     def gives(self, pulse_steps: int) -> None:
-        """Record the pulse that it gives, whatever its goal is."""
+        """Record its pulse, whatever its goal is."""
         self.on = pulse_steps > 0
         if self.on:
             self.ramp.found(pulse_steps)
@@ -192,7 +192,7 @@ class Channel:
             self.ramp.stop()
 
     def off_goal(self, pulse_steps: int) -> bool:
-        """Record where a move has ended; return whether it ended off goal twice at one pulse."""
+        """Record the end of a move; return whether it ended off goal twice at the same pulse."""
         before, self._end_steps = self._end_steps, pulse_steps
         short = self.goal_steps - pulse_steps
         self._bottom = -inf
@@ -207,7 +207,7 @@ class Channel:
         return True
 
     def settle(self, pulse_steps: int) -> None:
-        """Adopt a pulse as the servo's position: it has been there for long."""
+        """Adopt a pulse as the servo's position, as it has been unchanged for a long time."""
         self.found(pulse_steps)
         if pulse_steps:
             self.ramp.shaft_steps = pulse_steps
@@ -218,16 +218,16 @@ class Channel:
         return self.fits(self.ramp.pulse_steps)
 
     def fits(self, pulse_steps: float) -> bool:
-        """Return whether a pulse lies within the limits."""
+        """Return whether a pulse is within the limits."""
         return self.setup.min_steps <= pulse_steps <= self.setup.max_steps
 
     def rearm(self) -> None:
-        """Record that it was enabled again: plans begin at its pulse."""
+        """Record that it was enabled again: plans must begin at its pulse."""
         self.rearmed = True
         self.ramp.shaft_steps = self.ramp.pulse_steps
 
     def pop_rearmed(self) -> bool:
-        """Return once, after it was enabled, whether plans must begin at its pulse."""
+        """Return whether plans must begin at its pulse; True once after it was enabled."""
         rearmed, self.rearmed = self.rearmed, False
         return rearmed or self.entering
 

@@ -1,7 +1,7 @@
 """Switching a channel's pulses on with as little motion as possible.
 
-Where a channel gives pulses already it is held there. Where it gives none its
-servo's position is unknown, and a first pulse is not ramped: the servo goes there at its own speed.
+A channel that already outputs pulses is held there. Without pulses the servo's position is unknown,
+and a first pulse is not ramped: the servo moves there at its own speed.
 """
 
 from enum import Enum
@@ -12,7 +12,7 @@ from gazerig.drivers.hobby_board.models import US_STEPS
 
 
 class HoldResult(Enum):
-    """The result of enabling a channel: it is held, no answer, or it gives another pulse."""
+    """Result of enabling a channel: it is held, no answer, or another pulse."""
 
     HELD = "held"
     NO_ANSWER = "no answer"
@@ -20,10 +20,10 @@ class HoldResult(Enum):
 
 
 def take(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
-    """Hold a channel at the pulse that it gives, or at its last position if it gives none.
+    """Hold a channel at its present pulse, or without one at its last position.
 
-    Speed and acceleration are armed before the goal is sent, and the pulse is asked for
-    after. A joint outside its limits comes inside at 30 deg/s.
+    Speed and acceleration are armed before the goal is sent, and the pulse is read afterwards. A
+    joint outside its limits moves inside at 30 deg/s.
 
     Raises:
         BusLost: the port is lost.
@@ -37,7 +37,7 @@ def take(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
     if found is None:
         return HoldResult.NO_ANSWER
     low, high = sorted((pulse_steps or goal, goal))
-    # A first pulse is exact; another may have been on its way somewhere when it was asked.
+    # A first pulse is exact; another one may have been moving when it was read.
     room = channel.room_steps() if pulse_steps else FINE_STEPS
     if not found[0] or not low - room <= found[0] <= high + room:
         channel.gives(found[0])
@@ -48,10 +48,10 @@ def take(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
 
 
 def refusal(board: Board, channel: Channel) -> str:
-    """Return why a channel gives another pulse than commanded, with the remedy."""
+    """Return why a channel's pulse differs from the commanded one, with the remedy."""
     goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
     if not pulse:
-        return f"{channel.setup.label('channel')} gives no pulses: {board.texts.no_pulses}"
+        return f"{channel.setup.label('channel')} has no pulses: {board.texts.no_pulses}"
     sent, got = f"{goal / US_STEPS:g} us", f"{pulse / US_STEPS:g} us"
     return (
         f"{channel.setup.label('channel')} is sent to {sent} and gets {got}: "

@@ -1,4 +1,4 @@
-"""What a rig file may choose for any board of hobby servos."""
+"""Parameters of boards of hobby servos, set in a rig file."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -29,17 +29,17 @@ class HobbyBoardParams(ABC):
     @property
     @abstractmethod
     def channels(self) -> int:
-        """Return how many there are."""
+        """Return the number of channels."""
 
     @abstractmethod
     def ends_us(self) -> tuple[float, float, str]:
-        """Return the shortest and longest pulse that may be sent, and what decides that."""
+        """Return the shortest and longest pulse that may be sent, us, and the origin of both."""
 
     def check(self, setup: "ServoConfig") -> None:
-        """Refuse a servo that no channel can have.
+        """Reject a servo that no channel can have.
 
         Raises:
-            ValueError: no channel can have it; the message names the channel and what is possible.
+            ValueError: no channel can have it; the message names the channel and the valid range.
         """
         if not 0 <= setup.id < self.channels:
             raise ValueError(f"channel {setup.id}: the board has channels 0 to {self.channels - 1}")

@@ -1,25 +1,24 @@
 """Estimate of a channel's pulse and of its servo's shaft, from known speeds.
 
-A pulse is led towards its goal at a limited speed and acceleration, by the board or by the driver;
-the servo's shaft moves towards the pulse as fast as it can. The shaft is not measured: what is
-computed here is an estimate that a stuck or loaded servo does not keep.
-Steps are quarter microseconds.
+A pulse moves towards its goal at a limited speed and acceleration, ramped by the board or by the
+driver. The servo's shaft follows the pulse at its own speed. The shaft is not measured: the result
+is an estimate, which is wrong for a stuck or loaded servo. Steps are quarter microseconds.
 """
 
 from math import ceil, sqrt
 
 _SLICE_S = 0.005
 _LONG_S = 5.0
-"""After so long any pulse has arrived."""
+"""Time after which any pulse has arrived."""
 
 
 class Ramp:
-    """One channel's pulse and shaft.
+    """Ramp of one channel's pulse and shaft.
 
-    pulse_steps: what the board gives now; shaft_steps, shaft_steps_s: where the servo is
-        taken to be, and how fast
+    pulse_steps: present pulse; shaft_steps, shaft_steps_s: estimated position and speed of the
+        servo
     speed_steps_s, accel_steps_s2: limits of the pulse; 0: unlimited
-    shaft_speed_steps_s: how fast the servo itself is
+    shaft_speed_steps_s: speed of the servo itself
     """
 
     def __init__(self, place_steps: float, shaft_speed_steps_s: float) -> None:
@@ -29,13 +28,13 @@ class Ramp:
         self.begin(place_steps)
 
     def begin(self, pulse_steps: float) -> None:
-        """Record that pulses begin, or are found to be, at a width; the shaft stays."""
+        """Record that pulses begin, or already are, at a width; the shaft does not move."""
         self.pulse_steps = pulse_steps
         self.shaft_steps_s = 0.0
         self._pulse_steps_s = 0.0
 
     def stop(self) -> None:
-        """Record that there are no pulses: the shaft is taken to stay where it is."""
+        """Record that there are no pulses: the shaft is assumed not to move."""
         self.begin(self.shaft_steps)
 
     def found(self, pulse_steps: float) -> None:
@@ -43,13 +42,13 @@ class Ramp:
         self.pulse_steps = pulse_steps
 
     def longest_s(self, way_steps: float) -> float:
-        """Return a time within which the board has led a pulse so far, from rest."""
+        """Return a time within which a pulse has moved this distance from rest, seconds."""
         speed, accel = self.speed_steps_s, self.accel_steps_s2
         cruise_s = way_steps / speed if speed else 0.0
         return cruise_s + (2.0 * sqrt(way_steps / accel) if accel else 0.0)
 
     def move(self, goal_steps: float, for_s: float) -> None:
-        """Let time pass on the way to a goal."""
+        """Advance the pulse and the shaft towards a goal."""
         if for_s <= 0.0:
             return
         if self.pulse_steps == goal_steps == self.shaft_steps:

@@ -1,4 +1,4 @@
-"""Releasing hobby servos; imports no more than the guardian needs in an emergency."""
+"""Release of hobby servos; imports no more than the guardian needs in an emergency."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -8,23 +8,23 @@ from gazerig.drivers.errors import PortError
 from gazerig.drivers.serial.port import BusPort
 
 TRIES = 3
-"""Attempts of what must not fail."""
+"""Number of attempts of operations that must not fail."""
 
 
 class Stoppable(Protocol):
     """The part of a board that a release needs."""
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
-        """Ask the board to send no more pulses to channels."""
+        """Stop the pulses of channels."""
         ...
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the pulses that the board sends now, None if it does not answer."""
+        """Return the present pulses, None if the board does not answer."""
         ...
 
 
 def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:
-    """Stop the pulses and verify that they are gone.
+    """Stop the pulses and verify that they have stopped.
 
     Raises:
         BusLost: the port is lost.
@@ -49,14 +49,14 @@ def stop_pulses(
     """Open a board's port and stop the pulses; return the channels that did not confirm it.
 
     Args:
-        port: closed, or open already; it is left open.
-        baud: bit/s.
-        board: speaks over this port.
-        channels: those of the rig; others are left as they are, unless theirs do not stop.
+        port: Closed or open port; it stays open.
+        baud: Baud rate, bit/s.
+        board: Board on this port.
+        channels: Channels of the rig; others are not changed, unless these do not stop.
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: the port went away.
+        BusLost: the port is lost.
     """
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 115200")

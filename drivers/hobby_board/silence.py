@@ -1,4 +1,4 @@
-"""A board that does not answer: when to ask again, and what is reported."""
+"""Silence of a board: times of retries, and reports."""
 
 from math import inf
 
@@ -6,19 +6,20 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
-"""Time between questions to a board that stays silent: doubled from the first to the last."""
+"""Interval of requests to a silent board: doubled from the first to the last value."""
 
 IN_A_ROW = 3
-"""So many answers may stay out before it is asked less often: each costs a read its time-out."""
+"""Consecutive missing answers after which it is read less often, as each costs a read its
+time-out."""
 
 OWED_S = 0.1
-"""So long after the first answer, those that were owed have come."""
+"""Time after the first answer by which the pending ones have arrived."""
 
 
 class SilenceMonitor:
-    """Counts missing answers.
+    """Monitor of missing answers.
 
-    missed: how many in a row
+    missed: number of consecutive missing answers
     """
 
     def __init__(self, log: EventLog, lateness: HostLateness) -> None:
@@ -30,11 +31,11 @@ class SilenceMonitor:
         self._since_s, self._due_s, self._wait_s = 0.0, -inf, AGAIN_FIRST_S
 
     def due(self, now_s: float) -> bool:
-        """Return whether to ask now."""
+        """Return whether a request is due."""
         return now_s >= self._due_s
 
     def miss(self, now_s: float, heard_s: float = -inf) -> None:
-        """Record a missing or damaged answer; ``heard_s``: when any byte was received last."""
+        """Record a missing or damaged answer; ``heard_s``: time of the last received byte."""
         if not self.missed:
             self._wait_s = AGAIN_FIRST_S
             if self._back_s is None:
@@ -49,7 +50,7 @@ class SilenceMonitor:
         if not self._reported and now_s - self._since_s >= (SILENCE_S if damaged else BLAME_S):
             self._reported = True
             self._log.add(
-                "what the board answers arrives damaged: check cable, ground and baud rate"
+                "the board's answers arrive damaged: check cable, ground and baud rate"
                 if damaged
                 else "the board does not answer: check its power and the cable"
             )
@@ -73,5 +74,5 @@ class SilenceMonitor:
         self._reported, self._back_s = False, None
 
     def seconds(self, now_s: float) -> float:
-        """Return how long no answer has come; 0 if the last one came."""
+        """Return the time without an answer, seconds; 0 if the last request was answered."""
         return now_s - self._since_s if self.missed else 0.0

@@ -13,7 +13,7 @@ from gazerig.drivers.types import ServoConfig
 
 
 def every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
-    """Ask for every pulse.
+    """Read every pulse.
 
     Raises:
         BusLost: the port is lost.
@@ -30,16 +30,15 @@ def every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
             raise ServoMissing(
                 f"{where}: no answer about {setup.label('channel')}: {board.texts.no_answer}"
             )
-    raise ServoMissing(f"{where}: answers get lost: {board.texts.noise}")
+    raise ServoMissing(f"{where}: answers are lost: {board.texts.noise}")
 
 
 def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
-    """Enable every channel, those without pulses one after another.
+    """Enable every channel; channels without pulses one after another.
 
     Raises:
         BusLost: the port is lost.
-        ServoMissing: the board does not answer, or a channel does not take
-            its goal.
+        ServoMissing: the board does not answer, or a channel does not accept its goal.
     """
     board.prepare(log)
     pulses = every_pulse(board, [channel.setup for channel in channels])
@@ -47,7 +46,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
         channel.found(pulse)
     without_pulses = [channel.setup.label("channel") for channel in channels if not channel.on]
     if without_pulses:
-        log.add(f"{', '.join(without_pulses)} had no pulses: they go to their places at once")
+        log.add(f"{', '.join(without_pulses)} had no pulses: they move to their goals immediately")
     start_s = -inf
     for channel, pulse in zip(channels, pulses, strict=True):
         if not pulse:
@@ -60,7 +59,7 @@ def _insist(board: Board, channel: Channel, pulse: int) -> None:
     """Enable one channel.
 
     Raises:
-        ServoMissing: it does not take its goal.
+        ServoMissing: it does not accept its goal.
     """
     for _ in range(TRIES):
         outcome = take(board, channel, pulse)

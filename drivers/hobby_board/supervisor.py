@@ -1,8 +1,8 @@
 """Supervision of a board: errors, restarts, channels that lost their pulses.
 
-On an error a board may send its channels home: to no pulses, or a place of its own. A restart does
-the same and forgets how it was set up. Both show in one short question a tick: a channel's pulse
-and the board's own status.
+On an error a board may send its channels home: to no pulses, or to a stored position. A restart
+does the same and loses the settings. One short request per tick detects both: it reads a channel's
+pulse and the board's status.
 """
 
 from collections.abc import Sequence
@@ -15,24 +15,25 @@ from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
 from gazerig.drivers.hobby_board.models import HOBBY
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
-"""A board that lets go of its channels more often within such a time stays without pulses."""
+"""A board that releases its channels more often than this within this time stays without pulses."""
 
 REST_S, LONGEST_REST_S = 0.1, 1.0
-"""Channels that noise sends home more often than that wait so long, and longer each time."""
+"""First and longest wait of channels that noise sends home more often than that; it increases each
+time."""
 
 LEAST_STEPS = HOBBY["hobby"].lowest
-"""A shorter pulse is none: a bit of an answer was hit."""
+"""Shortest possible pulse; a shorter one is a damaged answer."""
 
 SAME_S = 1.0
 """Shortest time between two reports of the same error."""
 
 
 class BoardSupervisor:
-    """Checks the board's status and recovers its channels.
+    """Supervisor of a board's status, which recovers its channels.
 
-    engaged: goals are followed
-    sure: goals may be sent, as the board has kept its settings
-    pending: channels of which it is not known where they are, until they are held again
+    engaged: whether goals are followed
+    sure: whether goals may be sent, as the board has kept its settings
+    pending: channels with an unknown position, until they are held again
     """
 
     def __init__(self, board: Board, channels: Sequence[Channel], log: EventLog) -> None:
@@ -54,7 +55,7 @@ class BoardSupervisor:
         self._damaged_s = self._hold_at_s = self._told_s = -inf
 
     def torque_enabled(self) -> None:
-        """Start the supervision of enabled channels."""
+        """Start supervision of enabled channels."""
         self.engaged = True
         self._restarts.clear()
         self._disturbed.clear()
@@ -63,7 +64,7 @@ class BoardSupervisor:
         self.sure, self._unhandled = True, ()
 
     def torque_disabled(self) -> None:
-        """Stop the supervision."""
+        """Stop supervision."""
         self.engaged = False
         self.pending.clear()
         for channel in self._channels:
@@ -77,7 +78,7 @@ class BoardSupervisor:
                 self._drop(channel)
 
     def record_errors(self, names: Sequence[str], now_s: float) -> None:
-        """Record what the board has reported."""
+        """Record errors that the board has reported."""
         for name in names:
             self._line.errors[name] += 1
             if now_s - self._errors_s.get(name, -inf) >= SAME_S:
@@ -118,12 +119,12 @@ class BoardSupervisor:
         return True
 
     def advance(self, now_s: float) -> None:
-        """Let time pass for every channel."""
+        """Advance the estimates of all channels to ``now_s``."""
         for channel in self._channels:
             channel.advance(now_s)
 
     def lead(self) -> None:
-        """Lead pulses that are on their way, where the board does not do that itself."""
+        """Advance moving pulses if the board does not do so itself."""
         if not self._led:
             return
         self.advance(self._line.port.now_s())
@@ -149,7 +150,7 @@ class BoardSupervisor:
         return True
 
     def _check_all(self) -> bool:
-        """Compare every channel's pulse with what it should be; return whether they came."""
+        """Compare every channel's pulse with the expected one; return whether they were read."""
         pulses = self._board.pulses([channel.id for channel in self._channels])
         if pulses is None:
             self.sure = False
@@ -163,7 +164,7 @@ class BoardSupervisor:
         held = [channel for channel in self._channels if channel.held]
         odd = [channel for channel in held if channel.implausible(found[channel], now_s, away)]
         home = [channel for channel in odd if not found[channel]]
-        # Boards that lead their pulses to their home are lost with any other pulse as well.
+        # Boards that ramp to their home are lost with any unexpected pulse as well.
         astray = not self._led and (home or away or len(odd) == len(held))
         lost = odd if astray else home
         if lost:
@@ -181,11 +182,11 @@ class BoardSupervisor:
         return True
 
     def _restore(self) -> None:
-        """Arm the limits again, which a restart forgets, then send the goals in force.
+        """Arm the limits again, which a restart loses, then send the active goals.
 
-        A board that leads its channels home at their armed speed has not yet gone far. A goal
-        to a channel that an error has just left without pulses would not be ramped: goals are
-        sent where the limits have arrived well.
+        A board that moves its channels home at their armed speed has not moved them far yet. A goal
+        to a channel that an error has just left without pulses would not be ramped, so goals are
+        sent only if the limits arrived intact.
         """
         held = [channel for channel in self._channels if channel.held]
         if not held:
@@ -196,9 +197,9 @@ class BoardSupervisor:
         self._board.send_goals(held)
 
     def _off_goal(self, channel: Channel, pulse: int) -> None:
-        """Record that a channel stays off its goal, at an end of the board's own range."""
+        """Record that a channel stays off its goal, at a limit of the board's own range."""
         if self._led:
-            # Boards that are led have no range of their own: what was sent was lost.
+            # Boards ramped by the driver have no range of their own: the command was lost.
             self._line.errors["other pulse"] += 1
             channel.found(pulse)
             return
@@ -208,7 +209,7 @@ class BoardSupervisor:
             self._log.add(refusal(self._board, channel))
 
     def _lost_hold(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
-        """Record that channels have lost their goals and are to be enabled again."""
+        """Record that channels have lost their goals and must be enabled again."""
         named = " and ".join(errors)
         who = (
             "the board"
@@ -237,9 +238,9 @@ class BoardSupervisor:
         return now_s - self._damaged_s < WITHIN_S
 
     def _wait_for_quiet(self, who: str, named: str, now_s: float) -> None:
-        """Delay enabling channels that noise has sent home: at once, then later and later.
+        """Delay enabling channels that noise has sent home: none at first, then increasing.
 
-        Without pulses nothing moves; a servo that is enabled and released all the time jerks.
+        Without pulses nothing moves; a servo that is enabled and released repeatedly jerks.
         """
         self._disturbed = [at_s for at_s in self._disturbed if now_s - at_s < WITHIN_S]
         self._disturbed.append(now_s)
@@ -258,7 +259,7 @@ class BoardSupervisor:
             self.pending.append(channel)
 
     def _give_up(self) -> None:
-        """Leave channels that lose their pulses again and again without them."""
+        """Give up channels that lose their pulses repeatedly, leaving them without pulses."""
         fault = "restarts again and again: supply too weak"
         for channel in self.pending:
             channel.fault = fault
@@ -279,7 +280,7 @@ class BoardSupervisor:
         if self._never_sent(channel, pulse, now_s):
             pulse = 0
         elif pulse and not self._led:
-            # A goal to a channel without pulses is not ramped: that it gives any is asked twice.
+            # A goal to a channel without pulses is not ramped, so its pulse is read twice.
             twice = before[0] == channel.id and abs(before[1] - pulse) <= channel.room_steps()
             if pulse < LEAST_STEPS or not twice:
                 return
@@ -293,12 +294,12 @@ class BoardSupervisor:
                 self._line.errors["damaged"] += 1
                 channel.gives(0)  # tried again at the next read
                 return
-            # It does give pulses, only others: that is reported once, and it is held so.
+            # It outputs other pulses: report that once, and hold it at these.
             self._off_goal(channel, round(channel.ramp.pulse_steps))
             channel.hold()
             channel.rearm()
             self.pending.remove(channel)
 
     def _never_sent(self, channel: Channel, pulse: int, now_s: float) -> bool:
-        """Return whether a pulse cannot be one of this driver, as on a line that hits one bit."""
+        """Return whether this driver cannot have sent a pulse: the line may damage one bit."""
         return self._led and not channel.fits(pulse) and channel.implausible(pulse, now_s)

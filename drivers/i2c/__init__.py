@@ -1,1 +1,1 @@
-"""I2C buses: of the kernel, or behind a bridge on a serial line."""
+"""I2C buses of the kernel, or of a bridge on a serial line."""

@@ -1,10 +1,10 @@
-"""I2C transfers as bytes, as NXP's SC18IM700 takes them from a serial line; pure.
+"""I2C transfers as bytes, in the format of NXP's SC18IM700 on a serial line; pure.
 
-All ports of servos carry bytes, so these carry I2C: a bridge on a serial line, an emulated one
-on a pseudo-terminal, and gazerig.drivers.i2c.port, which does with the kernel's buses what a
-bridge does with its own. S begins, then the address with its direction bit and a count, and of a
-write so many bytes; P ends. R, a register, P reads the bridge's own; register 0A tells how the last
-transfer ended. Source: NXP, SC18IM700 data sheet, rev. 2 (10 August 2007).
+All servo ports carry bytes, and these bytes carry I2C: to a bridge on a serial line, to an emulated
+one on a pseudo-terminal, and to gazerig.drivers.i2c.port, which executes them on the kernel's
+buses. A transfer is S, the address with its direction bit, a count, for a write that number of
+bytes, and P. R, a register and P read a register of the bridge; register 0A contains the result of
+the last transfer. Source: NXP, SC18IM700 data sheet, rev. 2 (10 August 2007).
 """
 
 from collections.abc import Iterator
@@ -21,26 +21,26 @@ OUTCOMES = {
     0xF3: "not acknowledged",
     TIMED_OUT: "bus stuck",
 }
-"""Status byte -> what went wrong."""
+"""Status byte -> error, "" for none."""
 
 
 def write(address: int, register: int, data: bytes) -> bytes:
-    """Return a write of some registers."""
+    """Build a write of some registers."""
     return bytes((START, address << 1, len(data) + 1, register)) + data + bytes((STOP,))
 
 
 def write_all(data: int) -> bytes:
-    """Return a byte to all devices of the bus, by its general call address."""
+    """Build a write of one byte to all devices of the bus, at the general call address."""
     return bytes((START, 0, 1, data, STOP))
 
 
 def read(address: int, register: int, length: int) -> bytes:
-    """Return a read of some registers."""
+    """Build a read of some registers."""
     return bytes((START, address << 1, 1, register, START, address << 1 | 1, length, STOP))
 
 
 class Part(NamedTuple):
-    """One start of a transfer; length: of a read, None where it writes."""
+    """One message of a transfer; length: number of bytes to read, None for a write."""
 
     address: int
     data: bytes

@@ -1,6 +1,6 @@
-"""Exchanges on one I2C bus: bounded waiting, every transfer confirmed, counts.
+"""Exchanges on one I2C bus: bounded waits, every transfer confirmed, counts.
 
-I2C has no check bytes: an answer that is acted upon is read twice.
+I2C has no checksums: an answer that causes an action is read twice.
 """
 
 from collections import Counter
@@ -14,11 +14,11 @@ WAIT_PIECE_S = 0.1
 
 
 class I2cLine:
-    """A port with an I2C bus behind it; every method may raise BusLost.
+    """A port with an I2C bus; every method may raise BusLost.
 
-    tx_bytes, rx_bytes: counts since it was made
+    tx_bytes, rx_bytes: counts since creation
     errors: counts by kind
-    lateness: answers that came after waiting had ended
+    lateness: counter of answers after their time-outs
     failure: error of the last exchange, "" for none
     """
 
@@ -33,15 +33,15 @@ class I2cLine:
         self._late = False
 
     def send(self, packet: bytes) -> None:
-        """Send transfers that only write, without asking for their status."""
+        """Send transfers that only write, without reading their status."""
         self.port.write(packet)
         self.tx_bytes += len(packet)
 
     def ask(self, transfers: Sequence[tuple[bytes, int]]) -> list[bytes] | None:
-        """Send transfers and return what each of them read; None if one failed.
+        """Send transfers and return the bytes that each of them read; None if one failed.
 
         Args:
-            transfers: each with the number of bytes that it reads.
+            transfers: Transfers, each with the number of bytes that it reads.
         """
         port = self.port
         if self._late:
@@ -73,7 +73,7 @@ class I2cLine:
         if not answer:
             return "timeout"
         if len(answer) < sum(lengths) + len(lengths):
-            # Of a transfer that failed there is a status and nothing else.
+            # A failed transfer returns only its status.
             failed = [OUTCOMES.get(byte, "incomplete") for byte in answer]
             return next((reason for reason in failed if reason), "incomplete")
         at = -1
@@ -89,9 +89,9 @@ class I2cLine:
         return self.ask([(packet, 0) for packet in packets]) is not None
 
     def wait(self, until_s: float) -> None:
-        """Let time pass; what arrives meanwhile was not asked for."""
-        # In pieces: each is a sign of life to the guardian that watches this port.
+        """Wait and discard bytes that arrive meanwhile."""
+        # In pieces, as each is a sign of life for the guardian that watches this port.
         while (now_s := self.port.now_s()) < until_s:
             got = self.port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
             if not got and self.port.now_s() <= now_s:
-                return  # an emulated port in simulated time, where waiting takes none
+                return  # an emulated port in simulated time, in which a wait takes no time

@@ -1,7 +1,7 @@
-"""An I2C bus of the kernel as a port that carries bytes: it does what a bridge chip does.
+"""An I2C bus of the kernel as a byte port with the behaviour of a bridge chip.
 
 The commands are those of gazerig.drivers.i2c.bridge. The kernel itself frees a bus whose data line
-is held down, where its driver can.
+is held low, if its driver can.
 """
 
 import errno
@@ -22,7 +22,7 @@ from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, Part, comm
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
 TIMEOUT_10_MS = 2
-"""A transfer that hangs ends after 20 ms instead of a second."""
+"""Time-out of a transfer in units of 10 ms: 20 ms instead of one second."""
 
 _GONE = (errno.ENODEV, errno.ENOENT, errno.EBADF, errno.ESHUTDOWN)
 _STUCK = (errno.ETIMEDOUT, errno.EAGAIN, errno.EBUSY, errno.EINTR)
@@ -32,13 +32,13 @@ OpenBus = Callable[[str], Any]
 
 
 class I2cPort:
-    """A real I2C bus by its path; implements gazerig.drivers.serial.port.BusPort.
+    """A real I2C bus; implements gazerig.drivers.serial.port.BusPort.
 
     Args:
-        port_name: its path, e.g. /dev/i2c-1.
-        exclusive: whether other programs of this kind are locked out; those of sensors are not.
-        on_traffic: called whenever bytes are sent or waited for; None if not needed.
-        open_bus: opens it.
+        port_name: Its path, e.g. /dev/i2c-1.
+        exclusive: Whether to lock out other servo programs; programs for sensors are not affected.
+        on_traffic: Called whenever bytes are sent or waited for; None if not needed.
+        open_bus: Opens the bus.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class I2cPort:
         return time.monotonic()
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open it; the rate of an I2C bus is set in the system, not here.
+        """Open the bus; its rate is set in the system, not here.
 
         Raises:
             PortError: absent, busy or not permitted.
@@ -90,7 +90,7 @@ class I2cPort:
         self._bus = None
 
     def write(self, data: bytes) -> None:
-        """Carry out transfers; what they read waits to be taken.
+        """Execute transfers; bytes that they read are kept for ``read_until``.
 
         Raises:
             BusLost: the bus is gone.
@@ -129,7 +129,7 @@ class I2cPort:
         """Check that no kernel driver has claimed an address.
 
         Raises:
-            BusLost: it is; the message says how to free it.
+            BusLost: one has; the message contains the remedy.
         """
         if self._bus.fd is None or address in self._checked:
             return
@@ -148,7 +148,7 @@ class I2cPort:
         return os.path.exists(self.port_name)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Return ``length`` bytes or what there is; where there is nothing, wait.
+        """Return up to ``length`` available bytes; if there are none, wait until the deadline.
 
         Raises:
             BusLost: the bus is gone.
@@ -157,14 +157,14 @@ class I2cPort:
             self._on_traffic()
         if self._bus is None:
             raise self._lost("it is closed")
-        # Transfers are over when ``write`` returns: waiting brings no more bytes.
+        # Transfers have ended when ``write`` returns: no more bytes can arrive.
         if not self._waiting and (left_s := deadline_s - time.monotonic()) > 0.0:
             time.sleep(left_s)
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
     def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
-        """Discard received bytes, write, and read what came; return when all had been written, too.
+        """Discard received bytes, write, and read; return the bytes and the end time of the write.
 
         Raises:
             BusLost: the bus is gone.
@@ -175,7 +175,7 @@ class I2cPort:
         return self.read_until(length, deadline_s), sent_s
 
     def getBytesAvailable(self) -> int:
-        """Return how many bytes wait."""
+        """Return the number of available bytes."""
         return len(self._waiting)
 
     def clearPort(self) -> None:
@@ -201,7 +201,7 @@ def explain(path: str, code: int | None) -> str:
         )
     if code in (errno.EACCES, errno.EPERM):
         return (
-            f"no right to open {path}: join its group with "
+            f"no permission to open {path}: join its group with "
             f"'sudo usermod -aG {group_of(path)} $USER' and log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN):
@@ -210,7 +210,7 @@ def explain(path: str, code: int | None) -> str:
 
 
 def group_of(path: str) -> str:
-    """Return the group that may use a device, "i2c" where that is not known."""
+    """Return the group that may use a device, "i2c" if it is unknown."""
     try:
         status = os.stat(path)
         return getgrgid(status.st_gid).gr_name if stat.S_ISCHR(status.st_mode) else "i2c"

@@ -1,1 +1,1 @@
-"""A Pololu Maestro and the hobby servos behind it, which give no feedback."""
+"""A Pololu Maestro and its hobby servos, which have no feedback."""

@@ -1,6 +1,6 @@
-"""A Pololu Maestro as a board of hobby servos: it leads its pulses to their goals itself.
+"""A Pololu Maestro as a board of hobby servos: it ramps its pulses to their goals itself.
 
-Its own serial timeout, set with Pololu's program, helps where the cable or the computer dies.
+Its own serial timeout, set with Pololu's program, helps if the cable or the computer fails.
 """
 
 from collections.abc import Sequence
@@ -40,17 +40,17 @@ class MaestroBoard:
             other_pulse="widen its range in Pololu's program, or delete the board's script",
             noise="check cable, ground and baud rate",
             no_answer=f"has the board {params.channels} channels?",
-            left_alone="the board goes on with its last goals as long as it has power",
+            left_alone="the board keeps its last goals while it has power",
         )
         self._errors_first = False
         self._questions: dict[int, tuple[bytes, bytes]] = {}
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
-        """Greet the board and return the pulses of these servos; nothing moves.
+        """Find the board and return the pulses of these servos; nothing moves.
 
         Raises:
             BusLost: the port is lost.
-            ServoMissing: it does not answer, or a channel is no servo's.
+            ServoMissing: it does not answer, or a channel is not a servo channel.
         """
         where = self.line.port.port_name
         register = self.line.greet()
@@ -58,12 +58,12 @@ class MaestroBoard:
             raise ServoMissing(f"{where}: no Maestro answers: {self._mute_causes()}")
         if not self.line.takes_crc():
             raise ServoMissing(
-                f"{where}: the board wants no CRC: switch Enable CRC on in Pololu's program, as "
+                f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
                 "noise moves servos without it, or set crc to false"
             )
         if register:
             named = ", ".join(name_errors(register))
-            log.add(f"the board held errors from before, cleared now: {named}")
+            log.add(f"the board had earlier errors, cleared now: {named}")
         pulses = every_pulse(self, setups)
         for setup, pulse in zip(setups, pulses, strict=True):
             if 0 < pulse <= MOST_INPUT:
@@ -91,36 +91,36 @@ class MaestroBoard:
             log.add("the board ran a script of its own: stopped")
 
     def look(self, channel: Channel) -> ChannelStatus | None:
-        """Ask for one channel's pulse and the error register; None where no answer came."""
+        """Read one channel's pulse and the error register; None without an answer."""
         questions = self._questions.get(channel.id)
         if questions is None:
             speech = self.line.speech
             one, other = speech.position(channel.id), speech.errors()
             questions = self._questions[channel.id] = one + other, other + one
-        # Now in this order, now in the other: a line that says its last answer again gives a
-        # pulse width in the place of the register, which cannot be one.
+        # The order alternates: on a line that repeats its last answer a pulse width takes the place
+        # of the register, which is detected.
         self._errors_first = not self._errors_first
         found = self.line.ask_words(questions[self._errors_first], 2)
         if found is None:
             return None
         pulse, register = found[::-1] if self._errors_first else found
         if register >> len(ERRORS):
-            # A pulse width taken for a register, or noise: such errors do not exist.
+            # Such errors do not exist: it is a pulse width instead of the register, or noise.
             self.line.errors["damaged"] += 1
             return None
         return ChannelStatus(pulse, name_errors(register | self.line.unheard()))
 
     def wake(self) -> tuple[str, ...] | None:
-        """Ask a board that may have to detect its baud rate again; None: no answer."""
+        """Read the errors of a board that may have to detect its baud rate; None if silent."""
         register = self.line.wake()
         return None if register is None else name_errors(register)
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return what channels give now, confirmed; None where that did not succeed."""
+        """Return the confirmed present pulses of channels; None after a failure."""
         return self.line.pulses(channels)
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
-        """Arm speed and acceleration; False where that is to be confirmed and is not."""
+        """Arm speed and acceleration; return False if a requested confirmation fails."""
         packet = b"".join(self._limits(channel) for channel in channels)
         if confirmed:
             return self.line.send_checked(packet)
@@ -136,19 +136,19 @@ class MaestroBoard:
         return speech.speed(channel.id, speed) + speech.acceleration(channel.id, accel)
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
-        """Send channels to their goals."""
+        """Send the goals of channels."""
         self.line.send(self.line.speech.targets(goals_of(channels)))
 
     def steady(self, channels: Sequence[Channel]) -> None:
-        """Do nothing: a board that may have restarted would take goals without any ramp."""
+        """Do nothing: a board that may have restarted would apply goals without any ramp."""
 
     def lead(self, channels: Sequence[Channel]) -> None:
-        """Do nothing: the board leads its pulses itself."""
+        """Do nothing: the board ramps its pulses itself."""
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses."""
         self.line.stop(channels)
 
     def wait(self, until_s: float) -> None:
-        """Let time pass."""
+        """Wait."""
         self.line.wait(until_s)

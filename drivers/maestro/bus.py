@@ -1,4 +1,4 @@
-"""Hobby servos on a Pololu Maestro."""
+"""Bus of hobby servos on a Pololu Maestro."""
 
 from collections.abc import Sequence
 
@@ -15,12 +15,12 @@ class MaestroBus(HobbyBoardBus):
 
     Args:
         port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
-        setups: the servos, in the order of every sequence given and taken; a servo's id is
-            its channel, and steps are quarter microseconds.
-        params: how to speak with the board.
+        setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
+            are quarter microseconds.
+        params: Communication parameters.
 
     Raises:
-        ValueError: a servo is on a channel or at a pulse width that the board cannot have.
+        ValueError: a servo has a channel or a pulse width that the board does not have.
     """
 
     def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: MaestroParams) -> None:
@@ -30,7 +30,7 @@ class MaestroBus(HobbyBoardBus):
     def go_home(self) -> None:
         """Send all channels to their home as set in Pololu's program, and release them.
 
-        Home may be a place, to which servos go at the armed speed, or no pulses at all.
+        Home may be a position, to which servos move at the armed speed, or no pulses at all.
 
         Raises:
             BusLost: the port is lost.
@@ -39,7 +39,7 @@ class MaestroBus(HobbyBoardBus):
         self._maestro.line.send(self._maestro.line.speech.go_home())
 
     def moving(self) -> bool | None:
-        """Return whether any channel with a limit is on its way; None if unknown.
+        """Return whether any channel with a limit is moving; None if unknown.
 
         The Micro Maestro has no such request.
 

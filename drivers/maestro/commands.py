@@ -1,9 +1,9 @@
 """Commands and answers of a Pololu Maestro as bytes; pure, nothing is sent here.
 
-A command byte has its highest bit set, data bytes have not. The compact form is the
-command and its data; the Pololu form puts AA and a device number before the command
-without its highest bit. Answers are plain bytes, low byte first, and never checked.
-Source: Pololu Maestro Servo Controller User's Guide (0J40), sections 4.e and 5.
+A command byte has its highest bit set; data bytes do not. The compact form is the command and its
+data; the Pololu form is AA, a device number, the command without its highest bit, and the data.
+Answers are plain bytes, low byte first, without a checksum. Source: Pololu Maestro Servo Controller
+User's Guide (0J40), sections 4.e and 5.
 """
 
 import struct
@@ -24,22 +24,23 @@ STOP_SCRIPT = 0xA4
 SCRIPT_STATUS = 0xAE
 
 POLOLU = 0xAA
-"""Begins a command in the Pololu form; a board that detects its baud rate waits for it."""
+"""First byte of a command in the Pololu form; a board that detects its baud rate waits for it."""
 
 WORD = 2
 """Bytes of an answer to get position and get errors."""
 
 MOST = 0x3FFF
-"""The greatest number in two data bytes."""
+"""Largest number in two data bytes."""
 
 LOWEST, HIGHEST = 64 * 4, 4080 * 4
-"""Pulse widths that the board can give, quarter microseconds."""
+"""Range of the board's pulse widths, quarter microseconds."""
 
 MOST_INPUT = 1023
-"""A channel that is an input answers its voltage as 0..1023 instead of a pulse width."""
+"""Largest answer of an input channel, which reports its voltage as 0..1023 instead of a pulse
+width."""
 
 MICRO = 6
-"""Channels of the Micro Maestro, which knows neither set multiple targets nor get moving."""
+"""Channels of the Micro Maestro, which has neither set multiple targets nor get moving."""
 
 ERRORS = (
     "serial signal error",
@@ -52,7 +53,7 @@ ERRORS = (
     "script call stack error",
     "script program counter error",
 )
-"""By bit of the error register."""
+"""Errors by bit of the error register."""
 
 PROTOCOL_ERROR = ERRORS.index("serial protocol error")
 
@@ -70,7 +71,7 @@ def crc7(data: bytes) -> int:
 
 
 def name_errors(register: int) -> tuple[str, ...]:
-    """Name the set bits of the error register."""
+    """Return the names of the set bits of the error register."""
     if not register:
         return ()
     named = [name for bit, name in enumerate(ERRORS) if register >> bit & 1]
@@ -84,11 +85,11 @@ def decode_words(answer: bytes) -> tuple[int, ...]:
 
 @dataclass(frozen=True, slots=True)
 class MaestroCodec:
-    """Encodes commands in the form that one board expects.
+    """Encoder of commands in the form that a board expects.
 
     form: "compact" or "pololu"; device: its number, 0..127, for the Pololu form
-    crc: every command ends in a check byte
-    channels: its size, which decides the commands it knows
+    crc: whether every command ends in a check byte
+    channels: number of channels, which decides the available commands
     """
 
     form: Form = "compact"
@@ -109,11 +110,11 @@ class MaestroCodec:
         return packet + bytes((crc7(packet),)) if self.crc else packet
 
     def target(self, channel: int, steps: int) -> bytes:
-        """Send a channel to a pulse width in quarter microseconds; 0: no pulses."""
+        """Encode a channel's target, a pulse width in quarter microseconds; 0: no pulses."""
         return self.command(SET_TARGET, channel, *split(steps))
 
     def targets(self, goals: Mapping[int, int]) -> bytes:
-        """Send channels to pulse widths: one command for every run of neighbours where it can.
+        """Encode targets: one command for every run of adjacent channels, if the board has it.
 
         goals: pulse width by channel, quarter microseconds
         """
@@ -122,7 +123,7 @@ class MaestroCodec:
             if len(run) > 1 and self.channels > MICRO:
                 widths = [goals[channel] for channel in run]
                 data = [0] * (2 * len(run))
-                # As ``split``, of all at once; what does not fit is not a data byte.
+                # As ``split``, for all at once; a width that does not fit is not a data byte.
                 data[0::2] = [width & 0x7F for width in widths]
                 data[1::2] = [width >> 7 for width in widths]
                 packet += self.command(SET_TARGETS, len(run), run[0], *data)
@@ -131,35 +132,35 @@ class MaestroCodec:
         return packet
 
     def speed(self, channel: int, units: int) -> bytes:
-        """Limit a channel's speed, 0.25 us per 10 ms; 0: unlimited."""
+        """Encode a channel's speed limit, 0.25 us per 10 ms; 0: unlimited."""
         return self.command(SET_SPEED, channel, *split(units))
 
     def acceleration(self, channel: int, units: int) -> bytes:
-        """Limit a channel's acceleration, 0..255 in 0.25 us per 10 ms per 80 ms; 0: unlimited."""
+        """Encode a channel's acceleration limit, 0..255 in 0.25 us per 10 ms per 80 ms; 0: none."""
         return self.command(SET_ACCELERATION, channel, *split(units))
 
     def position(self, channel: int) -> bytes:
-        """Ask for the pulse width that a channel gives now; a word."""
+        """Encode a request for a channel's present pulse width; the answer is a word."""
         return self.command(GET_POSITION, channel)
 
     def errors(self) -> bytes:
-        """Ask for the error register, which is cleared so; a word."""
+        """Encode a read of the error register, which clears it; the answer is a word."""
         return self.command(GET_ERRORS)
 
     def moving(self) -> bytes:
-        """Ask whether a channel with a limit is still on its way; a byte."""
+        """Encode a request whether a channel with a limit is still moving; the answer is a byte."""
         return self.command(GET_MOVING)
 
     def go_home(self) -> bytes:
-        """Send all channels to their home, which may be: no pulses."""
+        """Encode the command that sends all channels home, which may mean no pulses."""
         return self.command(GO_HOME)
 
     def stop_script(self) -> bytes:
-        """Stop the board's own script."""
+        """Encode the command that stops the board's own script."""
         return self.command(STOP_SCRIPT)
 
     def script_status(self) -> bytes:
-        """Ask whether the board's own script has stopped; a byte, 0: it runs."""
+        """Encode a request for the script status; the answer is a byte, 0: the script runs."""
         return self.command(SCRIPT_STATUS)
 
 
@@ -167,7 +168,7 @@ def split(number: int) -> tuple[int, int]:
     """Return a number's two data bytes of seven bits, the low one first.
 
     Raises:
-        ValueError: it does not fit into them.
+        ValueError: it does not fit.
     """
     if not 0 <= number <= MOST:
         raise ValueError(f"{number} does not fit into two data bytes: 0..{MOST}")
@@ -175,7 +176,7 @@ def split(number: int) -> tuple[int, int]:
 
 
 def runs(channels: Sequence[int]) -> list[list[int]]:
-    """Part ascending channels into runs of neighbours."""
+    """Split ascending channels into runs of adjacent ones."""
     parted: list[list[int]] = []
     for channel in channels:
         if parted and parted[-1][-1] == channel - 1:

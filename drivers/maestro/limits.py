@@ -1,4 +1,4 @@
-"""A Maestro's limits of speed and acceleration, in its own units.
+"""Speed and acceleration limits of a Maestro, in its own units.
 
 Source: Pololu Maestro User's Guide (0J40), section 5.e.
 """
@@ -11,13 +11,13 @@ SPEED_STEPS_S = 100.0
 """Unit of the board's speed limit: a quarter microsecond in 10 ms."""
 
 ACCEL_STEPS_S2 = SPEED_STEPS_S / 0.08
-"""Unit of its acceleration limit: that much more speed in 80 ms."""
+"""Unit of its acceleration limit: that change of speed in 80 ms."""
 
 MOST_ACCEL = 255
 
 
 def speed_units(steps_s: float) -> int:
-    """Return the smallest speed limit that is not below a speed; 0, unlimited, where none is.
+    """Return the smallest speed limit that is not below a speed; 0 (unlimited) if there is none.
 
     Raises:
         ValueError: it is not a positive number.
@@ -26,7 +26,7 @@ def speed_units(steps_s: float) -> int:
 
 
 def accel_units(steps_s2: float | None) -> int:
-    """Return the smallest acceleration limit that is not below one; 0, unlimited, where none is.
+    """Return the smallest limit that is not below an acceleration; 0 (unlimited) if there is none.
 
     Raises:
         ValueError: it is not a positive number.

@@ -1,7 +1,7 @@
-"""Exchanges with one Maestro: bounded waiting, clean lines, counts.
+"""Exchanges with one Maestro: bounded waits, drained lines, counts.
 
-Answers carry no address and no check, so an answer that came too late looks like any
-other. After a missing answer the line is drained before the next request.
+Answers have no address and no checksum, so a late answer looks like any other. After a missing
+answer the line is drained before the next request.
 """
 
 from collections import Counter
@@ -13,30 +13,31 @@ from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
 
 AT_ONCE = 6
-"""So many questions in one write: the board's receive buffer is small."""
+"""Largest number of requests in one write, as the board's receive buffer is small."""
 
 GREETINGS = 4
 
 WAIT_PIECE_S = 0.1
 
 ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
-"""Two answers about a pulse may be so far apart, and farther by the time between them."""
+"""Largest difference between two answers about a pulse, plus a speed times the time between
+them."""
 
 
 class MaestroLink:
-    """A port with one board behind it; every method may raise BusLost.
+    """A port with one board; every method may raise BusLost.
 
-    speech: encodes the board's commands
-    tx_bytes, rx_bytes: counts since it was made
+    speech: encoder of the board's commands
+    tx_bytes, rx_bytes: counts since creation
     errors: counts by kind
-    lateness: answers that came after waiting had ended
+    lateness: counter of answers after their time-outs
     """
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
         self.port = port
         self.speech = MaestroCodec(params.protocol, params.device, params.crc, params.channels)
-        # A whole command in the Pololu form begins with the byte that a board waits for
-        # which detects its baud rate; any other board takes it for the question it is.
+        # A command in the Pololu form begins with the byte that a board needs to detect its baud
+        # rate; any other board simply answers it.
         self._waking = MaestroCodec("pololu", params.device, params.crc).errors()
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
@@ -56,7 +57,7 @@ class MaestroLink:
         """Send requests and return their answers; None if they do not come in time."""
         port = self.port
         if self._late or self._owed:
-            # After a silence the answer to an older question may come first, and more behind it.
+            # After a silence answers to earlier requests may come first.
             dropped = port.drain()
             if 0 < dropped <= self._owed:
                 self.lateness.late_answer(port.now_s())
@@ -75,22 +76,22 @@ class MaestroLink:
         return answer
 
     def ask_words(self, packet: bytes, count: int) -> tuple[int, ...] | None:
-        """Send requests that are answered by 16-bit words; None if they are not."""
+        """Send requests and return their answers as 16-bit words; None without a good answer."""
         answer = self.ask(packet, WORD * count)
         if answer is None:
             return None
         found = decode_words(answer)
         if max(found) > MOST:
-            # No pulse width and no error register is so large: bytes were lost or added.
+            # No pulse width and no error register is this large: bytes were lost or added.
             self.errors["damaged"] += 1
             self._late = True
             return None
         return found
 
     def send_checked(self, packet: bytes) -> bool:
-        """Send commands and return whether the board has found no error up to their end.
+        """Send commands and return whether the board has found no error.
 
-        On an error it may have stopped all pulses: what moves a servo must not come behind.
+        On an error it may have stopped all pulses, so no command that moves a servo may follow.
         """
         found = self.ask_words(packet + self.speech.errors(), 1)
         if found is None:
@@ -105,13 +106,13 @@ class MaestroLink:
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses."""
-        # Each by its own command: one that is damaged on the way takes no other with it.
+        # Each by its own command, so that a damaged one affects no other.
         self.send(b"".join(self.speech.target(channel, 0) for channel in channels))
 
     def greet(self) -> int | None:
-        """Ask for the errors until the board answers; None if it stays silent.
+        """Read the errors until the board answers; None if it stays silent.
 
-        A board that has yet to detect its baud rate is sent the byte it waits for.
+        The request also lets a board detect its baud rate.
         """
         for attempt in range(GREETINGS):
             packet = self._waking if attempt % 2 else self.speech.errors()
@@ -121,9 +122,9 @@ class MaestroLink:
         return None
 
     def takes_crc(self) -> bool:
-        """Return whether the board expects the check bytes that it is sent.
+        """Return whether the board expects check bytes.
 
-        One that does not answers too, but finds an error in every command.
+        Other boards answer too, but find an error in every command.
         """
         if not self.speech.crc:
             return True
@@ -132,16 +133,16 @@ class MaestroLink:
         return found is None or not found[0] >> PROTOCOL_ERROR & 1
 
     def wake(self) -> int | None:
-        """Ask for the errors once, so that a board that detects its baud rate wakes up."""
+        """Read the errors once, so that a board that detects its baud rate wakes up."""
         found = self.ask_words(self._waking, 1)
         return found[0] if found is not None else None
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Ask for the pulse widths of some channels, quarter microseconds; 0: no pulses.
+        """Read the pulse widths of some channels, quarter microseconds; 0: no pulses.
 
-        Asked twice, as answers carry no check, and much follows from what they are: where a
-        channel is held. None if they did not come, if both differ, or if more came than was
-        asked for: after a doubled answer every pulse would be taken for the next channel's.
+        They are read twice, as answers have no checksum and decide the position at which a channel
+        is held. The result is None without an answer, if both reads differ, or if more bytes arrive
+        than requested: after a doubled answer every pulse would be taken for the next channel's.
         """
         first, began_s = self._pulses_once(channels), self.port.now_s()
         second = None if first is None else self._pulses_once(channels)
@@ -152,7 +153,7 @@ class MaestroLink:
             bool(one) == bool(other) and abs(one - other) <= reach
             for one, other in zip(first, second, strict=True)
         )
-        # Not in every read, as it takes 3 ms: all are asked for where something is odd.
+        # Only for several channels, as it takes 3 ms: all are read only after an anomaly.
         over = len(channels) > 1 and self.port.read_until(1, self.port.now_s() + QUIET_S)
         if over or not alike:
             self.errors["damaged"] += 1
@@ -172,9 +173,9 @@ class MaestroLink:
         return found
 
     def wait(self, until_s: float) -> None:
-        """Let time pass; what arrives meanwhile was not asked for."""
-        # In pieces: each is a sign of life to the guardian that watches this port.
+        """Wait and discard bytes that arrive meanwhile."""
+        # In pieces, as each is a sign of life for the guardian that watches this port.
         while (now_s := self.port.now_s()) < until_s:
             got = self.port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
             if not got and self.port.now_s() <= now_s:
-                return  # an emulated port in simulated time, where waiting takes none
+                return  # an emulated port in simulated time, in which a wait takes no time

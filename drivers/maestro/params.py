@@ -1,4 +1,4 @@
-"""How to speak with a Pololu Maestro: what a rig file may choose.
+"""Communication parameters of a Pololu Maestro, set in a rig file.
 
 Source: Pololu Maestro Servo Controller User's Guide (0J40).
 """
@@ -14,7 +14,7 @@ Form = Literal["compact", "pololu"]
 
 @dataclass(frozen=True, slots=True)
 class MaestroParams(HobbyBoardParams):
-    """How to speak with one board."""
+    """Communication parameters of one board."""
 
     # fmt: off
     baud: Annotated[int, Choices(9600, 19200, 38400, 57600, 115_200),

@@ -1,10 +1,9 @@
-"""Detection of a Maestro at a port and of its command form. Nothing is moved on purpose.
+"""Detection of a Maestro at a port and of its command form; nothing is moved on purpose.
 
-One thing is changed: a board clears its error register when it is read, so what it held
-is in the answer. Commands that a board does not understand are errors to it, and on an
-error it sends its channels home; so forms other than the chosen one are tried only where
-it keeps silent, and channels that may not exist are read only on request
-and if no channel gives pulses.
+One state changes: a board clears its error register when it is read, so the result contains it. A
+board treats unknown commands as errors, and on an error it sends its channels home. So forms other
+than the configured one are tried only if it is silent, and channels that may not exist are read
+only on request and if no channel outputs pulses.
 """
 
 from collections.abc import Callable
@@ -28,12 +27,12 @@ TRIES = 3
 class DetectedMaestro(NamedTuple):
     """A board that answers.
 
-    forms: those of the commands that it answers; "pololu" with the device number given
-    crc: it wants a check byte after every command
-    errors: what its error register held, which is cleared now
+    forms: command forms that it answers; "pololu" with the given device number
+    crc: whether it expects a check byte after every command
+    errors: errors of its error register, which is now cleared
     script: whether its own script runs, None if unknown
-    pulses: by channel, quarter microseconds; 0: no pulses
-    channels: how many there are, None if not asked
+    pulses: pulse widths by channel, quarter microseconds; 0: no pulses
+    channels: number of channels, None if not counted
     """
 
     forms: tuple[Form, ...]
@@ -45,15 +44,15 @@ class DetectedMaestro(NamedTuple):
 
 
 def probe(port: BusPort, params: MaestroParams, count: bool = False) -> DetectedMaestro | None:
-    """Return the Maestro at a port, None if nothing answers as one. The port is left open.
+    """Return the Maestro at a port, None if no Maestro answers; the port stays open.
 
-    count: find the number of channels by asking for some that may not exist, on which a
-        board sends its channels home; never done while any gives pulses. On USB the product
-        id shows it: ``USB_CHANNELS``.
+    count: find the number of channels by reading channels that may not exist, after which a board
+        sends its channels home; never done while a channel outputs pulses. On USB the product id
+        identifies it: ``USB_CHANNELS``.
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: the port went away.
+        BusLost: the port is lost.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: choose 115200")
@@ -71,10 +70,10 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> Detected
 def _look(
     line: MaestroLink, params: MaestroParams, register: int, count: bool
 ) -> DetectedMaestro | None:
-    """Read the rest of the state of a board that answers."""
+    """Read the remaining state of a board that answers."""
     crc = line.speech.crc
     forms: tuple[Form, ...] = ()
-    # Where several boards share a line all of them answer the compact form.
+    # If several boards share a line, all of them answer the compact form.
     for form in FORMS if line.speech.form == "compact" else ("pololu",):
         spoken = MaestroLink(line.port, replace(params, protocol=form, crc=crc))
         found = _patiently(partial(spoken.ask_words, spoken.speech.errors(), 1))
@@ -97,17 +96,17 @@ def _look(
 
 
 def _patiently(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | None:
-    """Ask again where no answer came: a busy host may have been late, not the board."""
+    """Repeat a read without an answer: a busy host may have been late, not the board."""
     return next((answer for answer in (ask() for _ in range(TRIES)) if answer is not None), None)
 
 
 def _count(line: MaestroLink) -> int:
-    """Count the channels: read the first one of each larger board until it does not exist."""
+    """Return the number of channels: read the first one of each larger board until one fails."""
     for channels in sorted(USB_CHANNELS.values())[:-1]:
         question = line.speech.position(channels) + line.speech.errors()
         found = line.ask_words(question, 2)
         if found is None or found[1] >> PROTOCOL_ERROR & 1:
-            # What was not understood is an error in its register, and no one else's.
+            # The rejected command set an error bit, which is cleared here.
             line.greet()
             return channels
     return max(USB_CHANNELS.values())

@@ -1,1 +1,1 @@
-"""PCA9685 boards on an I2C bus, and the hobby servos behind them, which give no feedback."""
+"""PCA9685 boards on an I2C bus, and their hobby servos, which have no feedback."""

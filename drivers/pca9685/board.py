@@ -1,7 +1,7 @@
-"""PCA9685 boards as a board of hobby servos: sixteen channels each, led by the driver.
+"""PCA9685 boards as a board of hobby servos: sixteen channels each, ramped by the driver.
 
-They hold pulses without any speed limit: each goal is sent as a position on the way to it, and the
-last one stays. A servo's id is sixteen times the number of its board, plus its channel.
+They hold pulses without any speed limit: each goal is sent as a series of intermediate pulses, and
+the last one stays. A servo's id is sixteen times the number of its board plus its channel.
 """
 
 from collections import defaultdict
@@ -41,10 +41,10 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
 
 LONGEST_LEAD_S = 0.05
-"""A pulse on its way goes on for no longer than this after a pause."""
+"""Longest time for which a ramp advances after a pause."""
 
 FOLLOW_UP_S = 0.015
-"""Pulses on their way are sent by reads where no goals have come for so long."""
+"""Time without goals after which reads send the intermediate pulses."""
 
 SILENT = SLEEP | RESTART | EXTCLK
 """Modes without pulses."""
@@ -52,16 +52,15 @@ SILENT = SLEEP | RESTART | EXTCLK
 NO_CLOCK = "it was set to an external clock, so it was reset"
 
 PRESCALE_EVERY = 8
-"""The prescaler is looked at in every so many looks."""
+"""Number of status reads per read of the prescaler."""
 
 
 class Pca9685Board:
     """The boards of one bus; implements gazerig.drivers.hobby_board.board.Board.
 
     Args:
-        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind
-            it.
-        params: how to reach them.
+        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge.
+        params: Addresses and timing of the boards.
     """
 
     damage = ("damaged", "incomplete")
@@ -84,7 +83,7 @@ class Pca9685Board:
             other_pulse=again,
             noise="check SDA, SCL and ground, and the length of the cable",
             no_answer="check power, SDA, SCL and ground of its board",
-            left_alone="the board goes on with its last pulses as long as it has power",
+            left_alone="the board keeps its last pulses while it has power",
         )
         self._clocks = params.clocks
         self._places = [(address, nth) for address in params.addresses for nth in range(CHANNELS)]
@@ -94,7 +93,7 @@ class Pca9685Board:
         self._sent_s = 0.0
         self._looks = 0
 
-    # --- places and units
+    # --- addresses and units
 
     def _boards(self, ids: Sequence[int]) -> dict[int, list[int]]:
         """Return the channels of servos by the addresses of their boards."""
@@ -104,10 +103,10 @@ class Pca9685Board:
             boards[address].append(channel)
         return boards
 
-    # --- finding
+    # --- detection
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
-        """Check that the boards are there and return the pulses of these servos; nothing changes.
+        """Check that the boards answer and return the pulses of these servos; nothing changes.
 
         Raises:
             BusLost: the port is lost.
@@ -118,13 +117,13 @@ class Pca9685Board:
             see_board(self.line, address)
         return every_pulse(self, setups)
 
-    # --- setting up
+    # --- setup
 
     def prepare(self, log: EventLog) -> None:
-        """Prepare nothing: boards are set up where they need it, before their first pulse."""
+        """Do nothing: boards are set up, if needed, before their first pulse."""
 
     def _ready(self, address: int) -> bool:
-        """Set a board up if it is not, which ends all its pulses; return whether it is set up."""
+        """Set a board up if it is not, which stops all its pulses; return whether it is set up."""
         now = self._modes(address)
         if now is None:
             return False
@@ -139,9 +138,10 @@ class Pca9685Board:
         )
 
     def _modes(self, address: int) -> tuple[int, int, int] | None:
-        """Read both modes and the prescaler, twice; None where that did not succeed.
+        """Read both modes and the prescaler, twice; None after a failure.
 
-        A board on an external clock has none, and only a reset of all boards ends that (7.3.1).
+        A board on an external clock has no prescaler, and only a reset of all boards ends that
+        (7.3.1).
         """
         questions = [(bridge.read(address, at, 1), 1) for at in (MODE1, MODE2, PRESCALE)]
         found = self.line.ask(questions * 2)
@@ -158,7 +158,7 @@ class Pca9685Board:
         return mode1, mode2, prescale
 
     def _set_up(self, address: int) -> bool:
-        """Set a board up from any state: no pulses, asleep, the prescaler, then awake."""
+        """Set a board up from any state: no pulses, sleep, prescaler, then wake."""
         self._forget(address)
         asleep = self.line.write_confirmed(
             bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))),
@@ -170,22 +170,22 @@ class Pca9685Board:
         if not asleep:
             return False
         self.line.wait(self.line.port.now_s() + START_S)
-        # What slept with pulses on holds them back until this; there are none now.
+        # Channels that slept with pulses on would resume here; there are none now.
         self.line.write_confirmed(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
         return self._modes(address) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale)
 
     def _forget(self, address: int) -> None:
-        """Forget what was sent to a board."""
+        """Discard the record of pulses sent to a board."""
         mine = [servo_id for servo_id in self._sent if self._places[servo_id][0] == address]
         for servo_id in mine:
             del self._sent[servo_id]
 
-    # --- looking
+    # --- status
 
     def look(self, channel: Channel) -> ChannelStatus | None:
-        """Ask for a channel's pulse and its board's mode; None where no answer came.
+        """Read a channel's pulse and its board's mode; None without an answer.
 
-        A board that was reset sleeps: then it gives no pulses, whatever else is there.
+        A board that was reset sleeps and outputs no pulses, whatever its registers contain.
         """
         address, nth = self._places[channel.id]
         self._looks += 1
@@ -207,7 +207,7 @@ class Pca9685Board:
         return self._look_closer(channel)
 
     def _look_closer(self, channel: Channel) -> ChannelStatus | None:
-        """Check once more a board that has lost its setup or was read badly."""
+        """Check a board again that has lost its setup or was read badly."""
         address, _ = self._places[channel.id]
         now, pulses = self._modes(address), self.pulses((channel.id,))
         if now is None or pulses is None:
@@ -220,19 +220,19 @@ class Pca9685Board:
         return ChannelStatus(pulses[0], changed)
 
     def _pulse_steps(self, servo_id: int, counts: int, prescale: int) -> int:
-        """Return the pulse of counts: exactly the one sent if the counts are those sent."""
+        """Return the pulse of counts: exactly the sent pulse if the counts are those sent."""
         sent, clock = self._sent.get(servo_id), self._clocks[self._places[servo_id][0]]
         if sent is not None and sent[0] == counts and prescale == clock.prescale:
             return sent[1]
         return round(counts * clock._replace(prescale=prescale).grain_steps)
 
     def wake(self) -> tuple[str, ...] | None:
-        """Ask the first board whether it is there."""
+        """Check whether the first board answers."""
         mode = self.line.ask([(bridge.read(self.params.address, MODE1, 1), 1)])
         return None if mode is None else ()
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return what channels give now, asked twice; None where both differ or do not come."""
+        """Return the present pulses of channels, read twice; None if the reads differ or fail."""
         first = self._pulses_once(channels)
         second = None if first is None else self._pulses_once(channels)
         if second is not None and first != second:
@@ -261,7 +261,7 @@ class Pca9685Board:
         return tuple(pulses[servo_id] for servo_id in channels)
 
     def _outputs(self, address: int, channels: Sequence[int], runs_on: bool) -> list[bytes] | None:
-        """Read the registers of channels: each at once where the board counts on by itself."""
+        """Read the registers of channels, each in one transfer if the board auto-increments."""
         if runs_on:
             whole = [(bridge.read(address, output(channel), BYTES), BYTES) for channel in channels]
             return self.line.ask(whole)
@@ -287,18 +287,18 @@ class Pca9685Board:
         return all(self._ready(address) for address in self._boards([c.id for c in channels]))
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
-        """Send channels to where they are on the way to their goals, those of a board at once."""
+        """Send the intermediate pulses of channels towards their goals, one transfer per board."""
         counts: dict[int, int] = {}
         for channel in channels:
             servo_id, setup, steps = channel.id, channel.setup, round(channel.ramp.pulse_steps)
-            # Where it is on its way, inside its limits.
+            # Its intermediate pulse, inside its limits.
             width = counts_within(steps, setup.min_steps, setup.max_steps, self._grains[servo_id])
             counts[servo_id], self._sent[servo_id] = width, (width, steps)
             channel.sent_steps = steps
         self._send(counts)
 
     def _send(self, counts: Mapping[int, int]) -> None:
-        """Send pulses by the ids of their servos, those of a board in as few writes as can be."""
+        """Send pulses by servo id, with as few writes per board as possible."""
         boards: dict[int, dict[int, bytes]] = defaultdict(dict)
         for servo_id, width in counts.items():
             address, nth = self._places[servo_id]
@@ -314,11 +314,11 @@ class Pca9685Board:
         self._sent_s = self.line.port.now_s()
 
     def steady(self, channels: Sequence[Channel]) -> None:
-        """Send pulses once more as they were sent: a byte lost in a row of them shifts the rest."""
+        """Send the last pulses once more, as a byte lost in a series of them shifts the rest."""
         self._send({c.id: self._sent[c.id][0] for c in channels if c.id in self._sent})
 
     def lead(self, channels: Sequence[Channel]) -> None:
-        """Send pulses that are on their way a little farther, where no goals come."""
+        """Advance moving pulses a little if no goals arrive."""
         if self.line.port.now_s() - self._sent_s < FOLLOW_UP_S:
             return
         sent, none = self._sent, (0, 0)
@@ -327,7 +327,7 @@ class Pca9685Board:
             self.send_goals(moving)
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
-        """Stop pulses, each by one register, whatever is set; on the last try all of a board."""
+        """Stop pulses, each by one register, in any state; on the last try all of a board."""
         packets = []
         for servo_id in channels:
             address, nth = self._places[servo_id]
@@ -339,5 +339,5 @@ class Pca9685Board:
         self.line.send(b"".join(packets))
 
     def wait(self, until_s: float) -> None:
-        """Let time pass."""
+        """Wait."""
         self.line.wait(until_s)

@@ -1,4 +1,4 @@
-"""Hobby servos on PCA9685 boards."""
+"""Bus of hobby servos on PCA9685 boards."""
 
 from collections.abc import Sequence
 
@@ -13,14 +13,13 @@ class Pca9685Bus(HobbyBoardBus):
     """The channels of the boards on one I2C bus; implements gazerig.drivers.types.ServoBus.
 
     Args:
-        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge behind
-            it.
-        setups: the servos, in the order of every sequence given and taken; a servo's id is
-            its channel, and steps are quarter microseconds.
-        params: how to reach them.
+        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge.
+        setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
+            are quarter microseconds.
+        params: Addresses and timing of the boards.
 
     Raises:
-        ValueError: a servo is on a channel or at a pulse width that the boards cannot have.
+        ValueError: a servo has a channel or a pulse width that the boards do not have.
     """
 
     def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: Pca9685Params) -> None:

@@ -1,4 +1,4 @@
-"""How to reach PCA9685 boards: what a rig file may choose."""
+"""Parameters of PCA9685 boards, set in a rig file."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,7 +8,7 @@ from gazerig.drivers.pca9685.registers import CHANNELS, MOST_PRESCALE, PulseCloc
 from gazerig.params import Bounds
 
 BRIDGE_BAUD = 115_200
-"""Rate of the serial line of a bridge; that of an I2C bus is set in the system."""
+"""Baud rate of a bridge's serial line; the rate of an I2C bus is set in the system."""
 
 RESERVED = (0x70, *range(0x78, 0x80))
 """All boards answer at 70 after power-up; from 78 on addresses mean something else on I2C."""
@@ -16,7 +16,7 @@ RESERVED = (0x70, *range(0x78, 0x80))
 
 @dataclass(frozen=True, slots=True)
 class Pca9685Params(HobbyBoardParams):
-    """How to reach the boards of one I2C bus."""
+    """Addresses and timing of the boards of one I2C bus."""
 
     # fmt: off
     address: Annotated[int, Bounds(0x40, 0x77), "I2C address of the board; 0x40 (64) unless address jumpers are closed."] = 0x40
@@ -33,10 +33,10 @@ class Pca9685Params(HobbyBoardParams):
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that the values fit each other.
+        """Check that the values are consistent.
 
         Raises:
-            ValueError: they do not; the message names them.
+            ValueError: they are not; the message names them.
         """
         for address in self.addresses:
             if address in RESERVED:
@@ -81,5 +81,5 @@ class Pca9685Params(HobbyBoardParams):
 
     @property
     def baud(self) -> int:
-        """Return the rate of a bridge's serial line."""
+        """Return the baud rate of a bridge's serial line."""
         return BRIDGE_BAUD

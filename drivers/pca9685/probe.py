@@ -1,4 +1,4 @@
-"""Whether a PCA9685 is at an address: registers are read one by one, none is written."""
+"""Detection of PCA9685 boards: registers are read one by one, none is written."""
 
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.i2c.bridge import read
@@ -20,11 +20,11 @@ TRIES = 3
 
 
 def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
-    """Return the addresses of the boards on a bus; the port is left open.
+    """Return the addresses of the boards on a bus; the port stays open.
 
     Raises:
         PortError: the port cannot be opened.
-        BusLost: it went away.
+        BusLost: the port is lost.
     """
     if not port.setBaudRate(params.baud):
         raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")
@@ -43,10 +43,10 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
 
 
 def see_board(line: I2cLine, address: int) -> None:
-    """Check that what answers at an address is a PCA9685.
+    """Check that a PCA9685 answers at an address.
 
     Raises:
-        ServoMissing: it is not, or nothing answers.
+        ServoMissing: another chip answers, or none.
     """
     where = f"{line.port.port_name}: "
     tries = (_registers(line, address) for _ in range(TRIES))
@@ -56,7 +56,7 @@ def see_board(line: I2cLine, address: int) -> None:
     first_six, outputs, prescale = found
     if not plausible(first_six, outputs, prescale):
         raise ServoMissing(
-            f"{where}what answers at {address:#x} is no PCA9685: another chip has this "
+            f"{where}the chip at {address:#x} is no PCA9685: another chip has this "
             "address; close a jumper and write the new one under bus.pca9685.address"
         )
     if first_six[MODE1] & EXTCLK:
@@ -67,11 +67,11 @@ def see_board(line: I2cLine, address: int) -> None:
 
 
 def _mute(line: I2cLine, address: int) -> str:
-    """Return why nothing was read, with the remedy."""
+    """Return the reason of a failed read, with the remedy."""
     if line.failure == "bus stuck":
         return (
-            "the I2C bus is stuck, its data or clock line is held down: switch what "
-            "hangs on it off and on, check SDA and SCL for a short"
+            "the I2C bus is stuck, its data or clock line is held low: switch the "
+            "supply of its devices off and on, check SDA and SCL for a short"
         )
     if line.failure != "not acknowledged":
         return (
@@ -85,7 +85,7 @@ def _mute(line: I2cLine, address: int) -> str:
 
 
 def _registers(line: I2cLine, address: int) -> tuple[bytes, bytes, int] | None:
-    """Read all registers of a board one by one, which needs no setting of it."""
+    """Read all registers of a board one by one, which needs no particular setting."""
     single = [*range(LED0), *range(LED0, LED0 + CHANNELS * BYTES), PRESCALE]
     found = line.ask([(read(address, register, 1), 1) for register in single])
     if found is None:

@@ -1,4 +1,4 @@
-"""Registers of a PCA9685 and what they hold; pure, nothing is sent here.
+"""Registers of a PCA9685 and their contents; pure, nothing is sent here.
 
 Source: NXP, PCA9685 data sheet, rev. 4 (16 April 2015), section 7.3.
 """
@@ -11,25 +11,25 @@ from typing import NamedTuple
 MODE1, MODE2 = 0x00, 0x01
 LED0, ALL_LED, PRESCALE = 0x06, 0xFA, 0xFE
 BYTES = 4
-"""Of one channel: ON low and high, OFF low and high."""
+"""Bytes of one channel: ON low and high, OFF low and high."""
 
 RESTART, EXTCLK, AUTO_INCREMENT, SLEEP = 0x80, 0x40, 0x20, 0x10
 AWAKE = AUTO_INCREMENT
-"""MODE1 while it works: it does not answer at the address of all boards."""
+"""MODE1 in operation: the board does not answer at the all-call address."""
 TOTEM_POLE = 0x04
-"""MODE2: outputs drive both ways, and change at the stop condition, a pulse never in halves."""
+"""MODE2: outputs drive high and low, and change at the stop condition, never within a pulse."""
 FULL_OFF = 0x10
-"""In the high byte of OFF: no pulses, whatever ON holds (7.3.3)."""
+"""Bit in the high byte of OFF: no pulses, whatever ON contains (7.3.3)."""
 OFF = bytes((0, 0, 0, FULL_OFF))
 
 SOFTWARE_RESET = 0x06
-"""To all devices of the bus: every PCA9685 on it is as after power-up (7.6)."""
+"""Byte to the general call address that resets every PCA9685 to its power-up state (7.6)."""
 
 CHANNELS, COUNTS = 16, 4096
 LEAST_PRESCALE, MOST_PRESCALE = 3, 255
 START_S = 0.001
-"""The oscillator is steady .5 ms after the end of sleep; before that a restart must not be asked
-for (7.3.1.1)."""
+"""The oscillator is stable .5 ms after the end of sleep; a restart must not be requested earlier
+(7.3.1.1)."""
 
 US_STEPS = 4
 
@@ -47,7 +47,7 @@ class PulseClock(NamedTuple):
 
     @property
     def grain_steps(self) -> float:
-        """Return quarter microseconds of one 4096th of the period."""
+        """Return the length of one 4096th of the period, quarter microseconds."""
         return (self.prescale + 1) / self.oscillator_hz * 1e6 * US_STEPS
 
 
@@ -62,7 +62,7 @@ def pulse(counts: int) -> bytes:
 
 
 def counts_of(registers: bytes) -> int:
-    """Return the pulse that the registers of a channel make; 0: none."""
+    """Return the counts of a channel's pulse from its registers; 0: none."""
     on_low, on_high, off_low, off_high = registers
     if off_high & FULL_OFF:
         return 0
@@ -72,12 +72,12 @@ def counts_of(registers: bytes) -> int:
 
 
 def plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
-    """Return whether registers can be those of a PCA9685: reserved bits are 0.
+    """Return whether registers can belong to a PCA9685: reserved bits are 0.
 
     Args:
-        first_six: MODE1 to ALLCALLADR.
-        outputs: of all channels.
-        prescale: the prescaler.
+        first_six: Registers MODE1 to ALLCALLADR.
+        outputs: Registers of all channels.
+        prescale: Prescaler.
     """
     low_bits = any(address & 1 for address in first_six[2:])
     high_bits = first_six[1] & 0xE0 or any(byte & 0xE0 for byte in outputs[1::2])
@@ -85,13 +85,13 @@ def plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
 
 
 def counts_within(steps: int, low_steps: int, high_steps: int, grain_steps: float) -> int:
-    """Return the counts nearest to a pulse; those of a pulse inside the limits stay inside.
+    """Return the counts nearest to a pulse; if it is inside the limits, the counts are too.
 
     Args:
-        steps: the pulse, quarter microseconds.
-        low_steps: shortest pulse.
-        high_steps: longest pulse.
-        grain_steps: what one count is.
+        steps: Pulse, quarter microseconds.
+        low_steps: Shortest pulse, quarter microseconds.
+        high_steps: Longest pulse, quarter microseconds.
+        grain_steps: Length of one count, quarter microseconds.
     """
     counts = round(steps / grain_steps)
     least, most = _counts_between(low_steps, high_steps, grain_steps)
@@ -102,12 +102,12 @@ def counts_within(steps: int, low_steps: int, high_steps: int, grain_steps: floa
 
 @lru_cache(maxsize=256)
 def _counts_between(low_steps: int, high_steps: int, grain_steps: float) -> tuple[int, int]:
-    """Return the least and the most counts of which no pulse is outside limits."""
+    """Return the smallest and largest counts whose pulses are inside the limits."""
     return ceil(low_steps / grain_steps), floor(high_steps / grain_steps)
 
 
 def runs(channels: Sequence[int]) -> list[list[int]]:
-    """Part ascending channels into runs of neighbours that fit into a bridge's buffer."""
+    """Split ascending channels into runs of adjacent ones that fit into a bridge's buffer."""
     longest = CHANNELS - 1
     parted: list[list[int]] = []
     for channel in channels:

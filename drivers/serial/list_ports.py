@@ -1,7 +1,7 @@
-"""Serial ports of this computer as the system shows them: who may open them, who holds them.
+"""Serial ports of this computer: their permissions and the programs that use them.
 
-Nothing is opened here. ``Host`` names the system folders that are read, so
-that tests can use others.
+No port is opened here. ``Host`` contains the system folders that are read, so that tests can use
+others.
 """
 
 import contextlib
@@ -21,9 +21,9 @@ RECOMMENDED_LATENCY_MS = 1
 class Host:
     """System folders that describe ports.
 
-    latency: one folder a USB serial device, with its latency_timer in ms
-    by_id: links named after the adapter, the same after every plugging
-    processes: one folder a process
+    latency: one folder per USB serial device, with its latency_timer in ms
+    by_id: links named after the adapter, which persist when it is replugged
+    processes: one folder per process
     """
 
     latency: Path = Path("/sys/bus/usb-serial/devices")
@@ -32,7 +32,7 @@ class Host:
 
 
 class SerialPort(NamedTuple):
-    """One serial port.
+    """A serial port.
 
     device: path to open; by_id: its persistent name, None if it has none
     usb: USB vendor and product id, "0403:6014"; "" for a port that is not on USB
@@ -45,11 +45,11 @@ class SerialPort(NamedTuple):
 
 
 class Access(NamedTuple):
-    """What this user may do with a path.
+    """Permissions of this user for a path.
 
-    exists: there is such a file; serial: it is a device of its own kind, no plain file
-    allowed: it may be read and written
-    group: the group that may; joined: this user is in it (but perhaps not this session)
+    exists: whether the path exists; serial: whether it is a device, not a plain file
+    allowed: whether it may be read and written
+    group: group with access; joined: whether this user is in it (but perhaps not this session)
     """
 
     exists: bool
@@ -60,7 +60,7 @@ class Access(NamedTuple):
 
 
 def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
-    """List the serial ports there are, those on USB first."""
+    """Return the serial ports, those on USB first."""
     names = _lasting_names((host or Host()).by_id)
     ports = [
         SerialPort(
@@ -82,12 +82,12 @@ def _lasting_names(by_id: Path) -> dict[str, str]:
 
 
 def lasting_name(device: str, by_id: Path | None = None) -> str | None:
-    """Return the persistent name of a port, the same after every plugging; None without one."""
+    """Return the name of a port that persists when it is replugged; None without one."""
     return _lasting_names(by_id or Host().by_id).get(os.path.realpath(device))
 
 
 def access(device: str) -> Access:
-    """Return whether this user may open a path."""
+    """Return this user's permissions for a path."""
     try:
         found = os.stat(device)
     except OSError:
@@ -108,12 +108,12 @@ def _user() -> str:
 
 
 def holders(device: str, host: Host | None = None) -> tuple[str, ...]:
-    """Name the other programs that hold a port open, "python3 (process 1234)".
+    """Return the other programs that have a port open, "python3 (process 1234)".
 
-    Only those that this user may look into are found.
+    Only programs that this user may inspect are found.
     """
     real, own = os.path.realpath(device), str(os.getpid())
-    if real.startswith("/dev/pts/"):  # the program that serves a pseudo-terminal holds it too
+    if real.startswith("/dev/pts/"):  # the program that serves a pseudo-terminal also has it open
         return ()
     found = []
     for process in sorted((host or Host()).processes.glob("[0-9]*")):
@@ -123,7 +123,7 @@ def holders(device: str, host: Host | None = None) -> tuple[str, ...]:
 
 
 def _open_files(process: Path) -> Iterable[str]:
-    """List the files a process has open; none where it may not be looked into."""
+    """Return the files that a process has open; none if it may not be inspected."""
     files = []
     with contextlib.suppress(OSError):
         for link in (process / "fd").iterdir():
@@ -143,14 +143,14 @@ def _program(process: Path) -> str:
 
 
 def latency_file(device: str, host: Host | None = None) -> Path | None:
-    """Return the file that holds the adaptor's latency timer, None where it has none."""
+    """Return the file of the adaptor's latency timer, None if it has none."""
     name = Path(os.path.realpath(device)).name
     file = (host or Host()).latency / name / "latency_timer"
     return file if file.is_file() else None
 
 
 def latency_ms(file: Path) -> int | None:
-    """Read a latency timer, None where it cannot be read."""
+    """Return a latency timer, ms; None if it cannot be read."""
     try:
         return int(file.read_text(encoding="ascii"))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Why a serial port cannot be opened, in one line."""
+"""Messages about serial ports that cannot be opened."""
 
 import errno
 import os
@@ -14,7 +14,7 @@ def explain(port_name: str, code: int | None) -> str:
         return f"no serial port {port_name}: plug the adapter in; ports here: {name_ports()}"
     if code in (errno.EACCES, errno.EPERM):
         return (
-            f"no right to open {port_name}: join its group with "
+            f"no permission to open {port_name}: join its group with "
             "'sudo usermod -aG dialout $USER' and log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN):
@@ -26,6 +26,6 @@ def explain(port_name: str, code: int | None) -> str:
 
 
 def name_ports() -> str:
-    """List the serial ports there are."""
+    """Return the names of the serial ports as text."""
     ports = [f"{port.device} ({port.description})" for port in list_ports.comports()]
     return ", ".join(ports) or "none"

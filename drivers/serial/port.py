@@ -1,6 +1,6 @@
-"""Serial port of a servo bus: waits in the kernel instead of spinning, names its errors.
+"""Serial port of a servo bus: it waits in the kernel instead of spinning.
 
-Owns the host clock of the servo bus (monotonic seconds).
+It owns the host clock of the servo bus (monotonic seconds).
 """
 
 import os
@@ -19,37 +19,37 @@ from gazerig.drivers.serial.open_error import explain
 
 try:
     import termios
-except ImportError:  # no POSIX: emulated servos run there, real ports do not
+except ImportError:  # without POSIX only emulated servos work
     termios = None  # type: ignore[assignment]
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034
-"""What the SDK allows for two turns of a USB adapter's 16 ms latency timer."""
+"""Time that the SDK allows for two periods of a USB adapter's 16 ms latency timer."""
 
 QUIET_S = 0.003
-"""A line without a byte for so long is quiet: three turns of a 1 ms latency timer."""
+"""Time without a byte after which a line is quiet: three periods of a 1 ms latency timer."""
 
 BABBLE_S = 0.06
-"""Longest draining of a line that never falls silent."""
+"""Longest time to drain a line that never falls silent."""
 
 MORE_RATES = (38_400, 76_800, 128_000, 250_000)
-"""Bit/s that servos and adaptors know and the SDK's list of rates lacks."""
+"""Bit/s that servos and adaptors support but that are not in the SDK's list."""
 
 WRITE_S = 0.05
-"""A packet that cannot be handed to the adapter within this time never will be."""
+"""Longest time to pass a packet to the adapter."""
 
 
 class BusPort(Protocol):
-    """What the driver asks of a port; for setup it is also the SDK's PortHandler."""
+    """Port interface of the driver; for setup it is also the SDK's PortHandler."""
 
     port_name: str
 
     def now_s(self) -> float:
-        """Return the time."""
+        """Return the time, seconds."""
         ...
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate; False where the rate is not possible."""
+        """Open at a baud rate; return False if the rate is not supported."""
         ...
 
     def closePort(self) -> None:
@@ -65,7 +65,7 @@ class BusPort(Protocol):
         ...
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Return ``length`` bytes, or those that came before the deadline.
+        """Return up to ``length`` bytes, those received before the deadline.
 
         Raises:
             BusLost: the port is lost.
@@ -76,7 +76,7 @@ class BusPort(Protocol):
         """Clear the port, send a request and read until the deadline, all in one.
 
         Returns:
-            What ``read_until`` returns, and when the request had been handed over.
+            The result of ``read_until``, and the time at which the request was written, seconds.
 
         Raises:
             BusLost: the port is lost.
@@ -84,7 +84,7 @@ class BusPort(Protocol):
         ...
 
     def getBytesAvailable(self) -> int:
-        """Count the bytes that have arrived.
+        """Return the number of received bytes.
 
         Raises:
             BusLost: the port is lost.
@@ -92,7 +92,7 @@ class BusPort(Protocol):
         ...
 
     def clearPort(self) -> None:
-        """Throw away what has arrived, without waiting.
+        """Discard received bytes, without waiting.
 
         Raises:
             BusLost: the port is lost.
@@ -100,7 +100,7 @@ class BusPort(Protocol):
         ...
 
     def drain(self) -> int:
-        """Throw away what arrives until the line is quiet; return the number of bytes.
+        """Discard bytes until the line is quiet; return their number.
 
         Raises:
             BusLost: the port is lost.
@@ -109,15 +109,16 @@ class BusPort(Protocol):
 
 
 class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
-    """A real serial port by path.
+    """A real serial port.
 
     Args:
-        port_name: its path.
-        exclusive: opened for this program alone; False: beside the program that has it open.
-        on_traffic: called whenever bytes are sent or waited for; None if not needed.
-        by_id: folder of names that adaptors keep, None for the system's.
+        port_name: Its path.
+        exclusive: Whether to open it for this program alone; otherwise it is shared with the
+            program that has it open.
+        on_traffic: Called whenever bytes are sent or waited for; None if not needed.
+        by_id: Folder of persistent names of adaptors, None for the system's.
 
-    opened_as: the path that was opened last: an adaptor may come back under another name
+    opened_as: the path that was opened last; an adaptor may reconnect under another name
     """
 
     def __init__(
@@ -138,16 +139,16 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._poll: Callable[[int], object] = _closed
         self._deadline_s = 0.0
 
-    # --- what the driver's control loop uses
+    # --- methods for the control loop
 
     now_s = staticmethod(time.monotonic)
     """Host monotonic seconds."""
 
     def write(self, data: bytes) -> None:
-        """Send bytes; waits at most 50 ms for room in the adapter's buffer.
+        """Send bytes; wait at most 50 ms for space in the adapter's buffer.
 
         Raises:
-            BusLost: the port is lost or takes nothing.
+            BusLost: the port is lost or accepts no bytes.
         """
         if self._on_traffic is not None:
             self._on_traffic()
@@ -166,7 +167,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self._wait_for_room(deadline_s)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
-        """Return ``length`` bytes, or those that came before the deadline.
+        """Return up to ``length`` bytes, those received before the deadline.
 
         Raises:
             BusLost: the port is lost.
@@ -176,7 +177,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return self._gather(b"", length, deadline_s)
 
     def _gather(self, got: bytes, length: int, deadline_s: float) -> bytes:
-        """Read on until there are ``length`` bytes, or the deadline.
+        """Read until there are ``length`` bytes, or the deadline.
 
         Raises:
             BusLost: the port is lost.
@@ -191,19 +192,20 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
         """Clear the port, send a request and read until the deadline.
 
-        In every tick, so all that happens as a rule is in this one function.
+        It runs in every tick, so this one function contains the whole usual path.
 
         Returns:
-            ``length`` bytes, or those that came; when the request had been handed over.
+            ``length`` bytes, or those that arrived; the time at which the request was written,
+            seconds.
 
         Raises:
-            BusLost: the port is lost or takes nothing.
+            BusLost: the port is lost or accepts no bytes.
         """
         if self._on_traffic is not None:
             self._on_traffic()
         fd, sent, got = self._fd, 0, b""
         try:
-            # To ask costs a quarter of throwing away what as a rule is nothing.
+            # A poll takes a quarter of the time of a flush, which is rarely needed.
             if self._poll(0):
                 termios.tcflush(fd, termios.TCIFLUSH)
             sent = os.write(fd, request)
@@ -221,7 +223,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
                 if not got:
                     raise self._lost("it hung up")
         except BlockingIOError:
-            pass  # nothing after all
+            pass  # no bytes after all
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
         if len(got) < length:
@@ -229,7 +231,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return got, sent_s
 
     def drain(self) -> int:
-        """Throw away what arrives until nothing came for 3 ms; return the number of bytes.
+        """Discard bytes until none arrives for 3 ms; return their number.
 
         Raises:
             BusLost: the port is lost.
@@ -241,10 +243,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return dropped
 
     def _wait(self, deadline_s: float) -> bool:
-        """Sleep until a byte has arrived; False at the deadline."""
+        """Sleep until a byte arrives; return False at the deadline."""
         try:
             left_s = deadline_s - time.monotonic()
-            # poll() takes half as long as select(), but counts in whole milliseconds.
+            # poll() takes half as long as select(), but its unit is whole milliseconds.
             if left_s >= 0.001 and self._poll(int(1e3 * left_s)):
                 return True
             left_s = max(0.0, deadline_s - time.monotonic())
@@ -259,7 +261,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
         if not ready[1]:
-            raise self._lost("it takes no more bytes")
+            raise self._lost("it accepts no more bytes")
 
     def _take(self, length: int) -> bytes:
         try:
@@ -273,14 +275,14 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return data
 
     def _lost(self, reason: object) -> BusLost:
-        """Make the error; the SDK's busy flag is freed, so that a reopened port works."""
+        """Return the error and clear the SDK's busy flag, so that a reopened port works."""
         self.is_using = False
         return BusLost(f"{self.port_name} is gone ({reason}): check USB cable and servo power")
 
-    # --- what the SDK uses
+    # --- methods for the SDK
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open at a baud rate; False where the rate is not possible.
+        """Open at a baud rate; return False if the rate is not supported.
 
         Raises:
             PortError: absent, busy or not permitted.
@@ -304,7 +306,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self.ser = Serial(where, cflag_baud, timeout=0, exclusive=self._exclusive or None)
         except (SerialException, OSError) as error:
             raise PortError(explain(self.port_name, error.errno)) from error
-        except ValueError as error:  # pyserial: an adapter that does not do this rate
+        except ValueError as error:  # pyserial: the adapter does not support this rate
             raise PortError(
                 f"{self.port_name} cannot run at {cflag_baud} bit/s: choose 115200 or 1000000"
             ) from error
@@ -321,10 +323,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return True
 
     def _where(self) -> str:
-        """Return the path to open: a port that was open is found again by its adaptor's number.
+        """Return the path to open; a port that was open is found by its adaptor's serial number.
 
         Raises:
-            PortError: another adaptor has its name now.
+            PortError: another adaptor now has its name.
         """
         lasting, name = self._lasting, str(self.port_name)
         if lasting is None:
@@ -345,21 +347,21 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.is_open = self.is_using = False
 
     def clearPort(self) -> None:
-        """Throw away what has arrived."""
+        """Discard received bytes."""
         try:
             termios.tcflush(self._fd, termios.TCIFLUSH)
         except (OSError, ValueError, termios.error) as error:
             raise self._lost(error) from error
 
     def getBytesAvailable(self) -> int:
-        """Count the bytes that wait; none where the port is closed."""
+        """Return the number of received bytes; 0 if the port is closed."""
         try:
             return self.ser.in_waiting if self.ser is not None else 0
         except OSError as error:
             raise self._lost(error) from error
 
     def readPort(self, length: int) -> bytes:
-        """Return ``length`` bytes, or those that came before the packet's deadline."""
+        """Return ``length`` bytes, or those that arrived before the packet's deadline."""
         return self.read_until(length, self._deadline_s)
 
     def writePort(self, packet: bytes | list[int]) -> int:
@@ -389,10 +391,10 @@ def _closed(timeout_ms: int) -> object:
 
 
 def ask_low_latency(port: Any) -> None:
-    """Ask a USB adapter to hand over bytes after 1 ms instead of 16; other adapters ignore it."""
+    """Request a latency of 1 ms instead of 16 ms from a USB adapter; others ignore it."""
     try:
         port.set_low_latency_mode(True)
     except (ValueError, OSError):
-        # Only some drivers have the setting (a terminal answers ENOTTY); without it the
-        # bus works, only slower.
+        # Only some drivers have the setting (a terminal returns ENOTTY). Without it the bus works,
+        # but more slowly.
         return

@@ -1,4 +1,4 @@
-"""Reconnection of a port that was unplugged while in use."""
+"""Reconnection of a port that was unplugged in use."""
 
 from collections.abc import Callable
 
@@ -7,13 +7,13 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.serial.port import BusPort
 
 FIRST_S, LAST_S = 0.1, 1.0
-"""Time between attempts: doubled from the first to the last."""
+"""Interval of attempts: doubled from the first to the last value."""
 
 
 class Reconnect:
-    """The state of a port: open, or since when it is gone and when it is tried again.
+    """State of a port: open, or lost with the times of its loss and of the next attempt.
 
-    down: the port is gone
+    down: whether the port is lost
     """
 
     def __init__(self) -> None:
@@ -22,13 +22,13 @@ class Reconnect:
         self._wait_s = FIRST_S
 
     def lost(self, now_s: float) -> None:
-        """Record that the port went away."""
+        """Record that the port is lost."""
         self.down = True
         self._since_s, self._wait_s = now_s, FIRST_S
         self._next_s = now_s + FIRST_S
 
     def due(self, now_s: float) -> bool:
-        """Return whether to try now."""
+        """Return whether an attempt is due."""
         return now_s >= self._next_s
 
     def failed(self, now_s: float, longest_s: float = LAST_S) -> None:
@@ -37,28 +37,28 @@ class Reconnect:
         self._next_s = now_s + self._wait_s
 
     def back(self, now_s: float) -> float:
-        """Record that the port is open again; return for how long it had been gone."""
+        """Record that the port is open again; return the time for which it was lost, seconds."""
         self.down = False
         return now_s - self._since_s
 
     def gone_for_s(self, now_s: float) -> float:
-        """Return for how long the port has been gone."""
+        """Return the time for which the port has been lost, seconds."""
         return now_s - self._since_s if self.down else 0.0
 
 
 class ReconnectingPort:
-    """Reopens the port of one bus after it was unplugged.
+    """A port that is reopened after it was unplugged.
 
     Args:
-        port: opened once already.
-        baud: bit/s to open it with.
-        give_up_s: longest absence, seconds.
-        log: gets the events of loss and return.
-        on_reconnect: called when it is open again: every servo must be checked.
+        port: Port, opened once already.
+        baud: Baud rate, bit/s.
+        give_up_s: Longest loss, seconds.
+        log: Records loss and reconnection.
+        on_reconnect: Called when it is open again: every servo must be checked.
 
-    down: the port is gone
-    release_due: torque must be switched off first as soon as the port is open; set
-        and cleared by the bus
+    down: whether the port is lost
+    release_due: whether torque must be switched off as soon as the port is open; set and cleared by
+        the bus
     """
 
     def __init__(
@@ -75,17 +75,17 @@ class ReconnectingPort:
         self.down = self.release_due = False
 
     def lose(self, lost: BusLost, now_s: float) -> None:
-        """Record that the port is gone."""
+        """Record that the port is lost."""
         self._link.lost(now_s)
         self.down = True
         self._port.closePort()
         self._log.add(f"port lost: {lost}")
 
     def returned(self, now_s: float) -> bool:
-        """Try to open the port again where that is due; return whether it is open.
+        """Try to open the port if an attempt is due; return whether it is open.
 
         Raises:
-            BusLost: it has been gone for longer than ``give_up_s``.
+            BusLost: it has been lost for longer than ``give_up_s``.
         """
         gone_s = self._link.gone_for_s(now_s)
         if self._link.due(now_s):
@@ -103,17 +103,17 @@ class ReconnectingPort:
         return False
 
     def refused_release(self) -> None:
-        """Record that torque could not be switched off: it is when the port is back."""
+        """Record that torque could not be switched off; it is after the port reconnects."""
         self.release_due = True
 
     def released(self) -> None:
         """Record that torque was switched off on every servo that answers."""
         if self.release_due:
-            self._log.add("torque switched off, as was asked for while the port was gone")
+            self._log.add("torque switched off, as requested while the port was gone")
         self.release_due = False
 
     def open_once_more(self, now_s: float) -> bool:
-        """Try to open the port now, whether it is due or not; return whether it is open."""
+        """Try to open the port now, even if no attempt is due; return whether it is open."""
         if not self._open():
             return False
         self._link.back(now_s)
