@@ -193,7 +193,7 @@ class Clothing(NamedTuple):
 
     colours: roots of the shares of 24 bins of colour; the inner product of two is their
         Bhattacharyya coefficient, 1 where they are the same
-    share: of the place that counts, how much of it is seen, 0..1
+    share: visible share of the measured area, 0..1
     """
 
     colours: tuple[float, ...]
@@ -201,9 +201,9 @@ class Clothing(NamedTuple):
 
 
 class FaceSigns(NamedTuple):
-    """What eyes and mouth of a face do, at an adult's size.
+    """State of the eyes and mouth of a face, at an adult's size.
 
-    eye_opening: of the lids, over the usual opening, 0 is shut; None where lids are not seen
+    eye_opening: opening of the lids over the usual opening, 0 is shut; None if lids are not visible
     mouth_opening_m: gap between the lips
     """
 
@@ -212,35 +212,35 @@ class FaceSigns(NamedTuple):
 
 
 class DetectionInCamera(NamedTuple):
-    """One detection with its place in the camera's axes (x right, y down, z forward).
+    """One detection with its position in the camera's axes (x right, y down, z forward).
 
-    All of it follows from the image and the calibration alone.
+    All fields depend only on the image and the calibration.
 
-    R_camera_face: axes of a face, None of anything else
+    R_camera_face: axes of a face, otherwise None
     confidence: 0..1
-    face_length: of a face, in lengths of the canonical one
-    depth_measured: whether the distance was measured by the camera; else a face's is from
-        its size and a thing's is assumed
-    across_sd_m, along_sd_m: standard deviations of the place, across and along the view
-    v_camera_m_s: velocity over ground, None where only the place is known;
-        across_sd_m_s, along_sd_m_s: its standard deviations
-    size_depth: of a face, its distance if it were of an adult's size, over the distance
-        measured; None where the camera measured none
-    mark: the detector's own number of it, None where it gives none
+    face_length: length of a face, in lengths of the canonical one
+    depth_measured: whether the camera measured the distance; otherwise a face's is from its size
+        and a thing's is assumed
+    across_sd_m, along_sd_m: standard deviations of the position, across and along the view
+    v_camera_m_s: velocity over ground, None if only the position is known; across_sd_m_s,
+        along_sd_m_s: its standard deviations
+    size_depth: of a face, ratio of its distance at an adult's size to the measured distance; None
+        if the camera measured none
+    mark: the detector's own id, None if it has none
     turn_sd_rad: of a face, standard deviation of its turn
-    gaze_camera: of a face, unit vector along which the eyes look, None where it is unknown
-    fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part, None where
-        they are not known
-    signs: of a face, what eyes and mouth do, None where they are not found
-    upper_m: of what moves and is upright, place of its upper end, where a person's head is
-    compact: of what moves, whether its patch is about as wide as high and full, as a fist's or a
-        hand's alone is and an arm's is not
-    thickness_m: of what moves, diameter of the largest disc within its patch, as far away as its
-        place; from_side: the patch goes on beyond the left or right edge of the image
-    clothing: of a person, colours of the clothes, None where they are not seen
-    box_m: of a face, size of its box as far away as its place, the root of its area
-    lower_face: of a face, width of the mouth over the distance of the eyes, times the part of the
-        way from the eyes to the mouth at which the nose is; 0 of anything else
+    gaze_camera: of a face, unit vector along which the eyes look, None if unknown
+    fastest_m, fastest_m_s: of a moving thing, position and velocity of its fastest part, None if
+        unknown
+    signs: of a face, state of eyes and mouth, None if they are not found
+    upper_m: of an upright moving thing, position of its upper end, at a person's head
+    compact: of a moving thing, whether its patch is solid and about as wide as high, as a fist's or
+        a hand's is and an arm's is not
+    thickness_m: of a moving thing, diameter of the largest disc within its patch, at its distance;
+        from_side: the patch extends beyond the left or right edge of the image
+    clothing: of a person, colours of the clothes, None if they are not visible
+    box_m: of a face, size of its box at its distance, the root of its area
+    lower_face: of a face, width of the mouth over the distance of the eyes, times the position of
+        the nose between eyes and mouth as a share; otherwise 0
     """
 
     kind: str
@@ -273,10 +273,11 @@ class DetectionInCamera(NamedTuple):
 
 
 class LocatedFrame(NamedTuple):
-    """What one image shows, located in the camera's axes by one calibration.
+    """Contents of one image, located in the camera's axes by one calibration.
 
-    intrinsics: the calibration; things: what moves, with a place
-    faces: behind those seen, the heads of people whose face is not; they have no ``R_camera_face``
+    intrinsics: the calibration; things: moving things with a position
+    faces: visible faces, then heads of people without a visible face, which have no
+        ``R_camera_face``
     palms: of the nearest person, None in a frame that was not searched for them
     """
 

@@ -1,1 +1,1 @@
-"""Files of users: read with limits, written whole or not at all, films and MCAP."""
+"""Files of users: limited reads, atomic writes, films and MCAP."""

@@ -1,4 +1,4 @@
-"""Reading files that a user named: regular files only, and never more than is wanted.
+"""Reading files named by a user: only regular files, and never more than a limit.
 
 A named pipe would block, a device has no end, and opening a serial port toggles its control lines.
 """
@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import BinaryIO
 
 _FLAGS = os.O_RDONLY
-for _name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):  # the last is Windows'
+for _name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):  # the last exists only on Windows
     _FLAGS |= getattr(os, _name, 0)
 
 
 class NotRegularFile(OSError):
-    """A path leads to a pipe, a device or a socket."""
+    """A path is a pipe, a device or a socket."""
 
 
 class FileTooLarge(OSError):
-    """A file holds more than its kind may."""
+    """A file is larger than its kind may be."""
 
 
 _KINDS = {
@@ -30,7 +30,7 @@ _KINDS = {
 
 
 def kind_of(found: os.stat_result) -> str:
-    """Return what is at a path that is neither a file nor a folder: "a named pipe"."""
+    """Return the kind of a path that is neither a file nor a folder, e.g. "a named pipe"."""
     return _KINDS.get(stat.S_IFMT(found.st_mode), "no file")
 
 
@@ -58,11 +58,11 @@ def read_limited(path: Path | str, largest: int) -> bytes:
     """Return the content of a regular file of at most ``largest`` bytes.
 
     Raises:
-        FileTooLarge: it holds more.
+        FileTooLarge: it is larger.
         OSError: see ``open_regular``.
     """
     with open_regular(path) as file:
-        # Files of /proc have size 0 and any content, so the size alone is no bound.
+        # Files in /proc have size 0 and any content, so the size alone is not a limit.
         content = file.read(largest + 1) if os.fstat(file.fileno()).st_size <= largest else b""
         if len(content) > largest or os.fstat(file.fileno()).st_size > largest:
             what = f"is larger than the {largest / 1e6:g} MB that such a file may have"

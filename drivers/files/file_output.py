@@ -1,8 +1,8 @@
-"""Writing files that a user named: nothing that is there is lost, whatever goes wrong.
+"""Writing files named by a user, without loss of existing data after any error.
 
-A file appears whole or not at all: it is written beside its place and then takes it in one
-step. One that already exists is kept unless the user forces it. Named pipes and devices are
-refused: opening a pipe without a reader waits forever, and a full device takes nothing.
+Writes are atomic: a file is written in the same folder and then renamed. An existing file is kept
+unless the user forces it. Named pipes and devices are refused: opening a pipe without a reader
+waits forever, and a full device accepts nothing.
 """
 
 import contextlib
@@ -21,13 +21,13 @@ _OWN_OUTPUT = ("/dev/fd/", "/proc/self/fd/")
 
 
 def refuse_existing(*paths: Path, force: bool = False) -> None:
-    """Refuse before any work what could not be written in the end.
+    """Check before any work that files can be written in the end.
 
-    The program's own output (``/dev/stdout``, ``/dev/fd/3``) and ``/dev/null`` hold nothing that
-    could be lost, and pass.
+    The program's own output (``/dev/stdout``, ``/dev/fd/3``) and ``/dev/null`` are accepted, as
+    they contain no data that could be lost.
 
     Raises:
-        SetupError: a file is there and not forced; or the path is a directory, a named pipe, a
+        SetupError: a file exists and is not forced; or the path is a directory, a named pipe, a
             device or a socket, or its folder is not writable.
     """
     for path in paths:
@@ -50,15 +50,14 @@ def refuse_existing(*paths: Path, force: bool = False) -> None:
 
 @contextlib.contextmanager
 def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
-    """Return a file to write to, which takes its place only when all of it is on the disk.
+    """Yield a file to write to, which replaces the path only once it is completely on the disk.
 
     Args:
-        path: the file wanted; the program's own output is written to directly.
-        force: Replace a file that is there; else it is refused.
+        path: Path of the file; the program's own output is written to directly.
+        force: Whether to replace an existing file; otherwise it is refused.
 
     Raises:
-        SetupError: it already exists, or cannot be written; what was there is
-            as it was.
+        SetupError: it already exists or cannot be written; an existing file is unchanged.
     """
     refuse_existing(path, force=force)
     with _clear(path):
@@ -80,7 +79,7 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
 
 @contextlib.contextmanager
 def output_text(path: Path, force: bool = False) -> Iterator[TextIO]:
-    """Return a text file to write to, UTF-8 and with the line ends as written.
+    """Yield a text file to write to, in UTF-8 and with line ends as written.
 
     Raises:
         SetupError: see ``output_file``.
@@ -92,7 +91,7 @@ def output_text(path: Path, force: bool = False) -> Iterator[TextIO]:
             text.flush()
         finally:
             with contextlib.suppress(OSError, ValueError):
-                text.detach()  # ``output_file`` closes what lies below
+                text.detach()  # ``output_file`` closes the underlying file
 
 
 def write_file(path: Path, content: str | bytes, force: bool = False) -> None:
@@ -106,24 +105,24 @@ def write_file(path: Path, content: str | bytes, force: bool = False) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, with those above it, where it is not there.
+    """Create a folder and its parents if they do not exist.
 
     Raises:
-        SetupError: it cannot be made.
+        SetupError: it cannot be created.
     """
     with _clear(path):
         path.mkdir(parents=True, exist_ok=True)
 
 
 def _put_in_place(fresh: Path, target: Path, path: Path, force: bool) -> None:
-    """Let a finished file take its place."""
+    """Move a finished file to its path."""
     if target.exists():
         shutil.copymode(target, fresh)
     if force:
         os.replace(fresh, target)
         return
     try:
-        os.link(fresh, target)  # unlike a replace, never over a file made meanwhile
+        os.link(fresh, target)  # unlike a rename, it never replaces a file created meanwhile
     except FileExistsError:
         raise SetupError(_there(path)) from None
     except OSError:  # a file system without links
@@ -137,7 +136,7 @@ def _there(path: Path) -> str:
 
 
 def _is_own_output(path: Path) -> bool:
-    """Whether a path is an open pipe or terminal of this program, or the null device."""
+    """Return whether a path is an open pipe or terminal of this program, or the null device."""
     whole = os.path.abspath(path)
     own = whole in ("/dev/stdout", "/dev/stderr") or whole.startswith(_OWN_OUTPUT)
     return whole == os.devnull or (own and path.exists() and not (path.is_file() or path.is_dir()))
@@ -145,7 +144,7 @@ def _is_own_output(path: Path) -> bool:
 
 @contextlib.contextmanager
 def _clear(path: Path) -> Iterator[None]:
-    """Turn what the disk refuses into an error of one line."""
+    """Convert errors of the disk into a SetupError of one line."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Films for browsers: WebM with VP8, which every browser of today plays."""
+"""Films for browsers: WebM with VP8, which all current browsers play."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -18,12 +18,12 @@ _OPTIONS = "OPENCV_FFMPEG_WRITER_OPTIONS"
 def film_writer(
     path: Path, size_px: tuple[int, int], rate_hz: float
 ) -> Iterator[Callable[[ImageArray], None]]:
-    """Return what writes BGR pictures to a film, one after the other.
+    """Yield a function that appends BGR pictures to a film.
 
     Args:
-        path: of the film, ending in .webm; a file that is there is written over.
-        size_px: width and height of all pictures.
-        rate_hz: pictures a second.
+        path: Path of the film, ending in .webm; an existing file is overwritten.
+        size_px: Width and height of all pictures.
+        rate_hz: Pictures per second.
 
     Raises:
         SetupError: OpenCV cannot write such a film here.
@@ -48,7 +48,7 @@ def film_writer(
 
 
 def film_seconds(path: Path | str) -> float:
-    """Return how long a film lasts.
+    """Return the duration of a film, seconds.
 
     Raises:
         SetupError: it cannot be read.
@@ -65,7 +65,7 @@ def film_seconds(path: Path | str) -> float:
 
 @contextmanager
 def _without_stderr() -> Iterator[None]:
-    """Drop what native code prints: OpenCV says that WebM does not know VP8, its own codec."""
+    """Suppress messages of native code: OpenCV claims that WebM does not support its codec VP8."""
     kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nothing, 2)

@@ -1,4 +1,4 @@
-"""Opening a file that should be an MCAP recording, of a camera or of a run."""
+"""Opening of MCAP recordings, of a camera or of a run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,15 +9,16 @@ MAGIC = b"\x89MCAP0\r\n"
 
 
 def open_mcap(path: Path, failed: Callable[[str], Exception], cure: str) -> BinaryIO:
-    """Open a file that begins as MCAP files do, at the first byte after that.
+    """Open an MCAP file, at the first byte after its magic bytes.
 
     Args:
-        path: of the file.
-        failed: makes the error from its line.
-        cure: what to do where the file is no recording.
+        path: Path of the file.
+        failed: Creates the error from its message.
+        cure: Remedy if the file is no recording.
 
     Raises:
-        Exception: what ``failed`` made: it is absent, no file, not readable or no recording.
+        Exception: created by ``failed``: the file is absent, no regular file, not readable or no
+            recording.
     """
     if not path.exists():
         raise failed(f"no recording at {path}: check the path")

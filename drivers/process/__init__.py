@@ -1,1 +1,1 @@
-"""Other processes and threads: start and end, messages, calls with a time limit."""
+"""Child processes and threads: start and end, messages, calls with a time limit."""

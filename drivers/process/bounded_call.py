@@ -1,4 +1,4 @@
-"""Calls that must not hold up the control loop: made in another thread, waited for briefly."""
+"""Calls that must not block the control loop: they run in a thread and are awaited briefly."""
 
 import contextlib
 import ctypes
@@ -11,36 +11,36 @@ from typing import Any, NamedTuple, Protocol
 from gazerig.drivers.plugins import failure
 
 _FIRST_END_S, _NEXT_END_S, _LONGEST_END_S = 0.2, 0.05, 2.0
-"""A call that was given up is ended after the first; then again, at an interval that doubles."""
+"""An abandoned call is ended after the first time; then again, at an interval that doubles."""
 
 FIRST_LINE_S, _LONGEST_SILENCE_S = 1.0, 60.0
-"""A call that lasts is reported after the first; then again, at an interval that doubles."""
+"""A call that lasts is reported after the first time; then again, at an interval that doubles."""
 
 
 class CallEnded(SystemExit):
-    """Ends a call that was given up; raised in its thread, which then ends without a word."""
+    """Exception that ends an abandoned call; raised in its thread, which then ends silently."""
 
 
 class Lasting(Protocol):
-    """What may hold a thread for longer than it should."""
+    """A source of calls that may block a thread for too long."""
 
     def lasts(self) -> tuple[float, str] | None:
-        """Return for how long it has done so [s] and what to say of it; None: it does not."""
+        """Return the time for which a call lasts [s] and a message; None if no call lasts."""
         ...
 
 
 LASTING: set[Lasting] = set()
-"""Everything in this program that may hold a thread for too long."""
+"""All objects of this program whose calls may block a thread for too long."""
 
 
 class LastingReport:
-    """What there is to say of ``LASTING``: again and again, ever more seldom."""
+    """Report about ``LASTING``, repeated at increasing intervals."""
 
     def __init__(self) -> None:
         self._due_s: dict[Lasting, float] = {}
 
     def lines(self) -> tuple[str, ...]:
-        """Return what is due now."""
+        """Return the lines that are due."""
         lasting = _lasting()
         self._due_s = {one: self._due_s.get(one, FIRST_LINE_S) for one, _, _ in lasting}
         due = [found for found in lasting if found[1] >= self._due_s[found[0]]]
@@ -50,7 +50,7 @@ class LastingReport:
 
 
 def lasting_text() -> str:
-    """Return what lasts too long now, "" where nothing does."""
+    """Return the calls that last too long as text, "" for none."""
     return "; ".join([text for _, for_s, text in _lasting() if for_s >= FIRST_LINE_S])
 
 
@@ -60,10 +60,10 @@ def _lasting() -> list[tuple[Lasting, float, str]]:
 
 
 class CallResult(NamedTuple):
-    """What came of a call.
+    """Result of a call.
 
-    error: what it raised, in words as ``why``; took_s: how long it ran, without the time until
-    it was begun, which is the machine's
+    error: exception that it raised, as text in ``why``; took_s: run time in seconds, without the
+        wait for its start
     """
 
     value: Any = None
@@ -73,7 +73,7 @@ class CallResult(NamedTuple):
 
 
 class _Call:
-    """One call; ``done`` is released at its end."""
+    """A call; ``done`` is released at its end."""
 
     def __init__(self, work: Callable[[], Any]) -> None:
         self._work = work
@@ -89,15 +89,15 @@ class _Call:
 
 
 class BoundedCall:
-    """Makes one call after another in a thread of its own.
+    """Calls made one after another in a separate thread, with a time limit.
 
-    A call that is not done in time goes on; its outcome is the next one asked for, and no other
-    call is begun before. The thread ends with the program, or after ``close``.
+    A call that exceeds its limit continues; the next request returns its result, and no other call
+    begins before. The thread ends with the program, or after ``close``.
 
     Args:
-        name: of what is called, for messages.
-        longest_s: a call is waited for so long, real seconds; None: it is made in the caller's
-            thread and waited for to its end, for simulated time, in which nothing is late.
+        name: Name of the called object in messages.
+        longest_s: Longest wait for a call, real seconds. None: the call runs in the caller's thread
+            to its end, for simulated time, in which nothing is late.
     """
 
     def __init__(self, name: str, longest_s: float | None) -> None:
@@ -111,16 +111,16 @@ class BoundedCall:
         self._closed_s: float | None = None
 
     def running_s(self) -> float:
-        """Return for how long the present call has been running, 0 where none is."""
+        """Return the run time of the present call, seconds; 0 without one."""
         begun_s = self._begun_s
         return 0.0 if begun_s is None else perf_counter() - begun_s
 
     def waiting(self) -> int:
-        """Return how many calls wait behind the present one."""
+        """Return the number of calls that wait for the present one."""
         return self._calls.qsize()
 
     def __call__(self, work: Callable[[], Any]) -> CallResult | None:
-        """Make a call; return its outcome or that of the late one before, None while it lasts."""
+        """Make a call; return its result or that of the late one before, None while that lasts."""
         if self._longest_s is None:
             return _outcome(work, (Exception, SystemExit))
         if self._late is not None:
@@ -128,14 +128,14 @@ class BoundedCall:
         return self._waited_for(self._begun(work), self._longest_s)
 
     def begin(self, work: Callable[[], Any]) -> None:
-        """Make a call after all those before, and do not ask what comes of it; never waits."""
-        with contextlib.suppress(RuntimeError):  # no memory for a thread: the next one tries again
+        """Make a call after all earlier ones and ignore its result; never wait."""
+        with contextlib.suppress(RuntimeError):  # no memory for a thread: the next call tries again
             self._begun(work)
 
     def in_turn(self, work: Callable[[], Any], longest_s: float) -> CallResult | None:
-        """Make a call after the late one before, whose outcome is forgotten; None while one lasts.
+        """Make a call after the late one before, whose result is discarded; None while one lasts.
 
-        longest_s: each is waited for so long
+        longest_s: longest wait for each, seconds
         """
         if self._longest_s is None:
             return self(work)
@@ -144,7 +144,7 @@ class BoundedCall:
         return self._waited_for(self._begun(work), longest_s)
 
     def idle(self, longest_s: float) -> bool:
-        """Wait until all calls so far are made, for so long [s] at most; return whether so."""
+        """Wait until all calls are done, at most ``longest_s`` [s]; return whether they are."""
         return self._late is None or self._waited_for(self._begun(_nothing), longest_s) is not None
 
     def _begun(self, work: Callable[[], Any]) -> _Call:
@@ -165,10 +165,10 @@ class BoundedCall:
         return call.outcome
 
     def close(self) -> None:
-        """Let the thread end; a call that lasts is ended, and not waited for. No other is begun.
+        """End the thread; a call that lasts is ended without waiting, and no other begins.
 
-        Python code that computes ends by a ``CallEnded``, raised again while something catches
-        it. What waits outside Python cannot be ended: it is in ``LASTING`` as long as it lasts.
+        Running Python code ends with a ``CallEnded``, raised again if it is caught. A wait outside
+        Python cannot be ended: it is in ``LASTING`` while it lasts.
         """
         thread, self._thread = self._thread, None
         if thread is None:
@@ -185,19 +185,19 @@ class BoundedCall:
             ending.start()
 
     def lasts(self) -> tuple[float, str]:
-        """Return for how long [s] a call has been running on since it was given up."""
+        """Return the time [s] for which an abandoned call has been running, and a message."""
         for_s = perf_counter() - (self._closed_s or 0.0)
         return for_s, (
             f"{self._name} was given up {for_s:.0f} s ago and does not end: it may slow the loop "
-            "as long as this program runs"
+            "while this program runs"
         )
 
     def _end(self, thread: threading.Thread) -> None:
-        """End the thread, however often that takes."""
+        """End the thread, with as many attempts as needed."""
         thread.join(_FIRST_END_S)
         wait_s = _NEXT_END_S
         while thread.is_alive():
-            # Never after it has left: another thread may have its number by then.
+            # Never after the thread has ended: another one may have its number.
             with self._leaving:
                 if not self._left:
                     _raise_in(thread)
@@ -217,11 +217,11 @@ class BoundedCall:
 
 
 def _nothing() -> None:
-    """Do nothing, when all calls before it are made."""
+    """Do nothing; used to wait for all earlier calls."""
 
 
 def _raise_in(thread: threading.Thread) -> None:
-    """Raise ``CallEnded`` in a thread, once it is back in Python code."""
+    """Raise ``CallEnded`` in a thread once it runs Python code again."""
     if thread.ident is not None:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(
             ctypes.c_ulong(thread.ident), ctypes.py_object(CallEnded)
@@ -233,8 +233,8 @@ def _outcome(
 ) -> CallResult:
     try:
         return CallResult(work())
-    except caught as error:  # a package may do anything
+    except caught as error:  # a package may raise anything
         try:
             return CallResult(None, error, why=failure(error))
-        except Exception:  # nor can it say what
+        except Exception:  # even str() of its error may fail
             return CallResult(None, error, why=type(error).__name__)

@@ -1,11 +1,10 @@
-"""The one way in which this program starts a process of its own code.
+"""Start of child processes that run modules of this package.
 
-A child runs a module of this package with the same interpreter. It finds no module in the
-working folder (``-P``), is in a session of its own, as Ctrl-C in the terminal is for the program,
-which ends its children in order, and does its numerics in one thread beside the control loop's.
-A child ends when its end of a pipe or socket says so; its parent waits for it or kills it.
-The camera's process alone is started by ``multiprocessing`` (drivers/camera/process.py), as
-frames go through memory that both share.
+A child runs with the same interpreter. It imports no module from the working folder (``-P``). It
+has its own session, as Ctrl-C in the terminal is for the program, which ends its children in order.
+Its numerics run in one thread, to leave the control loop's core free. A child ends when its pipe or
+socket is closed; its parent waits for it or kills it. Only the camera's process is started by
+``multiprocessing`` (drivers/camera/process.py), as it passes frames through shared memory.
 """
 
 import os
@@ -34,14 +33,14 @@ def start(
     """Start a module of this package as a process.
 
     Args:
-        module: full name; it is run as ``python -m`` does.
-        arguments: its command line.
-        stdin: PIPE to write to it, DEVNULL.
-        stdout: PIPE to read from it, DEVNULL.
-        stderr: a file descriptor; None: this process's.
-        pass_fds: file descriptors that it inherits under their numbers.
-        variables: added to its environment.
-        bufsize: of the pipes, as ``subprocess.Popen`` has it.
+        module: Full name; it is run as with ``python -m``.
+        arguments: Its command line.
+        stdin: PIPE to write to it, or DEVNULL.
+        stdout: PIPE to read from it, or DEVNULL.
+        stderr: A file descriptor; None for this process's.
+        pass_fds: File descriptors that it inherits with the same numbers.
+        variables: Additions to its environment.
+        bufsize: Buffer size of the pipes, as for ``subprocess.Popen``.
 
     Raises:
         OSError: it cannot be started.
@@ -62,9 +61,9 @@ def run(module: str, given: bytes, timeout_s: float) -> subprocess.CompletedProc
     """Run a module of this package to its end.
 
     Args:
-        module: full name.
-        given: its standard input.
-        timeout_s: it is killed when it takes longer.
+        module: Full name.
+        given: Its standard input.
+        timeout_s: Time after which it is killed, seconds.
 
     Raises:
         OSError: it cannot be started.
@@ -82,7 +81,7 @@ def run(module: str, given: bytes, timeout_s: float) -> subprocess.CompletedProc
 
 
 def is_suspended(pid: int) -> bool:
-    """Return whether a process was suspended (SIGSTOP); False where the system does not tell."""
+    """Return whether a process is suspended (SIGSTOP); False if the system does not report it."""
     try:
         with open(f"/proc/{pid}/stat", "rb") as file:
             return file.read().rpartition(b")")[2].split()[0] == b"T"
@@ -100,11 +99,10 @@ def _environment(variables: Mapping[str, str]) -> dict[str, str]:
 
 @contextmanager
 def hidden_script() -> Iterator[None]:
-    """Have processes that multiprocessing starts meanwhile not run the program's script again.
+    """Prevent processes that multiprocessing starts meanwhile from running the script again.
 
-    Such a process imports the script it was started from, in case something of it is needed; a
-    script that opens a head, and not below ``if __name__ == "__main__"``, would open another one
-    there.
+    Such a process imports the program's script, in case its names are needed. A script that opens a
+    head outside ``if __name__ == "__main__"`` would open a second one there.
     """
     with _HIDING:
         script = sys.modules["__main__"]

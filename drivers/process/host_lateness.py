@@ -1,25 +1,25 @@
-"""Whether this computer is late, or the bus. Pure.
+"""Detection of delays of this computer, as opposed to the bus; pure.
 
-A busy computer looks like bad plugs: answers arrive after waiting for them has ended, and
-servos whose own watchdog was not fed stop. Answers that arrive whole but late distinguish it
-from a silent servo.
+The symptoms of a busy computer resemble bad plugs: answers arrive after their time-outs, and servos
+whose watchdog was not fed stop. Answers that are intact but late distinguish it from a silent
+servo.
 """
 
 from collections import deque
 from math import inf
 
 WITHIN_S = 1.0
-"""Answers late within such a time are counted."""
+"""Time within which late answers are counted."""
 
 BUSY = 3
-"""So many late answers within that time are no accident."""
+"""Number of late answers within that time that is no accident."""
 
 SILENCE_S = 0.25
-"""Where no servo at all answers, that is worth a line from so long on."""
+"""Silence of all servos after which a line is logged."""
 
 BLAME_S = 1.5
-"""Plugs and power are blamed for such a silence only while it lasts longer than this: before,
-a computer that stood still looks the same. Its late answers tell afterwards."""
+"""Silence after which plugs and power are blamed: a shorter one looks the same as a stalled
+computer, which late answers identify afterwards."""
 
 STOOD_STILL = (
     "this computer was busy, or the emulator stood still: for {:.1f} s no answer came, then "
@@ -28,17 +28,16 @@ STOOD_STILL = (
 
 
 LATE_COMPUTER = "late computer"
-"""Kind of what servos did because this computer was late; it is no fault of theirs."""
+"""Kind of events that servos had because this computer was late, not through a fault of theirs."""
 
 AFTERMATH_S = 2.0
-"""What servos do within such a time of a late computer is put down to it."""
+"""Time after a delay of the computer during which it is the cause of events of servos."""
 
 
 class HostLateness:
-    """Records how this computer was late.
+    """Record of delays of this computer.
 
-    Counts answers that came after waiting for them had ended, and remembers the last time at
-    which it sent nothing for long.
+    It counts answers that arrive after their time-outs, and stores the last long pause in sending.
     """
 
     def __init__(self) -> None:
@@ -47,22 +46,22 @@ class HostLateness:
         self._last_s = -inf
 
     def late_answer(self, at_s: float) -> None:
-        """Record that an answer has come late."""
+        """Record a late answer."""
         self._late.append(at_s)
         self._last_s = at_s
 
     def any_since(self, begin_s: float) -> bool:
-        """Return whether an answer came late since then, noise beside it or not."""
+        """Return whether an answer was late since ``begin_s``, with or without noise."""
         return self._last_s >= begin_s
 
     def own_silence(self, silent_s: float, until_s: float) -> None:
-        """Record that this computer has sent nothing for so long."""
+        """Record that this computer has sent nothing for ``silent_s`` seconds."""
         if until_s - self._silent_until_s >= AFTERMATH_S or silent_s > self._silent_s:
             self._silent_s = silent_s
         self._silent_until_s = until_s
 
     def cause(self, now_s: float) -> str:
-        """Return how this computer was late a moment ago, "" where it was not."""
+        """Return the recent delay of this computer as text, "" for none."""
         if now_s - self._silent_until_s < AFTERMATH_S:
             return f"this computer was late: it sent nothing for {self._silent_s:.2f} s"
         if self.any_since(now_s - AFTERMATH_S):
@@ -74,7 +73,7 @@ class HostLateness:
         self._late.clear()
 
     def busy(self, now_s: float) -> int:
-        """Return how many answers came late within the last second; 0 where they are few."""
+        """Return the number of late answers within the last second; 0 if they are few."""
         late = self._late
         while late and late[0] < now_s - WITHIN_S:
             late.popleft()

@@ -1,8 +1,8 @@
-"""Whole messages between this program and a child process, in both directions.
+"""Messages between this program and a child process, in both directions.
 
-On Linux a pair of sockets that keep messages apart, which the child inherits. Elsewhere a
-connection over the loopback: the child shows a token first, and each message has its length
-before it. Both ends are used as a socket is.
+On Linux the link is a pair of message-preserving sockets, one of which the child inherits.
+Elsewhere it is a connection over the loopback interface: the child sends a token first, and each
+message is preceded by its length. Both ends are used like a socket.
 """
 
 import contextlib
@@ -16,25 +16,25 @@ from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 HAS_PAIRS = hasattr(socket, "AF_UNIX") and hasattr(socket, "SOCK_SEQPACKET")
-"""Whether this system has sockets that keep messages apart, and passes them on: Linux."""
+"""Whether this system has message-preserving sockets that a child can inherit: Linux."""
 DONT_WAIT: int = getattr(socket, "MSG_DONTWAIT", 0x40)
 TOKEN_VARIABLE = "GAZERIG_LINK_TOKEN"
-"""Of the child's environment: what it has to show."""
+"""Environment variable with the child's token."""
 
 _LOOPBACK = "127.0.0.1"
 _TOKEN_BYTES = 32
 _LENGTH_BYTES = 4
 _MOST_BYTES = 1 << 23
-"""Waiting to be sent; what would be more is refused, as a full socket does."""
+"""Largest number of bytes waiting to be sent; more are refused, as by a full socket."""
 _COMES_WITHIN_S = 60.0
 _LOOK_S = 0.25
 
 
 class MessageLink(Protocol):
-    """One end of a link: a socket, or what does as one does."""
+    """One end of a link: a socket, or an object with the same methods."""
 
     def fileno(self) -> int:
-        """Return the file descriptor to wait on; it may change until the other end is there."""
+        """Return the file descriptor to wait on; it may change until the other end is connected."""
         ...
 
     def setblocking(self, flag: bool, /) -> None:
@@ -45,20 +45,20 @@ class MessageLink(Protocol):
         """Send one message.
 
         Raises:
-            OSError: it is gone, or BlockingIOError: it is full.
+            OSError: the link is closed; BlockingIOError if it is full.
         """
         ...
 
     def recv(self, bufsize: int, flags: int = 0, /) -> bytes:
-        """Return one message, b"" where the other end is gone.
+        """Return one message, b"" if the other end is closed.
 
         Raises:
-            OSError: it was closed, or BlockingIOError: there is none yet.
+            OSError: the link is closed; BlockingIOError if there is no message yet.
         """
         ...
 
     def shutdown(self, how: int, /) -> None:
-        """Wake who waits."""
+        """Wake all waiting threads."""
         ...
 
     def close(self) -> None:
@@ -67,12 +67,12 @@ class MessageLink(Protocol):
 
 
 class LinkOffer(NamedTuple):
-    """Some links for a child that is to be started.
+    """Links for a child that will be started.
 
-    ours: this program's ends
-    words: what the child opens its ends by, on its command line
-    fds: that it must inherit; variables: of its environment
-    theirs: to be closed here once it has been started
+    ours: ends of this program
+    words: command line arguments with which the child opens its ends
+    fds: file descriptors that it must inherit; variables: additions to its environment
+    theirs: sockets to close here once it has started
     """
 
     ours: tuple[MessageLink, ...]
@@ -83,10 +83,10 @@ class LinkOffer(NamedTuple):
 
 
 def offer(count: int) -> LinkOffer:
-    """Return new links for a child.
+    """Create links for a child.
 
     Raises:
-        OSError: there are no more sockets.
+        OSError: no more sockets are available.
     """
     if HAS_PAIRS:
         pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(count)]
@@ -100,10 +100,10 @@ def offer(count: int) -> LinkOffer:
 
 
 def open_link(word: str, token: str = "") -> MessageLink:
-    """Open a child's end.
+    """Open the child's end.
 
     Raises:
-        OSError: the other end is gone.
+        OSError: the other end is closed.
     """
     kind, _, port = word.rpartition(":")
     if not kind:
@@ -114,7 +114,7 @@ def open_link(word: str, token: str = "") -> MessageLink:
 
 
 def wait_readable(link: MessageLink) -> None:
-    """Wait until a message, the end or a caller has come."""
+    """Wait until a message, the end of the link or a caller arrives."""
     if isinstance(link, LoopbackLink):
         link.wait()
         return
@@ -124,14 +124,14 @@ def wait_readable(link: MessageLink) -> None:
 
 
 class LoopbackLink:
-    """One end of a connection over the loopback.
+    """One end of a connection over the loopback interface.
 
-    What is sent is handed to a thread, so that nobody waits for the other end.
+    A thread sends the messages, so that no caller waits for the other end.
 
     Args:
-        end: the connection; None: it comes by the listener.
-        listener: takes it, from whoever shows the token.
-        token: what the other end must show.
+        end: Connection; None: it is accepted by the listener.
+        listener: Accepts the connection that sends the token.
+        token: Token that the other end must send.
     """
 
     def __init__(
@@ -161,7 +161,7 @@ class LoopbackLink:
         self._waits = flag
 
     def send(self, data: bytes, flags: int = 0, /) -> int:
-        """Hand one message over; see MessageLink."""
+        """Queue one message; see MessageLink."""
         with self._news:
             if self._closed:
                 raise BrokenPipeError("the link is closed")
@@ -196,15 +196,15 @@ class LoopbackLink:
                 return message
 
     def wait(self) -> None:
-        """Wait until a message, the end or a caller has come."""
+        """Wait until a message, the end of the link or a caller arrives."""
         while not self._closed and not self._ready(_LOOK_S):
             if self._end is None:
                 self._looks -= 1
-                if self._looks <= 0:  # who was to come has died before
+                if self._looks <= 0:  # the child has died before it connected
                     self.shutdown()
 
     def shutdown(self, how: int = socket.SHUT_RDWR, /) -> None:
-        """Wake who waits; nothing is sent or received any more."""
+        """Wake all waiting threads; no more messages are sent or received."""
         with self._news:
             self._closed = True
             self._news.notify_all()
@@ -220,7 +220,7 @@ class LoopbackLink:
                 held.close()
 
     def _ready(self, within_s: float) -> bool:
-        """Return whether there is something to be read or somebody to be let in."""
+        """Return whether there are bytes to read or a connection to accept."""
         try:
             return bool(select.select([self.fileno()], [], [], within_s)[0])
         except (OSError, ValueError):  # closed meanwhile
@@ -228,7 +228,7 @@ class LoopbackLink:
             return True
 
     def _accepted(self) -> bool:
-        """Accept a caller; return False where none will come any more."""
+        """Accept a connection; return False if none will come any more."""
         assert self._listener is not None
         try:
             end, _ = self._listener.accept()
@@ -239,7 +239,7 @@ class LoopbackLink:
         with contextlib.suppress(OSError):
             while len(shown) < _TOKEN_BYTES and (more := end.recv(_TOKEN_BYTES - len(shown))):
                 shown += more
-        if not hmac.compare_digest(shown, self._token):  # somebody else's: the child may still come
+        if not hmac.compare_digest(shown, self._token):  # another program; the child may follow
             end.close()
             return True
         end.settimeout(None)
@@ -250,14 +250,14 @@ class LoopbackLink:
         return True
 
     def _missing(self) -> int:
-        """Return how many bytes of the message, or of its length, are still to come."""
+        """Return how many bytes of the message, or of its length, have not arrived yet."""
         if len(self._got) < _LENGTH_BYTES:
             return _LENGTH_BYTES - len(self._got)
         length = int.from_bytes(self._got[:_LENGTH_BYTES], "little")
         return _LENGTH_BYTES + length - len(self._got)
 
     def _hand_over(self) -> None:
-        """Send what was handed over, as fast as the other end takes it."""
+        """Send queued messages as fast as the other end receives them."""
         while True:
             with self._news:
                 while not self._closed and (self._end is None or not self._queue):
@@ -269,7 +269,7 @@ class LoopbackLink:
             try:
                 end.sendall(message)
             except OSError:
-                return  # who receives finds the end
+                return  # the receiver finds the end
 
 
 def _listening() -> socket.socket:

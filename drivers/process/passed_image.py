@@ -1,7 +1,7 @@
-"""Images passed to another process over a socket: in memory of their own, which goes along.
+"""Images passed to another process over a socket, as memory that is passed with the message.
 
-The sender copies an image once and forgets it. The memory lives as long as one of both holds its
-file descriptor, so that nothing is left behind by a process that dies, and none is overwritten.
+The sender copies an image once and keeps no reference. The memory exists while either process has
+its file descriptor open, so a process that dies leaves nothing behind, and no image is overwritten.
 """
 
 import mmap
@@ -17,15 +17,15 @@ from gazerig.drivers.process.message_link import MessageLink
 
 _FD_BYTES = 4  # a C int
 CAN_PASS = hasattr(os, "memfd_create") and hasattr(socket, "SCM_RIGHTS")
-"""Whether this system has memory without a name, and passes it on: Linux."""
+"""Whether this system has anonymous memory that can be passed to a process: Linux."""
 _FD_ROOM = socket.CMSG_LEN(_FD_BYTES) if CAN_PASS else 0
 
 
 class PassedImage(NamedTuple):
     """An image that another process can read.
 
-    fd: memory that holds the pixels; to be closed by whoever holds it
-    shape, dtype: of the array
+    fd: file descriptor of the pixels' memory; its owner must close it
+    shape, dtype: shape and type of the array
     """
 
     fd: int
@@ -34,10 +34,10 @@ class PassedImage(NamedTuple):
 
 
 def copied(image: NDArray[Any]) -> PassedImage:
-    """Return a copy of an image in memory that can be passed on.
+    """Return a copy of an image in memory that can be passed to a process.
 
     Raises:
-        OSError: there is no memory, or no more file descriptors.
+        OSError: no memory or no file descriptors are available.
     """
     fd = os.memfd_create("image")
     try:
@@ -63,7 +63,7 @@ def send(link: MessageLink, message: bytes, fd: int = -1) -> None:
     """Send a message, with a file descriptor unless it is -1.
 
     Raises:
-        OSError: as ``socket.send``.
+        OSError: raised by ``socket.send``.
     """
     if fd < 0 or not isinstance(link, socket.socket):
         link.send(message)
@@ -72,14 +72,14 @@ def send(link: MessageLink, message: bytes, fd: int = -1) -> None:
 
 
 def receive(link: MessageLink, most: int, flags: int = 0) -> tuple[bytes, int]:
-    """Return a message and the file descriptor that came with it, -1 without one.
+    """Return a message and its file descriptor, -1 without one.
 
     Raises:
-        OSError: as ``socket.recv``.
+        OSError: raised by ``socket.recv``.
     """
     if not isinstance(link, socket.socket):
         return link.recv(most, flags), -1
-    # socket.recv_fds of Python 3.11 leaves the flags out.
+    # socket.recv_fds of Python 3.11 ignores the flags.
     message, beside, _, _ = link.recvmsg(most, _FD_ROOM, flags)
     for level, kind, data in beside:
         if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
