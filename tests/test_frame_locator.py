@@ -74,7 +74,7 @@ def test_the_tick_fits_no_face_that_the_camera_has_located(
 @pytest.mark.parametrize(
     ("sure", "below_px", "faces"), [(0.8, 150.0, 1), (0.95, 150.0, 2), (0.8, 20.0, 2)]
 )
-def test_hands_before_the_chest_are_no_second_face(
+def test_a_face_printed_on_a_shirt_is_no_second_face(
     sure: float, below_px: float, faces: int
 ) -> None:
     one = replace(FACE, confidence=0.999, box_px=(300.0, 60.0, 65.0, 80.0))

@@ -53,8 +53,8 @@ _PALM_M, _PALM_SPREAD, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.15, 0.03, 0.07
 _EDGE = 0.02
 # A face so near to the middle of a person's head, in trunks, is theirs.
 _OWN_FACE = 0.25
-# Hands before the chest look like a face: one less sure than this, so many times less than another,
-# whose middle is so far below and aside of the other's, in heights of that.
+# A face printed on a shirt is none: one less sure than this, so many times less than another, whose
+# middle is so far below and aside of the other's, in heights of that.
 _DOUBTFUL, _SURER, _ON_CHEST, _ASIDE = 0.9, 10.0, (1.0, 3.0), 1.0
 # Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
 _CENTRE_PX, _CENTRE_OF_EYES = 0.4, 0.015
