@@ -3,8 +3,7 @@
 from math import inf
 from typing import NamedTuple
 
-from gazerig.features.world.shaft import WorldShaft
-from gazerig.features.world.shaft_axis import ShaftAxis
+from gazerig.features.world.shaft import ShaftAxis, WorldShaft
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
 from gazerig.sim_mock.smart_servo.controller import STEPS_PER_TURN, Loop
 from gazerig.sim_mock.smart_servo.physics import Physics

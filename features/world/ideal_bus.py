@@ -3,8 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from gazerig.drivers.types import Feedback, ServoConfig
-from gazerig.features.world.shaft import LIMP, SPEED_UNIT, Effort
-from gazerig.features.world.shaft_axis import ShaftAxis
+from gazerig.features.world.shaft import LIMP, SPEED_UNIT, Effort, ShaftAxis
 from gazerig.sim_mock.ideal.bus import LAG_S, WARM_C, IdealBus
 from gazerig.sim_mock.smart_servo.controller import MS_S
 

@@ -13,8 +13,7 @@ from gazerig.features.world.figure_model import PlacedPeople
 from gazerig.features.world.hobby_shaft import WorldHobbyServo
 from gazerig.features.world.ideal_bus import IdealShaft
 from gazerig.features.world.model import WorldModel
-from gazerig.features.world.shaft import Effort, WorldShaft
-from gazerig.features.world.shaft_axis import ShaftAxis
+from gazerig.features.world.shaft import Effort, ShaftAxis, WorldShaft
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
