@@ -148,7 +148,7 @@ def test_camera_without_colour_is_refused():
         ("BMI270", True, ""),
         ("NONE", True, "no IMU; oak.gyro: false"),
         ("", True, "no IMU; oak.gyro: false"),
-        ("BMI270", False, "does not say how the IMU sits: give oak.imu_rotation_deg"),
+        ("BMI270", False, "lacks the IMU's orientation: set oak.imu_rotation_deg"),
     ],
 )
 def test_camera_without_a_usable_gyro_goes_on_without(imu, extrinsics, told):

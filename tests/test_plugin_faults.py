@@ -250,7 +250,7 @@ def test_a_camera_that_fails_leaves_the_rig_without_frames(answer, reported):
     assert camera.latest(1.2) is None
     (line,) = camera.events()
     assert line.startswith("camera 'fish' of fish 2 ") and reported in line
-    assert line.endswith(": the rig runs on without frames")
+    assert line.endswith(": the rig continues without frames")
     camera.close()
     camera.close()
 

@@ -166,4 +166,4 @@ def test_what_looks_at_pictures_is_retuned_too() -> None:
     assert 60 in [v for k, v in held.items() if k.endswith("_params.min_face_px")]
     assert 3 in [v for k, v in held.items() if k.endswith("_params.max_blobs")]
     said = put(made, changed(other, {"detector.kind": "yunet"}))
-    assert "the detector stays as it was" in said[-1]
+    assert "the detector is unchanged" in said[-1]

@@ -208,7 +208,7 @@ def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 6
 
 def test_camera_that_lies_about_its_rate_is_noticed_once(device):
     (reported,) = run(device, 30.0, 15.0, away_s=0.008)
-    assert "states 30 frames a second and gives 15.0" in reported
+    assert "states 30 frames a second and delivers 15.0" in reported
     assert str(device) in reported
 
 
@@ -304,7 +304,7 @@ def test_each_thing_that_the_camera_does_not_take_is_one_line(device, monkeypatc
     at = Device(monkeypatch, AUTO_EXPOSURE=(0, 1), EXPOSURE=(3, 2047), MAINS=(0, 2))
     wanted = WebcamParams(exposure_ms=900.0, gain=64, anti_flicker="auto", focus=30)
     lines = events_with(device, wanted)
-    said = [line.removeprefix(f"camera {device} does not take webcam.") for line in lines]
+    said = [line.removeprefix(f"camera {device} does not accept webcam.") for line in lines]
     assert [line.partition(")")[0] for line in said] == [
         "exposure_ms: 900.0 (out of its range",
         "gain: 64 (it has no such control",
@@ -324,7 +324,7 @@ def test_format_that_the_camera_does_not_take_is_told_once(device):
     capture.format = "YUYV"
     camera = opened(device, capture)
     (line,) = camera.events()
-    assert "gives YUYV and not MJPG (webcam.format)" in line
+    assert "uses YUYV instead of MJPG (webcam.format)" in line
     assert list(capture.wishes)[0] == cv2.CAP_PROP_FOURCC  # sizes depend on it
     camera.open()
     assert camera.events() == ()

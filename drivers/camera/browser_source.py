@@ -1,4 +1,4 @@
-"""Frames of a browser's own camera, as its page sends them: JPEGs, a few a second."""
+"""Frames of a browser's camera, which its page sends as JPEGs, a few per second."""
 
 import threading
 from collections.abc import Callable
@@ -11,18 +11,18 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import Shot, bgr
 
 FIELD_DEG = 60.0
-"""Horizontal field of view of a camera of which nothing is known."""
+"""Assumed horizontal field of view of an unknown camera."""
 LATENCY_S = 0.08
-"""From the exposure until the picture is here: camera, browser, encoding, the way."""
+"""Delay from the exposure to the arrival: camera, browser, encoding, network."""
 _LOOK_S = 0.004
 _LARGEST_PX = 1920
 
 
 class BrowserSource:
-    """A source of the pictures in a slot.
+    """Source of the pictures in a slot.
 
     Args:
-        pictures: where they come.
+        pictures: Slot of the pictures.
     """
 
     def __init__(self, pictures: JpegSlot) -> None:
@@ -35,14 +35,14 @@ class BrowserSource:
         """Begin with the next picture."""
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next picture; one that is none is left out."""
+        """Wait for the next picture; skip unreadable ones."""
         while not stop.is_set():
             picture = self._pictures.newer(self._number)
             if picture is None:
                 stop.wait(_LOOK_S)
                 continue
             self._number = picture.number
-            import cv2  # in the camera's process, and not in that of the control loop
+            import cv2  # only in the camera's process, not in that of the control loop
 
             found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
             image = bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
@@ -55,7 +55,7 @@ class BrowserSource:
         return None
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         events, self._events = tuple(self._events), []
         return events
 
@@ -65,4 +65,4 @@ class BrowserSource:
     def _tell(self) -> None:
         if not self._told:
             self._told = True
-            self._events.append("a browser sends pictures that cannot be read: they are left out")
+            self._events.append("a browser sends pictures that cannot be read: they are skipped")

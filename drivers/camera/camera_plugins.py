@@ -1,4 +1,4 @@
-"""Our kinds of cameras, registered as a package registers its own, and sources made by name."""
+"""Our kinds of cameras, registered like those of packages, and creation of sources by name."""
 
 import threading
 from collections.abc import Callable
@@ -29,7 +29,7 @@ OAK = CameraPlugin(_oak, OakParams, ("frames", "depth", "lens"), Evidence(emulat
 
 
 def camera_part(name: str, params: Any) -> object:
-    """Return a frame source or a camera of a package, by its name.
+    """Create a frame source or a camera by its name.
 
     Raises:
         SetupError: there is none, or it cannot be made.
@@ -38,12 +38,12 @@ def camera_part(name: str, params: Any) -> object:
 
 
 def is_source(part: object) -> bool:
-    """Return whether a camera gives frames, in which the rig's own detectors look."""
+    """Return whether a camera returns frames, which the rig's own detectors search."""
     return hasattr(part, "take")
 
 
 def plugin_source(name: str, params: Any) -> FrameSource:
-    """Return the frame source of a package by its name, checked frame by frame; for any process.
+    """Create a frame source by its name, checked frame by frame; for use in any process.
 
     Raises:
         SetupError: there is none, or it cannot be made.
@@ -52,11 +52,11 @@ def plugin_source(name: str, params: Any) -> FrameSource:
 
 
 class CheckedSource:
-    """A frame source of another package; whatever it raises or returns is one named line.
+    """A frame source of another package: its results are checked, its errors become one named line.
 
     Args:
-        source: of the package.
-        label: the camera as messages name it.
+        source: The package's source.
+        label: Name of the camera in messages.
     """
 
     def __init__(self, source: FrameSource, label: str) -> None:
@@ -76,7 +76,7 @@ class CheckedSource:
             raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next frame; None where ``stop`` was set meanwhile.
+        """Wait for the next frame; return None if ``stop`` was set meanwhile.
 
         Raises:
             CameraError: the source fails, or what it returns is no frame.
@@ -94,14 +94,14 @@ class CheckedSource:
         image = bgr(shot.image)
         if image is None:
             raise CameraError(f"{self._label} returned a frame that is no image of 8 or 16 bits")
-        if not shot.captured_s <= now_s() + 1.0:  # nor a NaN
+        if not shot.captured_s <= now_s() + 1.0:  # also rejects NaN
             raise CameraError(f"{self._label} returned a frame of the time {shot.captured_s!r}")
         if shot.turn is not None and not _is_turn(shot.turn):
             raise CameraError(f"{self._label} returned a turn of the camera that is no rotation")
         return shot._replace(image=image)
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return tuple(map(str, self._source.events()))
 
     def close(self) -> None:
@@ -110,7 +110,7 @@ class CheckedSource:
 
 
 def _is_turn(turn: object) -> bool:
-    """Return whether a package's turn of the camera is one."""
+    """Return whether a package's camera turn is a valid one."""
     try:
         return isinstance(turn, CameraTurn) and turn.is_rotation
     except Exception:  # its parts may be anything

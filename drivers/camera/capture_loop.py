@@ -1,4 +1,4 @@
-"""Detection frame by frame, and reopening a lost camera."""
+"""Detection frame by frame, with reopening of a lost camera."""
 
 import threading
 from collections.abc import Callable
@@ -10,23 +10,23 @@ from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections, FaceDetector
 
 LOST, BACK = "camera lost", "camera back"
-"""The beginnings of the events about a source that is lost, and of its return."""
+"""First words of events about the loss of a source, and about its reconnection."""
 
 
 class CaptureLoop:
-    """A source of frames with the detectors that look for faces and motion in them.
+    """A source of frames with the detectors of faces and motion.
 
-    A source that is lost in service is reopened until it is back or ``recovery.give_up_s`` is
-    over. Frame numbers go on counting meanwhile.
+    A lost source is reopened until it reconnects or ``recovery.give_up_s`` has passed. Frame
+    numbers continue to count meanwhile.
 
     Args:
-        source: the frames.
-        detector: finds faces.
-        now_s: the host's monotonic clock, seconds.
-        recovery: how a lost source is reopened.
-        motion: finds motion, None for none.
-        report: called with each event as one line, at once.
-        locate: locates what is found in the camera's axes, None for none.
+        source: Source of frames.
+        detector: Finds faces.
+        now_s: The host's monotonic clock, seconds.
+        recovery: Parameters of reopening a lost source.
+        motion: Finds motion, None for none.
+        report: Called with each event as one line, immediately.
+        locate: Locates detections in the camera's axes, None for none.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class CaptureLoop:
         )
         self._now_s = now_s
         self._recovery = recovery
-        self._counted = 0  # frames of the source before it was last opened
+        self._counted = 0  # frames of the source before it was last reopened
         self._number = 0
         self._report = report
 
@@ -66,7 +66,7 @@ class CaptureLoop:
         """Return the detections in the next frame, None if ``stop`` was set meanwhile.
 
         Raises:
-            CameraError: the source is gone for good.
+            CameraError: the source is lost permanently.
         """
         shot = self._take(stop)
         if shot is None:
@@ -91,7 +91,7 @@ class CaptureLoop:
         self._source.close()
 
     def _take(self, stop: threading.Event) -> Shot | None:
-        """Return the next frame, reopening a lost source; None where ``stop`` was set."""
+        """Return the next frame, reopening a lost source; None if ``stop`` was set."""
         lost_s: float | None = None
         wait_s = self._recovery.retry_ms / 1e3
         while True:
@@ -114,7 +114,7 @@ class CaptureLoop:
             return shot
 
     def _lose(self, error: CameraError) -> float:
-        """Report the loss, keep the frame numbers going, and return the time of the loss."""
+        """Report the loss, continue the frame numbers, and return the time of the loss, seconds."""
         self._counted = self._number
         if self._recovery.give_up_s > 0.0:
             self._report(f"{LOST} ({error}): trying it again")
@@ -127,5 +127,5 @@ def failed(failure: BaseException) -> CameraError:
         return CameraError(str(failure))
     return CameraError(
         f"detection in the camera frames failed ({type(failure).__name__}: "
-        f"{' '.join(str(failure).split())}): start it again, and report it if it comes back"
+        f"{' '.join(str(failure).split())}): start it again, and report it if it recurs"
     )

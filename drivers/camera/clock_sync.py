@@ -1,34 +1,34 @@
-"""A camera's own clock in host time: the least delayed frames tell the offset, a line the drift.
+"""Conversion of a camera's clock to host time, with offset and drift from the least delayed frames.
 
-Every frame arrives late by a varying time, never early; so of a handful of frames the one
-with the smallest difference between arrival and stamp tells most about the clocks (the minimum
-filter of NTP's clock filter, RFC 5905 section 10). Crystals differ by tens of millionths: the
-drift is the median of the slopes between such best frames (Theil 1950, Sen 1968).
+Every frame arrives with a varying delay, never early. So the frame with the smallest difference
+between arrival and stamp is the best estimate of the offset (the minimum filter of NTP's clock
+filter, RFC 5905 section 10). Crystals differ by tens of ppm: the drift is the median of the slopes
+between such best frames (Theil 1950, Sen 1968).
 """
 
 from collections import deque
 from statistics import median
 from typing import NamedTuple
 
-_BUCKET_S = 1.0  # one best frame is kept of each
+_BUCKET_S = 1.0  # one best frame is kept per bucket
 _BUCKETS = 60
-_LEAST_SPAN_S = 10.0  # no drift is told from less
-_MOST_DRIFT = 300e-6  # crystals are better; more is a mistake
-_JUMP_S = 0.1  # differences that leave the line by more are a clock set again ...
-_LASTING_S = 1.0  # ... if they are late for as long as this: one frame may just be late
+_LEAST_SPAN_S = 10.0  # shorter spans give no drift
+_MOST_DRIFT = 300e-6  # crystals are better; more is an error
+_JUMP_S = 0.1  # a larger deviation from the line is a clock that was set ...
+_LASTING_S = 1.0  # ... if it lasts this long; a single frame may be late
 
 
 class _Best(NamedTuple):
-    """The least delayed frame of its time: device time, and arrival less device time."""
+    """The least delayed frame of a bucket: device time, and arrival minus device time."""
 
     device_s: float
     difference_s: float
 
 
 class ClockSync:
-    """Translates stamps of one device clock; each is translated once, in order.
+    """Converter of stamps of one device clock; each is converted once, in order.
 
-    jumps: how often the device clock was found set again
+    jumps: number of detected jumps of the device clock
     """
 
     def __init__(self, least_delay_s: float = 0.0) -> None:
@@ -36,20 +36,20 @@ class ClockSync:
         self._best: deque[_Best] = deque(maxlen=_BUCKETS)
         self._bucket: int | None = None
         self._drift = 0.0
-        self._offset_s = 0.0  # of the line, at device time 0
+        self._offset_s = 0.0  # offset of the line at device time 0
         self._late_since_s: float | None = None
         self._last: tuple[float, float] | None = None  # device, host
         self.jumps = 0
 
     @property
     def drift_ppm(self) -> float:
-        """Return how much faster the host's clock runs, in millionths."""
+        """Return how much faster the host's clock runs, ppm."""
         return self._drift * 1e6
 
     def host_s(self, device_s: float, arrived_s: float) -> float:
-        """Return the host time of a device stamp whose frame arrived just now.
+        """Return the host time of a device stamp whose frame has just arrived.
 
-        Later stamps never give earlier times, and no time lies after the arrival.
+        Later stamps never result in earlier times, and no time is after the arrival.
         """
         difference_s = arrived_s - device_s
         if self._jumped(device_s, difference_s):
@@ -63,34 +63,34 @@ class ClockSync:
         return host_s
 
     def _line_s(self, device_s: float) -> float:
-        """Return host less device time at a device time."""
+        """Return host minus device time at a device time."""
         return self._offset_s + self._drift * device_s
 
     def _jumped(self, device_s: float, difference_s: float) -> bool:
-        """Return whether the clocks are no longer those of the line."""
+        """Return whether the clocks no longer match the line."""
         if self._last is None:
             return False
         off_s = difference_s - self._line_s(device_s)
         if off_s <= _JUMP_S:
             self._late_since_s = None
-            # Nothing can arrive before it was taken: the device's clock is ahead of the line.
+            # A frame cannot arrive before its capture: the device's clock is ahead of the line.
             ahead = off_s < -_JUMP_S and len(self._best) > 1
             return ahead or device_s < self._last[0] - _JUMP_S
         arrived_s = device_s + difference_s
         if self._late_since_s is None:
             self._late_since_s = arrived_s
-        # A device that started again counts from 0.
+        # A device that restarted counts from 0.
         return device_s < self._last[0] or arrived_s - self._late_since_s > _LASTING_S
 
     def _forget(self) -> None:
-        """Begin with another clock."""
+        """Reset to an unknown clock."""
         self._best.clear()
         self._bucket, self._late_since_s, self._last = None, None, None
         self._drift, self._offset_s = 0.0, 0.0
         self.jumps += 1
 
     def _keep(self, device_s: float, difference_s: float) -> None:
-        """Keep a frame if it is the least delayed of its bucket, and draw the line again."""
+        """Store a frame if it is the least delayed of its bucket, and fit the line again."""
         bucket = int(device_s // _BUCKET_S)
         new = _Best(device_s, difference_s)
         if bucket != self._bucket:
@@ -104,7 +104,7 @@ class ClockSync:
         self._offset_s = min(self._above_drift(best) for best in self._best)
 
     def _above_drift(self, best: _Best) -> float:
-        """Return a frame's difference with the drift since device time 0 taken out."""
+        """Return a frame's difference without the drift since device time 0."""
         return best.difference_s - self._drift * best.device_s
 
     def _slope(self) -> float:

@@ -1,4 +1,4 @@
-"""The distance of an object from a depth image with holes, edges and outliers."""
+"""Distance of an object from a depth image with holes, edges and outliers."""
 
 from typing import NamedTuple
 
@@ -8,20 +8,20 @@ from numpy.typing import NDArray
 from gazerig.drivers.types import Depth
 
 _MM_PER_M = 1000.0
-# Nothing nearer is measured by any stereo camera with a baseline of a hand's breadth.
+# Nearest distance that a stereo camera with a baseline of a hand's breadth can measure.
 _NEAREST_M = 0.05
-# A gap in depth by this share of the distance divides a thing from what is behind it.
+# A gap in depth of this share of the distance separates an object from its background.
 _GAP = 0.15
-_LEAST_SHARE = 0.15  # of the valid pixels; a nearer layer smaller than this is clutter
+_LEAST_SHARE = 0.15  # share of the valid pixels; a smaller, nearer layer is clutter
 _SIGMAS = 1.4826  # from the median of absolute deviations to a standard deviation
 _MOST_PIXELS = 4096
 
 
 class DepthReading(NamedTuple):
-    """The distance of one object in a depth image.
+    """Distance of one object in a depth image.
 
-    distance_m: None where nothing is known
-    spread_m: standard deviation of its pixels, robust; valid_share: of its pixels, 0..1
+    distance_m: None if unknown
+    spread_m: robust standard deviation of its pixels; valid_share: share of valid pixels, 0..1
     """
 
     distance_m: float | None
@@ -38,12 +38,12 @@ def depth_at(
     mask: NDArray[np.bool_] | None = None,
     shrink: float = 0.6,
 ) -> DepthReading:
-    """Read the distance of what a box or a mask of the frame covers.
+    """Return the distance of the object that a box or a mask of the frame covers.
 
-    The nearest layer of some size is the thing; what shows beside it lies behind.
+    The nearest layer of sufficient size is the object; other layers are behind it.
 
-    box_px: x, y, width, height; of it the middle part ``shrink`` is read, as its edges hold
-        background; mask: (height, width); both together are their common part
+    box_px: x, y, width, height; only its central share ``shrink`` is read, as its edges contain
+        background; mask: (height, width); if both are given, their intersection is read
     """
     depth = np.asarray(depth_m)
     if depth.ndim != 2 or not depth.size or (mask is not None and mask.shape != depth.shape):
@@ -67,7 +67,7 @@ def depth_at(
 
 
 def metres(depth_mm: NDArray[np.uint16]) -> Depth:
-    """Turn a camera's millimetres, 0 where unknown, into read-only metres with NaN."""
+    """Convert a camera's millimetres (0: unknown) to read-only metres (NaN: unknown)."""
     depth = depth_mm.astype(np.float32)
     depth[depth_mm == 0] = np.nan
     depth /= np.float32(_MM_PER_M)
@@ -76,7 +76,7 @@ def metres(depth_mm: NDArray[np.uint16]) -> Depth:
 
 
 def millimetres(depth_m: Depth) -> NDArray[np.uint16]:
-    """Turn metres into whole millimetres, 0 where unknown or beyond 65 m."""
+    """Convert metres to whole millimetres, 0 if unknown or beyond 65 m."""
     with np.errstate(over="ignore"):
         mm = np.rint(np.asarray(depth_m, dtype=np.float32) * np.float32(_MM_PER_M))
     known = (mm > 0.0) & (mm <= np.iinfo(np.uint16).max)
@@ -87,7 +87,7 @@ def resized(depth_m: Depth, width_px: int, height_px: int) -> Depth:
     """Resize a depth image to its colour image, without inventing distances."""
     if depth_m.shape == (height_px, width_px):
         return depth_m
-    import cv2  # here, as the control loop's process reads depths, but resizes nothing
+    import cv2  # here, as the control loop's process reads depths but does not resize
 
     size = width_px, height_px
     found = np.asarray(cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST), np.float32)
@@ -111,7 +111,7 @@ def _window(
 
 
 def _nearest_layer(valid_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the nearest run of sorted distances without a gap as large as a thing."""
+    """Return the nearest run of sorted distances without a gap."""
     gaps = np.flatnonzero(np.diff(valid_m) > _GAP * valid_m[:-1]) + 1
     layers = np.split(valid_m, gaps)
     for layer in layers:

@@ -1,4 +1,4 @@
-"""What one frame shows: faces and what moves."""
+"""Analysis of a frame: faces, people, hands and motion."""
 
 from collections.abc import Callable
 from math import degrees
@@ -10,24 +10,22 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, LocatedFrame, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
-"""Finds what moves, from one frame to the next."""
+"""Finds motion from one frame to the next."""
 Locate = Callable[[Detections], LocatedFrame]
-"""Locates what was found in the camera's axes; picklable.
-
-Where it has a method ``fault``, that returns why its calibration is not used for a frame, as one
-line; "" where it is. Each line is reported once.
+"""Locates detections in the camera's axes; picklable. A method ``fault``, if present, returns in
+one line why its calibration is not used for a frame, "" if it is used. Each line is reported once.
 """
 
 
 class FrameAnalyzer:
-    """Runs the detectors on one frame after another; they may be changed in between.
+    """Runner of the detectors, which may be changed between frames.
 
     Args:
-        detector: finds faces.
-        motion: finds what moves; None: nothing does.
-        locate: locates faces and things; None: they are located by whoever needs them.
-        rotation_deg: by which frames have been turned clockwise already.
-        has_unknown_lens: the camera itself cannot tell its field of view.
+        detector: Finds faces.
+        motion: Finds motion; None for none.
+        locate: Locates faces and things; None: their consumer does.
+        rotation_deg: Angle by which frames have been turned clockwise already.
+        has_unknown_lens: Whether the camera does not report its field of view.
     """
 
     def __init__(
@@ -39,9 +37,9 @@ class FrameAnalyzer:
         has_unknown_lens: bool = False,
     ) -> None:
         self._detector, self._motion, self._locate = detector, motion, locate
-        self._faults: dict[str, bool] = {}  # and whether each has been reported
+        self._faults: dict[str, bool] = {}  # with whether each has been reported
         self._has_unknown_lens = has_unknown_lens
-        # Here because the process of the loop imports this module too, and needs no OpenCV.
+        # Here, as the loop's process imports this module too, without OpenCV.
         from gazerig.drivers.camera.health import CameraHealth
         from gazerig.drivers.vision.clothing import ClothingReader
         from gazerig.drivers.vision.cut_detector import CutDetector
@@ -51,7 +49,7 @@ class FrameAnalyzer:
         self._off_frame = OffFrameReport()
 
     def look(self, shot: Shot) -> Detections:
-        """Find and locate faces, unless the camera itself has, people, palms, and what moves."""
+        """Find and locate faces (unless the camera has found them), people, palms and motion."""
         began_s = perf_counter()
         height, width = shot.image.shape[:2]
         faces = self._faces(shot)
@@ -93,7 +91,7 @@ class FrameAnalyzer:
         return found.located_by(self._locate)
 
     def _field_assumed(self, shot: Shot) -> bool:
-        """Return whether nobody has measured what the lens covers."""
+        """Return whether the field of view is not measured."""
         if not self._has_unknown_lens or shot.lens is not None:
             return False
         if getattr(self._locate, "lens", None) is not None:
@@ -108,7 +106,7 @@ class FrameAnalyzer:
         return shot.faces if meshed is None else meshed(shot.image, shot.faces)
 
     def events(self) -> tuple[str, ...]:
-        """Return what detector and calibration have to tell since the last call, one line each."""
+        """Return events of detector and calibration since the last call, one line each."""
         faults = tuple(line for line, told in self._faults.items() if not told)
         self._faults = dict.fromkeys(self._faults, True)
         events = getattr(self._detector, "events", None)
@@ -124,12 +122,12 @@ class FrameAnalyzer:
         """Change the detectors and the calibration from the next frame on.
 
         Args:
-            detector: makes another one; None: no change.
-            motion: returns a motion detector from the present one; None: no change.
-            locate: locates by another calibration; None: no change.
+            detector: Creates another detector; None: no change.
+            motion: Returns a motion detector from the present one; None: no change.
+            locate: Locates by another calibration; None: no change.
 
         Raises:
-            SetupError: the detector cannot be made; the old one goes on.
+            SetupError: the detector cannot be created; the old one stays.
         """
         if locate is not None:
             self._locate, self._faults = locate, {}

@@ -1,21 +1,21 @@
-"""The measured frame rate of a camera against the stated one."""
+"""Comparison of a camera's measured frame rate with the stated one."""
 
 from collections import deque
 from math import isfinite
 from statistics import median
 
 _WINDOW = 45
-_LEAST = 15  # intervals before anything is said
+_LEAST = 15  # intervals before anything is reported
 _TOLERANCE = 0.2
-# Absence of the reader for less than this part of a frame cannot have cost a frame.
+# A reader that was away for less than this part of a frame period cannot have lost a frame.
 _PROMPT = 0.5
 
 
 class FrameRateMonitor:
-    """Measures the frame rate and reports once when it differs from the stated one.
+    """Monitor that measures the frame rate and reports once if it differs from the stated one.
 
-    Only intervals in which the reader was back in time count: a slow reader misses
-    frames, and that is no fault of the camera.
+    Only intervals in which the reader was prompt count: a slow reader misses frames, which is no
+    fault of the camera.
     """
 
     def __init__(self, name: str, stated_hz: float) -> None:
@@ -33,11 +33,11 @@ class FrameRateMonitor:
         return 1.0 / median(self._intervals_s)
 
     def update(self, captured_s: float, away_s: float) -> str:
-        """Add a frame; return a line when the rate is newly wrong or right again, else "".
+        """Add a frame; return a line when the rate becomes wrong or right again, otherwise "".
 
         Args:
-            captured_s: when it was captured.
-            away_s: how long the reader was busy elsewhere before it.
+            captured_s: Time of its capture, seconds.
+            away_s: Time for which the reader was busy before it, seconds.
         """
         before_s, self._before_s = self._before_s, captured_s
         if before_s is None or captured_s <= before_s:
@@ -52,12 +52,12 @@ class FrameRateMonitor:
             return ""
         self._reported = lies
         if not lies:
-            return f"{self._name} gives {rate_hz:.1f} frames a second again, as it states"
+            return f"{self._name} delivers {rate_hz:.1f} frames a second again, as stated"
         return (
-            f"{self._name} states {self._stated_hz:g} frames a second and gives {rate_hz:.1f}: "
+            f"{self._name} states {self._stated_hz:g} frames a second and delivers {rate_hz:.1f}: "
             "the times of its frames are measured; more light makes many cameras faster"
         )
 
     def _prompt(self, away_s: float) -> bool:
-        """Return whether the reader was back before a frame could be missed."""
+        """Return whether the reader returned before a frame could be missed."""
         return self._stated_hz == 0.0 or away_s <= _PROMPT / self._stated_hz

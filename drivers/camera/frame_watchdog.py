@@ -1,14 +1,14 @@
-"""When a camera whose process is alive counts as lost, or as hung: pure."""
+"""Decision whether a camera with a running process is lost or hung; pure."""
 
 from typing import Literal
 
 from gazerig.drivers.camera.params import CameraRecoveryParams
 
 FIRST_FRAME_S = 15.0
-"""A camera may take so long for its first frame: exposure settles, networks are loaded."""
+"""Longest time to the first frame: exposure settles, networks are loaded."""
 
 LOST_PERIODS, HUNG_PERIODS = 5.0, 15.0
-"""So many of its usual periods may go by at least: films and weak computers are slow."""
+"""Smallest number of usual frame periods before either: films and weak computers are slow."""
 
 _SHARE = 0.2
 
@@ -16,11 +16,11 @@ Silence = Literal["", "lost", "hung"]
 
 
 class FrameWatchdog:
-    """Compares the time since the last frame with what is usual.
+    """Watchdog that compares the time since the last frame with the usual period.
 
     Args:
-        recovery: how long is too long.
-        now_s: when the waiting for the first frame begins, monotonic seconds.
+        recovery: Time limits.
+        now_s: Start of the wait for the first frame, monotonic seconds.
     """
 
     def __init__(self, recovery: CameraRecoveryParams, now_s: float) -> None:
@@ -30,7 +30,7 @@ class FrameWatchdog:
         self._first = True
 
     def record_frame(self, now_s: float) -> None:
-        """Record that a frame came."""
+        """Record a frame."""
         period_s = now_s - self._last_s
         if self._first:
             self._first = False
@@ -41,11 +41,11 @@ class FrameWatchdog:
         self._last_s = now_s
 
     def record_activity(self, now_s: float) -> None:
-        """Record that the process is busy with something else than frames."""
+        """Record that the process is busy with other tasks than frames."""
         self._last_s = now_s
 
     def verdict(self, now_s: float) -> Silence:
-        """Return "lost" where no frame came for too long, "hung" where none will come."""
+        """Return "lost" if no frame came for too long, "hung" if none will come."""
         silent_s = now_s - self._last_s
         if self._first:
             return "hung" if silent_s >= FIRST_FRAME_S else ""

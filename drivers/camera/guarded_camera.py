@@ -1,4 +1,4 @@
-"""A camera of another package: the control loop neither waits for it nor ends with it."""
+"""A camera of another package that can neither delay nor end the control loop."""
 
 import threading
 from collections.abc import Sequence
@@ -13,31 +13,31 @@ from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.drivers.types import Camera, DetectedFace, Detections, MovingBlob
 
 LONGEST_S = 0.001
-"""It is waited for so long in a tick; after that the loop goes on with what it had."""
+"""Longest wait for the camera in a tick; after that the loop uses the last detections."""
 
 OPEN_S, OPEN_PROCESS_S = 20.0, 70.0
-"""A camera, and a process that reads one and gives up by itself, may take so long to open."""
+"""Longest time to open a camera, and a process that reads a camera and has its own limit."""
 
 CLOSE_S, CLOSE_PROCESS_S = 2.0, 15.0
-"""They may take so long to close."""
+"""Longest times to close them."""
 
 SILENT_S = 1.0
-"""A call that lasts longer is reported."""
+"""Duration after which a call is reported."""
 
 
 class GuardedCamera:
-    """A camera whose failures cost the rig its sight alone; implements ``Camera``.
+    """A camera whose failures only stop the rig's vision; implements ``Camera``.
 
-    What it returns is checked: something else than detections, or a number that is not finite,
-    is a failure. After a failure there is no frame, and the rig runs on without.
+    Its results are checked: anything other than detections, or a number that is not finite, is a
+    failure. After a failure there are no more frames, and the rig continues without them.
 
     Args:
-        camera: of another package, or a process that reads another package's frames.
-        label: the camera as messages name it.
-        longest_s: it is waited for so long in a tick, real seconds; None: to the end of the call,
-            for simulated time.
-        close_s: it is waited for so long as it is closed, real seconds.
-        open_s: it is waited for so long as it is opened, real seconds.
+        camera: Camera of another package, or a process that reads another package's frames.
+        label: Name of the camera in messages.
+        longest_s: Longest wait in a tick, real seconds; None: to the end of the call, for simulated
+            time.
+        close_s: Longest wait for its closing, real seconds.
+        open_s: Longest wait for its opening, real seconds.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class GuardedCamera:
 
         Raises:
             SetupError: it cannot be opened.
-            PluginError: it fails.
+            PluginError: the camera raises any other error.
         """
         self._call.close()
         self._call = BoundedCall(self._label, self._longest_s)
@@ -83,7 +83,7 @@ class GuardedCamera:
         self._newest, self._failed, self._asked_s, self._late = None, False, None, False
 
     def _open(self, given_up: threading.Event) -> None:
-        """Open the camera; may block, and closes it where that took too long."""
+        """Open the camera, and close it if that took too long; may block."""
         self.camera.open()
         if given_up.is_set():
             self.camera.close()
@@ -117,25 +117,25 @@ class GuardedCamera:
         return self._newest
 
     def _look(self, now_s: float) -> tuple[Detections | None, str, tuple[str, ...]]:
-        """Return what the camera has, what is wrong with it, and its events; may block."""
+        """Return the camera's detections, its fault, and its events; may block."""
         found = self.camera.latest(now_s)
         wrong = "" if found is self._checked else fault_of(found)
         return found, wrong, tuple(map(str, self.camera.events()))
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return self._log.drain()
 
     def close(self) -> None:
-        """Close the camera, whatever it does; safe to call twice."""
+        """Close the camera without raising; safe to call twice."""
         self._call.close()
         closing = BoundedCall(f"close of {self._label}", self._close_s)
         outcome = closing(self.camera.close)
         closing.close()
         if outcome is None:
-            self._log.add(f"{self._label} does not end: it is left behind")
+            self._log.add(f"{self._label} does not close: it is abandoned")
         elif outcome.error is not None:
-            self._log.add(f"{self._label} failed as it was closed ({outcome.why})")
+            self._log.add(f"{self._label} failed while it was closed ({outcome.why})")
 
     def _wait(self, now_s: float) -> None:
         """Record that it has not answered, and report it once."""
@@ -148,14 +148,14 @@ class GuardedCamera:
     def _fail(self, why: str) -> None:
         self._failed, self._newest = True, None
         self._call.close()
-        self._log.add(f"{self._label} {why}: the rig runs on without frames")
+        self._log.add(f"{self._label} {why}: the rig continues without frames")
 
 
 def fault_of(found: Any) -> str:
-    """Return what is wrong with the detections of a camera, "" where nothing is."""
+    """Return the fault in the detections of a camera, "" for none."""
     try:
         return "" if found is None else _fault(found)
-    except Exception as error:  # its parts may be anything
+    except Exception as error:  # its attributes may be anything
         return f"detections that cannot be read ({failure(error)})"
 
 
@@ -190,7 +190,7 @@ def _fault(found: Any) -> str:
 
 
 def fault_of_face(face: Any) -> str:
-    """Return what is wrong with a face, "" where nothing is."""
+    """Return the fault in a face, "" for none."""
     if not isinstance(face, DetectedFace):
         return f"a {type(face).__name__} as a face, wanted a DetectedFace"
     if len(face.box_px) != 4 or not all(map(_finite, face.box_px)) or not _finite(face.confidence):

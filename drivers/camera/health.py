@@ -1,9 +1,9 @@
-"""Poor viewing conditions of a camera: each is reported once as it begins and once as it ends.
+"""Poor viewing conditions of a camera: each is reported once when it begins and once when it ends.
 
-Once a second a frame is judged: too dark, out of focus, turned, of an unmeasured field of view, or
-one of many that come too fast. Only a condition that lasts is reported, with its remedy. The
-statistics use at most 640 pixels of width and cost 2 ms. While no upright faces are seen, a turned
-copy is searched for faces every few seconds, which costs 10 ms.
+Once a second a frame is assessed: too dark, out of focus, turned, of an unmeasured field of view,
+or analysed too slowly. Only a lasting condition is reported, with its remedy. The statistics use at
+most 640 pixels of width and take 2 ms. While no upright faces are found, a turned copy is searched
+for faces every few seconds, which takes 10 ms.
 """
 
 from collections import Counter, deque
@@ -23,34 +23,35 @@ if TYPE_CHECKING:
     from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 
 EVERY_S = 1.0
-"""Time between two judgements; the durations below are counts of judgements."""
+"""Time between two assessments; the durations below are counts of assessments."""
 PROBE_S = 3.0
-"""Time between two searches of a turned copy while no upright faces are seen."""
+"""Time between two searches of a turned copy while no upright faces are found."""
 
 _BEGINS, _ENDS = 5, 3
 _WIDTH_PX = 640
 # 95 % of the pixels are darker. MTCNN finds faces down to about 12 of 255 without noise; 32
 # leaves room for the noise of a webcam in the dark.
 _DARK, _LIT, _BLACK = 32.0, 45.0, 6.0
-# An edge's width is the contrast in a window over the steepest slope in it. In a quarter of the
-# windows it is below 4.4 px in sharp frames, below 8.9 after a blur of 4 px, where faces of 60 px
-# are lost. Only windows with an edge count: soft shadows on a wall are less steep.
+# An edge's width is the contrast in a window divided by its steepest slope. In a quarter of the
+# windows it is below 4.4 px in sharp frames, below 8.9 after a blur of 4 px, at which faces of 60
+# px are lost. Only windows with an edge count: soft shadows on a wall are less steep.
 _WINDOW_PX, _CONTRAST, _STEEP = 48, 40.0, 3.0
 _LEAST_WINDOWS = 0.1
 _BLURRED_PX, _SHARP_PX = 8.5, 7.0
 _LEAST_SIDE_PX = 96
-# Largest roll and lowest confidence of an upright face: MTCNN takes one of six upside-down faces
-# for upright, with a lower confidence. Number of judgements in which upright faces are counted.
+# Largest roll and lowest confidence of an upright face: MTCNN mistakes one of six upside-down faces
+# for upright, with a lower confidence. Number of assessments in which upright faces are counted.
 _UPRIGHT_DEG, _SURE, _SAMPLES = 25.0, 0.9, 15
-# Number of searches that must agree, and to how many degrees; width of the searched copy. After a
-# search in all directions without a result the next one comes later by the last factor.
+# Number of searches that must agree, and their tolerance in degrees; width of the searched copy;
+# factor by which the next search is delayed after one in all directions without a result.
 _PROBES, _AGREE_DEG, _PROBE_PX, _FRUITLESS = 4, 30.0, 320, 10
-# One degree of roll costs a face as much as this of its confidence: in a frame turned by 120 deg
-# MTCNN finds some faces too, less surely and with landmarks that are not theirs.
+# One degree of roll reduces a face's score by this share of its confidence: in a frame turned by
+# 120 deg MTCNN also finds some faces, with lower confidence and wrong landmarks.
 _PER_DEG = 0.003
-# How far from quarters frames are turned that camera.rotation can help.
+# Largest deviation from a quarter turn that camera.rotation can correct.
 _QUARTER_DEG = 30.0
-# Fewer than this part of the frames offered, and fewer a second: too slow; and in time again.
+# Analysis is too slow below this share of the frames and this rate, and in time again above the
+# others.
 _SHARE, _SLOW_HZ, _SHARE_AGAIN, _AGAIN_HZ = 0.5, 15.0, 0.6, 18.0
 
 _OVER = {
@@ -58,7 +59,7 @@ _OVER = {
     "turned": "camera: the picture is upright again",
     "blurred": "camera: the picture is sharp again",
     "field": "camera: the field of view is known now",
-    "slow": "camera: frames are looked at in time again",
+    "slow": "camera: frames are analysed in time again",
 }
 _REMEDIES = {
     "faces": "lower detector.work_width_px or detector.far_width_px",
@@ -74,10 +75,10 @@ FIELD_TEXT = (
 
 
 class PictureStats(NamedTuple):
-    """How a frame looks.
+    """Image statistics of a frame.
 
-    bright: grey level, 0..255, below which 95 % of its pixels are
-    edge_px: width of its edges, scaled to at most 640 px of width; None: it has too few
+    bright: 95th percentile of the grey level, 0..255
+    edge_px: width of its edges, scaled to at most 640 px of width; None if it has too few
     """
 
     bright: float
@@ -85,14 +86,15 @@ class PictureStats(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What is known of a camera at one judgement; None: nothing.
+    """Observations of a camera for one assessment; None: unknown.
 
-    upright: whether a face that is about upright is seen
-    turned_deg: how far the frame is turned, clockwise, by the faces that it shows upright as it is
-        turned back; 0: it is upright
-    offered, looked_at: frames since the judgement before; over_s: the time between
-    spent_ms: of each stage, a frame
-    field_assumed: the field of view is not measured
+    upright: whether a nearly upright face is found
+    turned_deg: clockwise angle of the frame, from faces that are upright after turning it back; 0:
+        it is upright
+    offered, looked_at: delivered and analysed frames since the last assessment; over_s: the time
+        between
+    spent_ms: time per frame by stage
+    field_assumed: whether the field of view is not measured
     """
 
     picture: PictureStats | None = None
@@ -106,14 +108,14 @@ class Judged(NamedTuple):
 
 
 class _Lasting:
-    """One condition; it begins and ends after several equal judgements in a row."""
+    """A condition; it begins and ends after several consecutive equal assessments."""
 
     def __init__(self, over: str, begins: int = _BEGINS, ends: int = _ENDS) -> None:
         self._over, self._lasts = over, (begins, ends)
         self.text, self._run = "", 0
 
     def step(self, text: str | None) -> str:
-        """Take a judgement, None: nothing is known; return the line to tell, "" for none."""
+        """Add an assessment, None if unknown; return the line to report, "" for none."""
         if text is None:
             return ""
         if bool(text) == bool(self.text):
@@ -127,32 +129,32 @@ class _Lasting:
 
 
 class HealthModel:
-    """Judgements in, conditions out; pure.
+    """Model that converts observations to conditions; pure.
 
-    rotation_deg: the present camera.rotation, by which frames have been turned already
+    rotation_deg: present camera.rotation, by which frames have been turned already
     """
 
     def __init__(self, rotation_deg: int = 0) -> None:
         self._rotation = rotation_deg
         self._on = {name: _Lasting(over) for name, over in _OVER.items()}
-        self._on["turned"] = _Lasting(_OVER["turned"], 1)  # what it rests on has lasted
+        self._on["turned"] = _Lasting(_OVER["turned"], 1)  # its evidence has already lasted
         self._on["field"] = _Lasting(_OVER["field"], 1, 1)
         self._upright: deque[bool] = deque(maxlen=_SAMPLES)
         self._turned: deque[float] = deque(maxlen=_PROBES)
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Return what is bad now, each with its remedy."""
+        """Return the present conditions, each with its remedy."""
         return tuple([one.text for one in self._on.values() if one.text])
 
     @property
     def lacks_upright(self) -> bool:
-        """Return whether few upright faces are seen, so that turned ones are worth a search."""
+        """Return whether few upright faces are found, so that turned ones are worth a search."""
         few = len(self._upright) >= _BEGINS and 2 * sum(self._upright) < len(self._upright)
         return few and not self._on["turned"].text
 
     def step(self, seen: Judged) -> tuple[str, ...]:
-        """Take a judgement; return what there is to tell of it, one line each."""
+        """Add observations; return the lines to report."""
         texts = {
             "dark": self._dark(seen.picture),
             "turned": self._roll(seen),
@@ -198,7 +200,7 @@ class HealthModel:
         return self._turned_text(seen.turned_deg)
 
     def _turned_text(self, deg: float) -> str:
-        """Return by what frames are turned, clockwise, and what turns them upright."""
+        """Return a message with the clockwise angle of frames and the remedy."""
         quarter = round(deg / 90.0) * 90 % 360
         off = abs(_within_half(deg - quarter))
         about = (
@@ -207,7 +209,7 @@ class HealthModel:
         cure = "turn it upright on its mount"
         if quarter and off < _QUARTER_DEG:
             cure = f"set camera.rotation: {(self._rotation - quarter) % 360}"
-        return f"the camera is turned by {about}, by the faces that it shows: {cure}"
+        return f"the camera is turned by {about}, according to the faces: {cure}"
 
     def _slow(self, seen: Judged) -> str | None:
         if seen.over_s <= 0.0 or seen.offered <= 0:
@@ -221,17 +223,17 @@ class HealthModel:
         stage = max(spent, key=lambda name: spent[name])
         return (
             f"{seen.looked_at / seen.over_s:.0f} of {seen.offered / seen.over_s:.0f} frames a "
-            f"second are looked at; {stage} take{'s' * (stage in ('motion', 'reading'))} "
+            f"second are analysed; {stage} take{'s' * (stage in ('motion', 'reading'))} "
             f"{spent[stage]:.0f} of {each_ms:.0f} ms a frame: {_REMEDIES[stage]}"
         )
 
 
 class CameraHealth:
-    """Judges the frames of a camera as they are looked at.
+    """Monitor of the frames of a camera.
 
     Args:
-        rotation_deg: the present camera.rotation.
-        probe_s: time from one search of a turned frame to the next.
+        rotation_deg: Present camera.rotation.
+        probe_s: Time between searches of a turned frame, seconds.
     """
 
     def __init__(self, rotation_deg: int = 0, probe_s: float = PROBE_S) -> None:
@@ -249,20 +251,20 @@ class CameraHealth:
         spent_s: Mapping[str, float],
         field_assumed: bool = False,
     ) -> tuple[str, ...]:
-        """Take a frame that was looked at; return the present conditions.
+        """Add an analysed frame; return the present conditions.
 
         Args:
-            shot: the frame.
-            faces: those found in it.
-            spent_s: on each stage.
-            field_assumed: the field of view is not measured.
+            shot: The frame.
+            faces: Faces found in it.
+            spent_s: Time by stage, seconds.
+            field_assumed: Whether the field of view is not measured.
         """
         t_s = shot.captured_s
         if not isfinite(t_s):
             return self._model.conditions
         self._looked_at += 1
         self._spent.update(spent_s)
-        if t_s < self._last_s:  # another beginning
+        if t_s < self._last_s:  # time has restarted
             self._due_s = self._probe_s = -inf
         if t_s < self._due_s:
             self._last_s = t_s
@@ -285,7 +287,7 @@ class CameraHealth:
         return self._model.conditions
 
     def events(self) -> tuple[str, ...]:
-        """Return which conditions have begun and ended since the last call, one line each."""
+        """Return the conditions that began or ended since the last call, one line each."""
         told, self._events = tuple(self._events), []
         return told
 
@@ -300,7 +302,7 @@ class CameraHealth:
 
 
 class TurnedFaces:
-    """Looks for faces in frames that are turned, another way each time until one is found."""
+    """Search for faces in turned frames, in another direction each time until one is found."""
 
     def __init__(self) -> None:
         self._detector: MtcnnDetector | None = None
@@ -308,11 +310,11 @@ class TurnedFaces:
         self._fails = False
 
     def find(self, image: ImageArray, tilted: bool = False) -> float | None:
-        """Return how far a frame is turned clockwise, by its faces; 0.0: it is not, or shows none.
+        """Return the clockwise angle of a frame from its faces; 0.0: upright, or without faces.
 
-        None: the detector is missing.
+        The result is None if the detector is missing.
 
-        tilted: the frame as it is shows faces
+        tilted: whether the unturned frame shows faces
         """
         detector = self._made()
         if detector is None or not _is_picture(image):
@@ -365,7 +367,7 @@ def _any_sure(faces: Sequence[DetectedFace]) -> bool:
 
 
 def _any_upright(faces: Sequence[DetectedFace]) -> bool:
-    """Return whether there is a face that surely is one, and about upright."""
+    """Return whether any face is confident and nearly upright."""
     return _any_sure([face for face in faces if abs(roll_deg(face)) < _UPRIGHT_DEG])
 
 
@@ -375,7 +377,7 @@ def _within_half(deg: float) -> float:
 
 
 def roll_deg(face: DetectedFace) -> float:
-    """Return how far a face is turned clockwise in the image, by its eyes; 0 if unknown."""
+    """Return the clockwise roll of a face in the image from its eyes; 0 if unknown."""
     points: list[list[float]] = face.landmarks_px.tolist()
     if len(points) < 2:
         return 0.0
@@ -385,7 +387,7 @@ def roll_deg(face: DetectedFace) -> float:
 
 
 def picture_stats(image: NDArray[Any]) -> PictureStats | None:
-    """Return statistics of a frame; None if it is no picture of 8 bits."""
+    """Return statistics of a frame; None if it is no 8-bit picture."""
     if not _is_picture(image):
         return None
     green = _no_wider(image[..., 1], _WIDTH_PX)
@@ -395,7 +397,7 @@ def picture_stats(image: NDArray[Any]) -> PictureStats | None:
 
 def _edge_px(grey: NDArray[Any]) -> float | None:
     """Return the width of the sharper edges, None if there are too few."""
-    smooth = cv2.GaussianBlur(grey, (0, 0), 1.2)  # noise is no edge
+    smooth = cv2.GaussianBlur(grey, (0, 0), 1.2)  # removes noise, which is no edge
     half = _WINDOW_PX // 2
     window, middles = np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8), slice(half, None, half)
     across = cv2.convertScaleAbs(cv2.Sobel(smooth, cv2.CV_16S, 1, 0, ksize=1))
@@ -420,6 +422,6 @@ def _no_wider(image: NDArray[Any], width_px: int) -> ImageArray:
 
 
 def _is_picture(image: Any) -> bool:
-    """Return whether an array is a colour picture of 8 bits."""
+    """Return whether an array is an 8-bit colour picture."""
     is_array = isinstance(image, np.ndarray) and image.dtype == np.uint8 and image.size > 0
     return is_array and image.ndim == 3 and image.shape[2] >= 3 and min(image.shape[:2]) >= 4

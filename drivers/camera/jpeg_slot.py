@@ -1,15 +1,15 @@
-"""The newest encoded picture, from one process to another (``TwoEntries``)."""
+"""The newest encoded picture, passed from one process to another (``TwoEntries``)."""
 
 from typing import NamedTuple
 
 from gazerig.drivers.camera.two_entries import CONTEXT, TwoEntries
 
 MOST_BYTES = 190_000
-"""No picture is larger: 640 x 480 as a JPEG of good quality has a third of it."""
+"""Largest picture; a JPEG of 640 x 480 in good quality has a third of it."""
 
 
 class Picture(NamedTuple):
-    """An encoded picture: which one since the start, and when it came [s]."""
+    """An encoded picture: its number since the start, its time of arrival [s] and its bytes."""
 
     number: int
     came_s: float
@@ -17,10 +17,7 @@ class Picture(NamedTuple):
 
 
 class JpegSlot:
-    """The newest picture.
-
-    It can be handed to a process that is being started, as an argument.
-    """
+    """Slot of the newest picture; it can be passed as an argument to a new process."""
 
     def __init__(self) -> None:
         self._newest = TwoEntries()
@@ -29,7 +26,7 @@ class JpegSlot:
         self._entries = CONTEXT.RawArray("c", 2 * MOST_BYTES)
 
     def put(self, data: bytes, came_s: float) -> bool:
-        """Leave a picture; only one thread writes. False where it is too large."""
+        """Store a picture; only one thread writes. Return False if it is too large."""
         if not 0 < len(data) <= MOST_BYTES:
             return False
         entry = self._newest.older
@@ -41,7 +38,7 @@ class JpegSlot:
 
     @property
     def came_s(self) -> float:
-        """Return when the newest picture came, -inf before the first."""
+        """Return the time of arrival of the newest picture, -inf before the first."""
         count = self._newest.count
         return float(self._times[(count - 1) % 2]) if count else float("-inf")
 

@@ -1,8 +1,8 @@
-"""Frames of a camera that is mounted on its side, upside down or delivers mirror images.
+"""Correction of frames of a camera that is mounted sideways or upside down, or is mirrored.
 
-Every frame is turned upright as it comes, with all that belongs to it: depth, lens, faces that the
-camera itself found, and its gyro. From there on nobody needs to know how the camera was mounted.
-Turning costs .03 to .1 ms at 640 x 480 and .2 to .9 ms at 1920 x 1080.
+Every frame is turned upright on arrival, with its data: depth, lens, faces found by the camera
+itself, and gyro. So no other code needs to know how the camera is mounted. Turning takes .03 to .1
+ms at 640 x 480 and .2 to .9 ms at 1920 x 1080.
 """
 
 import threading
@@ -29,15 +29,15 @@ _QUARTERS = {
     180: ((-1, 0), (0, -1)),
     270: ((0, 1), (-1, 0)),
 }
-# The owner's right and left change places in a mirror.
+# A mirror exchanges the person's right and left.
 _OTHER_SIDE = [1, 0, 2, 4, 3]
 
 
 @dataclass(frozen=True)
 class FrameOrientation:
-    """How frames are turned upright; picklable.
+    """Orientation of a camera's frames; picklable.
 
-    rotation: degrees clockwise; mirrored: left and right are exchanged before that
+    rotation: degrees clockwise; mirrored: whether left and right are exchanged before that
     """
 
     rotation: Rotation = 0
@@ -45,11 +45,11 @@ class FrameOrientation:
 
     @property
     def plain(self) -> bool:
-        """Return whether frames stay as they are."""
+        """Return whether frames need no change."""
         return self.rotation == 0 and not self.mirrored
 
     def upright(self, shot: Shot) -> Shot:
-        """Return a frame turned upright, with all that belongs to it."""
+        """Return a frame turned upright, with its data."""
         if self.plain:
             return shot
         height, width = shot.image.shape[:2]
@@ -65,7 +65,7 @@ class FrameOrientation:
 
     def turned(self, image: NDArray[Any]) -> NDArray[Any]:
         """Return an image (h, w) or (h, w, c) turned upright, read-only."""
-        import cv2  # in the process that has a camera, and not in that of the control loop
+        import cv2  # only in the process with the camera, not in that of the control loop
 
         if self.mirrored:
             image = cv2.flip(image, 1)
@@ -81,7 +81,7 @@ class FrameOrientation:
         return out
 
     def points(self, points_px: Floats, width_px: int, height_px: int) -> Floats:
-        """Return where pixels (n, 2) of a frame of this size are in the upright one."""
+        """Return the positions of pixels (n, 2) of a frame of this size in the upright one."""
         across = self._across()
         far = np.array([width_px - 1, height_px - 1], dtype=np.float64)
         least = np.minimum(across @ far, 0.0)  # the corner that becomes the upper left one
@@ -89,17 +89,17 @@ class FrameOrientation:
         return out
 
     def lens(self, lens: Intrinsics, width_px: int, height_px: int) -> Intrinsics:
-        """Return the lens of upright frames from that of frames of this size as they come."""
+        """Return the lens of upright frames from that of original frames of this size."""
         (cx, cy), *_ = self.points(np.array([[lens.cx_px, lens.cy_px]]), width_px, height_px)
         across = self._across()
         fx, fy = np.abs(across) @ (lens.fx_px, lens.fy_px)
         k1, k2, p1, p2, k3 = lens.distortion
-        # The tangential part is r2 t + 2 (t . x) x with t = (p2, p1): t turns like a point.
+        # The tangential part is r2 t + 2 (t . x) x with t = (p2, p1), so t turns like a point.
         p2, p1 = across @ (p2, p1)
         return Intrinsics(fx, fy, float(cx), float(cy), (k1, k2, float(p1), float(p2), k3))
 
     def face(self, face: DetectedFace, width_px: int, height_px: int) -> DetectedFace:
-        """Return a face that was found in a frame of this size, as in the upright one."""
+        """Return a face of a frame of this size in the coordinates of the upright frame."""
         x, y, width, height = face.box_px
         ends = self.points(np.array([(x, y), (x + width, y + height)]), width_px, height_px)
         (left, top), (right, bottom) = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
@@ -129,15 +129,15 @@ class FrameOrientation:
 
 
 AS_DELIVERED = FrameOrientation()
-"""Frames stay as they come."""
+"""Orientation that leaves frames unchanged."""
 
 
 class UprightSource:
     """A source whose frames are turned upright.
 
     Args:
-        source: gives the frames as the camera delivers them.
-        orientation: how they are turned.
+        source: Source of the camera's original frames.
+        orientation: Orientation of the camera.
     """
 
     def __init__(self, source: FrameSource, orientation: FrameOrientation) -> None:
@@ -145,12 +145,12 @@ class UprightSource:
 
     @property
     def rotation(self) -> Rotation:
-        """Return by how many degrees frames are turned clockwise."""
+        """Return the angle by which frames are turned clockwise, degrees."""
         return self._orientation.rotation
 
     @property
     def has_unknown_lens(self) -> bool:
-        """Return whether the camera itself cannot tell its field of view."""
+        """Return whether the camera does not report its field of view."""
         return bool(getattr(self._source, "has_unknown_lens", False))
 
     def open(self) -> None:
@@ -162,7 +162,7 @@ class UprightSource:
         self._source.open()
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next frame; None where ``stop`` was set meanwhile.
+        """Wait for the next frame; return None if ``stop`` was set meanwhile.
 
         Raises:
             CameraError: there will be no more frames.
@@ -171,7 +171,7 @@ class UprightSource:
         return None if shot is None else self._orientation.upright(shot)
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return self._source.events()
 
     def close(self) -> None:
@@ -182,7 +182,7 @@ class UprightSource:
 def upright(
     source: Callable[[], FrameSource], orientation: FrameOrientation
 ) -> Callable[[], FrameSource]:
-    """Return how to make a source of upright frames from how to make it; picklable."""
+    """Return a factory of a source with upright frames; picklable."""
     return source if orientation.plain else partial(_upright, source, orientation)
 
 

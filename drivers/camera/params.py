@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 from gazerig.params import Bounds
 
 ASSUMED_FIELD_DEG = 69.0
-"""Horizontal field of view of a lens that nobody has measured: an OAK-D's."""
+"""Assumed horizontal field of view of an unmeasured lens, that of an OAK-D."""
 
 
 @dataclass(frozen=True)
 class CameraRecoveryParams:
-    """How a lost camera is reopened."""
+    """Parameters of reopening a lost camera."""
 
     # fmt: off
     retry_ms: Annotated[float, Bounds(1, 60000), "delay before a lost camera is opened again; it doubles with each attempt"] = 250.0
@@ -27,7 +27,7 @@ class CameraRecoveryParams:
 
 @dataclass(frozen=True)
 class WebcamParams:
-    """What is requested of a webcam, which delivers what comes nearest."""
+    """Settings requested from a webcam, which uses the nearest ones that it has."""
 
     # fmt: off
     width_px: Annotated[int, Bounds(16, 16384), "image width requested from the camera"] = 640

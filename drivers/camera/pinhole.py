@@ -1,4 +1,4 @@
-"""The pinhole model of a camera: focal lengths, optical axis and distortion, in pixels.
+"""Pinhole model of a camera: focal lengths, optical axis and distortion, in pixels.
 
 Camera frame: optical, x right, y down, z forward. Pixels have their centres at whole numbers.
 Distortion is that of the OpenCV manual (camera calibration and 3D reconstruction): two tangential
@@ -20,10 +20,10 @@ _NONE: Distortion = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A camera.
+    """Intrinsic parameters of a camera.
 
-    fx_px, fy_px: focal lengths; cx_px, cy_px: where the optical axis meets the frame
-    distortion: k1 k2 p1 p2 k3 of the OpenCV manual; all 0 for a lens without
+    fx_px, fy_px: focal lengths; cx_px, cy_px: principal point
+    distortion: k1 k2 p1 p2 k3 of the OpenCV manual; all 0 without distortion
     """
 
     fx_px: float
@@ -33,7 +33,7 @@ class Intrinsics:
     distortion: Distortion = _NONE
 
     def __post_init__(self) -> None:
-        """Refuse focal lengths that are no lengths, and distortion that is no five numbers.
+        """Reject invalid focal lengths and distortion.
 
         Raises:
             ValueError: a focal length is not above 0, or a coefficient is not finite.
@@ -45,7 +45,7 @@ class Intrinsics:
 
     @property
     def distorts(self) -> bool:
-        """Return whether straight lines become bent in its frames."""
+        """Return whether straight lines are bent in its frames."""
         return any(self.distortion)
 
     @property
@@ -56,7 +56,7 @@ class Intrinsics:
         )
 
     def scaled(self, factor_x: float, factor_y: float) -> "Intrinsics":
-        """Return the intrinsics of the same frames made wider and higher by these factors.
+        """Return the intrinsics of the same frames scaled by these factors.
 
         Raises:
             ValueError: a factor is not above 0.
@@ -71,7 +71,7 @@ class Intrinsics:
 
 
 def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrinsics:
-    """Return the intrinsics of square pixels with the axis in the middle of the frame.
+    """Return the intrinsics of square pixels with the optical axis at the centre of the frame.
 
     view_rad: horizontal field of view, from edge to edge
 
@@ -79,6 +79,6 @@ def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrin
         ValueError: the field of view is not between 0 and pi.
     """
     if not 0.0 < view_rad < pi:
-        raise ValueError(f"a field of view lies between 0 and pi rad, not {view_rad}")
+        raise ValueError(f"a field of view must be between 0 and pi rad, not {view_rad}")
     focal_px = 0.5 * width_px / tan(0.5 * view_rad)
     return Intrinsics(focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1))

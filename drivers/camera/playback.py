@@ -1,4 +1,4 @@
-"""A camera recording played again: the same frames at the same times from each other."""
+"""Playback of a camera recording: the same frames at the same intervals."""
 
 import threading
 from collections.abc import Callable
@@ -11,14 +11,14 @@ from gazerig.drivers.camera.video_pacing import VideoPacing
 from gazerig.drivers.camera.video_timestamps import VideoTimestamps
 from gazerig.drivers.errors import CameraError
 
-_ALONE_S = 0.1  # how long a recording of one frame lasts
+_ALONE_S = 0.1  # duration of a recording of one frame
 
 
 class CameraReplay:
-    """A recording, repeated for ever like a film; film time starts at 0 with frame 1."""
+    """A recording, repeated forever like a film; film time starts at 0 with frame 1."""
 
     def __init__(self, path: str | Path) -> None:
-        """Name the file; nothing is opened yet."""
+        """Set the path; nothing is opened yet."""
         self._path = Path(path).expanduser()
         self._recording: Recording | None = None
         self._times = VideoTimestamps(1.0)
@@ -29,7 +29,7 @@ class CameraReplay:
         """Open the file, or open it again at film time 0.
 
         Raises:
-            CameraError: it is absent, no recording, or holds no frame.
+            CameraError: it is absent, no recording, or contains no frame.
         """
         self.close()
         self._recording = Recording(self._path)
@@ -41,7 +41,7 @@ class CameraReplay:
 
     @property
     def length_s(self) -> float:
-        """Return how long one showing lasts."""
+        """Return the duration of one repeat, seconds."""
         self._opened()
         return self._times.length_s
 
@@ -71,7 +71,7 @@ class CameraReplay:
         return None if due is None else self.shot(due.number)._replace(captured_s=due.host_s)
 
     def events(self) -> tuple[str, ...]:
-        """Return what is wrong with the file, one line each, once."""
+        """Return problems of the file, one line each, once."""
         message, self._unreported = self._unreported, ""
         return (message,) if message else ()
 

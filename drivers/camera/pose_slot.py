@@ -1,4 +1,4 @@
-"""The newest pose of the head: written by the control loop, read by a process that draws its view.
+"""The newest pose of the head, written by the control loop, read by a process that draws its view.
 
 No lock is needed (``TwoEntries``).
 """
@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 from gazerig.drivers.camera.two_entries import CONTEXT, TwoEntries
 
-_WIDTH = 13  # time, the nine numbers of the rotation, the place
+_WIDTH = 13  # time, the rotation's nine numbers, the position
 
 Row = tuple[float, float, float]
 
 
 class PoseAt(NamedTuple):
-    """Rotation (three rows) and place [m] of the head in the world at a time [s]."""
+    """Rotation (three rows) and position [m] of the head in the world at a time [s]."""
 
     t_s: float
     R_world_head: tuple[Row, Row, Row]
@@ -22,9 +22,9 @@ class PoseAt(NamedTuple):
 
 
 class PoseSlot:
-    """The newest pose, and when the first was written.
+    """Slot of the newest pose and the time of the first.
 
-    It can be handed to a process that is being started, as an argument.
+    It can be passed as an argument to a new process.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class PoseSlot:
 
     @property
     def first_s(self) -> float:
-        """Return the time of the first pose, 0 before it."""
+        """Return the time of the first pose, seconds; 0 before it."""
         return float(self._first_s.value)
 
     def newest(self) -> PoseAt | None:

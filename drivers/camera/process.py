@@ -1,12 +1,10 @@
-"""Detection in a process of its own, which can neither delay nor end the control loop.
+"""Detection in a separate process, which can neither delay nor end the control loop.
 
-Python runs one thread of a process at a time, so what finds faces would cost a loop in the
-same process milliseconds now and then; and where processors are few, the loop's process is
-to go first. What was found comes back through a pipe, frames through shared memory, from which they
-are copied when they are asked for.
-
-A process that crashes, or is blocked in a camera's driver, is started again while the loop
-goes on without frames: the last detections stay, and their age shows the loss.
+Python runs one thread of a process at a time, so a face detector would sometimes delay a loop in
+the same process by milliseconds; and on few cores the loop's process needs priority. Detections
+return through a pipe, frames through shared memory, from which they are copied on request. A
+process that crashes, or is blocked in a camera's driver, is restarted while the loop continues
+without frames: the last detections stay, and their age shows the loss.
 """
 
 import multiprocessing
@@ -34,14 +32,15 @@ from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, FaceDetector
 _LONGEST_START_S = 60.0
 _POLL_S = 0.1
 _STABLE_S = 10.0
-"""A process that lived for so long is well: the next end is news, and tried again quickly."""
+"""Lifetime after which a process counts as stable: its next end is reported and it is restarted
+quickly."""
 _MOST_EVENTS = 100
 _BLOB_IDS = 1_000_000
-"""Things that a process finds are numbered from 0; those of the next one from so many on."""
+"""Ids of things reserved for each process; the next process starts above them."""
 
 
 class _End(NamedTuple):
-    """Why a process delivers no more frames; final: no other one is started."""
+    """Reason why a process delivers no more frames; final: no other one is started."""
 
     reason: str
     final: bool = False
@@ -50,17 +49,17 @@ class _End(NamedTuple):
 class CameraProcess:
     """A camera, or a film paced by the real clock, watched from another process.
 
-    The same calls as a camera thread; while a lost source is reopened the last detections
-    stay, and their age shows the loss.
+    It has the methods of a camera thread. While a lost source is reopened the last detections stay,
+    and their age shows the loss.
 
     Args:
-        parts: how to make source and detectors; nothing starts yet.
-        now_s: the host's monotonic clock, picklable; all processes share its zero.
-        recovery: how a lost camera is reopened.
-        before: processes of other cameras that the same loop has looked through; what this one
-            finds is another scene than theirs.
+        parts: Factories of source and detectors; nothing starts yet.
+        now_s: The host's monotonic clock, picklable; all processes share its zero.
+        recovery: Parameters of reopening a lost camera.
+        before: Number of earlier camera processes of the same loop; the scenes of this one differ
+            from theirs.
 
-    frames, frames_with_face: counts of frames looked at since open
+    frames, frames_with_face: counts of analysed frames since open
     """
 
     def __init__(
@@ -84,13 +83,13 @@ class CameraProcess:
         self._forget()
 
     def _forget(self) -> None:
-        """Begin to count at frame 1."""
+        """Reset the state to frame 1."""
         self.frames = self.frames_with_face = 0
         self._counted = self._number = 0
         self._starts = self._before
         self._lost_s: float | None = None
         self._back_s = 0.0
-        self._losses = 0  # without a sound time between them
+        self._losses = 0  # without a stable period between them
         self._owes_back = False
 
     def open(self) -> None:
@@ -98,7 +97,7 @@ class CameraProcess:
 
         Raises:
             CameraError: the source cannot be opened, or is open already.
-            SetupError: the detector cannot be made.
+            SetupError: the detector cannot be created.
         """
         if self._process is not None:
             raise CameraError("the camera process runs already: close() it before opening it again")
@@ -114,10 +113,10 @@ class CameraProcess:
         self._thread.start()
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return what the newest frame showed, or None before the first.
+        """Return the detections of the newest frame, or None before the first.
 
         Raises:
-            CameraError: the source has been gone for longer than ``give_up_s``.
+            CameraError: the source has been lost for longer than ``give_up_s``.
         """
         if self._failure:
             raise CameraError(self._failure)
@@ -129,25 +128,25 @@ class CameraProcess:
         motion: Callable[[Motion | None], Motion | None] | None,
         locate: Locate | None = None,
     ) -> bool:
-        """Change detectors and calibration of the process from one of the next frames on.
+        """Change detectors and calibration of the process, from one of the next frames on.
 
-        Never waits. A detector that cannot be made there is reported as an event, and the old
-        one goes on.
+        It never waits. A detector that cannot be created there is reported as an event, and the old
+        one stays.
 
         Args:
-            detector: makes another one; None: no change.
-            motion: returns a motion detector from the present one; None: no change.
-            locate: locates by another calibration; None: no change.
+            detector: Creates another detector; None: no change.
+            motion: Returns a motion detector from the present one; None: no change.
+            locate: Locates by another calibration; None: no change.
 
         Returns:
-            Whether the process has room for the request.
+            Whether the process accepts the request.
         """
         pipe = self._pipe
         try:
             if pipe is None or not select([], [pipe], [], 0.0)[1]:
                 return False
             pipe.send(Retune(detector, motion, locate))
-        except (OSError, ValueError):  # it has ended, and the next one is on its way
+        except (OSError, ValueError):  # it has ended, and the next one is starting
             return False
         # For the process after this one.
         self._parts = self._parts._replace(
@@ -157,7 +156,7 @@ class CameraProcess:
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Return what has happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         messages = []
         while self._events:
             messages.append(self._events.popleft())
@@ -174,10 +173,10 @@ class CameraProcess:
         self._end(LONGEST_END_S)
         self._thread = None
 
-    # --- one process
+    # --- a single process
 
     def _start(self) -> SetupError | None:
-        """Start a process and wait for its first word; return why it cannot do its work."""
+        """Start a process and wait for its first message; return its error, if any."""
         context = multiprocessing.get_context("spawn")
         pipe, theirs = context.Pipe()
         process = context.Process(
@@ -202,7 +201,7 @@ class CameraProcess:
         return message if isinstance(message, SetupError) else None
 
     def _end(self, timeout_s: float) -> None:
-        """End the process, by force where it does not end in time; safe to call twice."""
+        """End the process, by force if it does not end in time; safe to call twice."""
         process, pipe = self._process, self._pipe
         if process is None or pipe is None:
             return
@@ -213,10 +212,10 @@ class CameraProcess:
         self._process = self._pipe = None
         pipe.close()
 
-    # --- one after the other, in a thread
+    # --- successive processes, in a thread
 
     def _supervise(self) -> None:
-        """Receive results of a process and restart it when it ends, until retrying is over."""
+        """Receive results of a process and restart it when it ends, until the time limit."""
         wait_s = self._recovery.retry_ms / 1e3
         while not self._closing.is_set():
             began_s = self._now_s()
@@ -249,22 +248,22 @@ class CameraProcess:
         return not end.final and gone_s < self._recovery.give_up_s
 
     def _lose(self, reason: str, remedy: str) -> None:
-        """Record that no frames come; losses that soon follow one another are reported once."""
+        """Record that no frames arrive; losses in quick succession are reported once."""
         self._lost_s = self._now_s()
         self._losses += 1
         if self._recovery.give_up_s > 0.0 and self._losses == 1:
             self._owes_back = True
             self._events.append(f"{LOST} ({reason}): {remedy}")
         elif self._losses == 2:
-            self._events.append(f"{LOST} again ({reason}): from now on it is tried without a word")
+            self._events.append(f"{LOST} again ({reason}): further attempts are not reported")
 
     def _receive(self) -> _End:
-        """Receive results of a process until it ends or hangs; return how it ended."""
+        """Receive results of a process until it ends or hangs; return the reason."""
         pipe = self._pipe
         assert pipe is not None
         slots = SlotReader(), SlotReader()
         silence = FrameWatchdog(self._recovery, self._now_s())
-        retrying = False  # the process itself opens a lost source again and again
+        retrying = False  # the process itself keeps reopening a lost source
         self._counted = self._number
         try:
             while True:
@@ -297,7 +296,7 @@ class CameraProcess:
         return self._process is not None and self._process.is_alive()
 
     def _is_hung(self, silence: FrameWatchdog) -> bool:
-        """Report a camera without new frames; return whether to end its process."""
+        """Report a camera without new frames; return whether its process must be ended."""
         verdict = silence.verdict(self._now_s())
         if verdict and self._lost_s is None:
             self._lose("no new frame", "waiting for it")
@@ -306,7 +305,7 @@ class CameraProcess:
         return verdict == "hung"
 
     def _publish(self, message: Found, slots: tuple[SlotReader, SlotReader]) -> None:
-        """Publish detections, which copy the frame from its slot if it is asked for."""
+        """Publish detections, which copy the frame from its slot on request."""
         found = message.detections
         self.frames += 1
         self.frames_with_face += bool(found.faces)
@@ -327,14 +326,14 @@ class CameraProcess:
 
 
 def renumbered(found: Detections, starts: int) -> Detections:
-    """Return detections of a process before which there were others.
+    """Return detections with ids that differ from those of earlier processes.
 
-    Its things are other ones, and what it shows is another scene: nobody knows what was before the
-    camera meanwhile, nor whether it is the same camera.
+    Its things and its scene are new: what was in front of the camera meanwhile is unknown, as is
+    whether it is the same camera.
 
     Args:
-        found: by the process.
-        starts: how many there were before.
+        found: Detections of the process.
+        starts: Number of earlier processes.
     """
     located, first = found.located, starts * _BLOB_IDS
     if located is not None:

@@ -1,4 +1,4 @@
-"""OpenCV's own complaints kept off the terminal where we say the same in one line."""
+"""Suppression of OpenCV's messages on the terminal, as ours report the same in one line."""
 
 import os
 from collections.abc import Iterator
@@ -9,10 +9,10 @@ import cv2
 
 @contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """Silence OpenCV's log for the length of a with block, in all threads.
+    """Silence OpenCV's log for the duration of a with block, in all threads.
 
-    FFmpeg inside OpenCV is silenced for good when the first film is opened, as its
-    level is read but once; a level the user has set in the environment stays.
+    FFmpeg in OpenCV is silenced permanently when the first film is opened, as it reads its level
+    only once; a level set by the user in the environment stays.
     """
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)

@@ -1,4 +1,4 @@
-"""Recording a camera's frames while it is used; they are encoded and written by threads."""
+"""Recording of a camera's frames while it is used; threads encode and write them."""
 
 import queue
 import threading
@@ -12,12 +12,12 @@ from gazerig.drivers.camera.recording_format import encoded
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.camera.source import FrameSource, Shot
 
-_ENCODERS = 2  # PNG of colour and depth takes most of a frame's time; OpenCV frees the others
-_MOST_WAITING = 30  # frames; where the disk is slower than the camera, frames are left out
+_ENCODERS = 2  # PNG of colour and depth takes most of a frame's time; OpenCV frees the GIL
+_MOST_WAITING = 30  # frames; if the disk is slower than the camera, frames are omitted
 
 
 class _Waiting(NamedTuple):
-    """A frame on its way into the file."""
+    """A frame that is queued for the file."""
 
     captured_s: float
     number: int
@@ -25,19 +25,20 @@ class _Waiting(NamedTuple):
 
 
 class CameraRecorder:
-    """A source of frames that are also written to a file; they come through unchanged.
+    """A source of frames that are also written to a file and returned unchanged.
 
-    A fault of the disk ends the recording, is reported, and leaves the camera running. The
-    file stays open while the source is closed and opened again; ``finish`` closes it.
+    An error of the disk ends the recording and is reported; the camera continues. The file stays
+    open while the source is reopened; ``finish`` closes it.
 
     Args:
-        source: the frames.
-        path: the file.
-        about: metadata of the recording.
-        jpeg_quality: 1..100, None keeps the frames exactly.
-        over: whether an existing file is overwritten.
+        source: Source of frames.
+        path: Path of the file.
+        about: Metadata of the recording.
+        jpeg_quality: Quality 1..100, None keeps the frames exactly.
+        over: Whether to overwrite an existing file.
 
-    failure: why the recording ended early, or ""; left_out: frames the disk was too slow for
+    failure: reason why the recording ended early, or ""; left_out: number of frames omitted because
+        of a slow disk
     """
 
     def __init__(
@@ -63,14 +64,14 @@ class CameraRecorder:
 
     @property
     def written(self) -> int:
-        """Return how many frames are in the file."""
+        """Return the number of frames in the file."""
         return 0 if self._writer is None else self._writer.written
 
     def open(self) -> None:
         """Open the source and, the first time, create the file.
 
         Raises:
-            CameraError: the source cannot be opened or the file not be made.
+            CameraError: the source cannot be opened, or the file cannot be created.
         """
         self._source.open()
         if self._writer is None:
@@ -86,7 +87,7 @@ class CameraRecorder:
             self._thread.start()
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next frame, and hand it to the recording.
+        """Wait for the next frame, and pass it to the recording.
 
         Raises:
             CameraError: there will be no more frames.
@@ -102,11 +103,11 @@ class CameraRecorder:
         return (*self._source.events(), *reported)
 
     def close(self) -> None:
-        """Free the source; the file stays open for when it comes back."""
+        """Free the source; the file stays open in case it is reopened."""
         self._source.close()
 
     def finish(self) -> None:
-        """Write what is waiting and close the file; safe to call twice."""
+        """Write queued frames and close the file; safe to call twice."""
         if self._thread is not None:
             self._waiting.put(None)
             self._thread.join()
@@ -116,12 +117,12 @@ class CameraRecorder:
             self._encoders = None
 
     def _hand_on(self, shot: Shot) -> None:
-        """Begin to encode a frame, unless too many wait already."""
+        """Begin to encode a frame, unless too many are queued already."""
         if self._waiting.full():
             if self.left_out == 0:
                 self._events.append(
-                    f"{self._path}: this machine is slower than the camera, frames are left out "
-                    "of the recording; --jpeg makes them smaller and faster"
+                    f"{self._path}: this machine is slower than the camera, frames are omitted "
+                    "from the recording; --jpeg makes them smaller and faster"
                 )
             self.left_out += 1
         elif self._encoders is not None:
@@ -138,7 +139,7 @@ class CameraRecorder:
         self._try(writer.close)
 
     def _try(self, write: Callable[[], None]) -> None:
-        """Do it, or note why it cannot be done: whatever it is, the camera goes on."""
+        """Call ``write``, or record why it failed: the camera continues after any error."""
         try:
             write()
         except Exception as error:

@@ -1,10 +1,9 @@
-"""What a camera recording holds: MCAP messages in JSON that Foxglove's tools show as they are.
+"""Format of a camera recording: MCAP messages in JSON that Foxglove's tools can display.
 
-Frames are PNG (exact) or JPEG (small) files inside foxglove.CompressedImage, depth is a
-16-bit PNG of millimetres with 0 where unknown, the lens is foxglove.CameraCalibration (schemas:
-Foxglove documentation, message schemas). All messages of one frame carry the time of its
-exposure in the host's monotonic clock, and the frame itself comes last: where it is, the rest
-is. MCAP: mcap.dev/spec.
+Frames are PNG (exact) or JPEG (small) files inside foxglove.CompressedImage, depth is a 16-bit PNG
+of millimetres with 0 where unknown, the lens is foxglove.CameraCalibration (schemas: Foxglove
+documentation, message schemas). All messages of one frame have the time of its exposure in the
+host's monotonic clock. The image comes last: if it is present, so is the rest. MCAP: mcap.dev/spec.
 """
 
 import base64
@@ -82,22 +81,22 @@ SCHEMAS: dict[str, tuple[str, dict[str, Any]]] = {
     ),
 }
 """Topic -> name and JSON schema of its messages."""
-# Level 1 of 9 is little larger than the best and many times as fast; runs suit colour best.
+# Level 1 of 9 is hardly larger than the best and many times as fast; RLE suits colour best.
 _DEPTH_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 _COLOUR_PNG = [*_DEPTH_PNG, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
 
 
 class BadMessage(ValueError):
-    """A message does not hold what its topic requires; the text names the error."""
+    """A message lacks contents that its topic requires; the text names the error."""
 
 
 def nanoseconds(time_s: float) -> int:
-    """Return a time as MCAP counts it."""
+    """Return a time in nanoseconds, as in MCAP."""
     return round(time_s * 1e9)
 
 
 def encoded(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]:
-    """Turn a frame and what belongs to it into messages, the frame last.
+    """Encode a frame and its data as messages, the image last.
 
     jpeg_quality: 1..100, None for PNG
     """
@@ -126,7 +125,7 @@ def image(data: bytes) -> ImageArray:
     """Read a frame message.
 
     Raises:
-        BadMessage: it holds no frame.
+        BadMessage: it contains no frame.
     """
     pixels = bgr(_pixels(data))
     if pixels is None:
@@ -138,7 +137,7 @@ def depth(data: bytes) -> Depth:
     """Read a depth message.
 
     Raises:
-        BadMessage: it holds no 16-bit frame.
+        BadMessage: it contains no 16-bit frame.
     """
     mm = _pixels(data)
     if mm.dtype != np.uint16 or mm.ndim != 2:
@@ -150,7 +149,7 @@ def lens(data: bytes) -> Intrinsics:
     """Read a lens message.
 
     Raises:
-        BadMessage: it holds no camera matrix.
+        BadMessage: it contains no camera matrix.
     """
     K = np.asarray(_load(data, "K"), dtype=np.float64)
     if K.shape != (9,) or not np.isfinite(K).all() or K[0] <= 0.0 or K[4] <= 0.0:
@@ -163,10 +162,10 @@ def lens(data: bytes) -> Intrinsics:
 
 
 def turn(data: bytes) -> CameraTurn:
-    """Read a message of how the camera was turned.
+    """Read a message of the camera's orientation.
 
     Raises:
-        BadMessage: it holds no rotation.
+        BadMessage: it contains no rotation.
     """
     epoch, R = _load(data, "epoch"), np.asarray(_load(data, "R"), dtype=np.float64)
     if not isinstance(epoch, int) or R.shape != (9,):
@@ -179,10 +178,10 @@ def turn(data: bytes) -> CameraTurn:
 
 
 def faces(data: bytes) -> tuple[DetectedFace, ...]:
-    """Read a message of found faces.
+    """Read a message of faces.
 
     Raises:
-        BadMessage: it holds no list of faces.
+        BadMessage: it contains no list of faces.
     """
     found = []
     for face in _load(data, "faces"):

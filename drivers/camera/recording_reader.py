@@ -1,4 +1,4 @@
-"""A camera recording as a list of frames; what a killed program left counts up to its end."""
+"""A camera recording as a list of frames; one of a killed program is read up to its end."""
 
 import struct
 from collections.abc import Iterator
@@ -23,14 +23,14 @@ _FIXED = 22  # bytes of a message before its data
 
 
 class _MessagePlace(NamedTuple):
-    """Where a record's content lies in the file."""
+    """Position of a record's content in the file."""
 
     offset: int
     length: int
 
 
 class _FrameIndex(NamedTuple):
-    """When a frame was taken, and where in the file it and what belongs to it lie."""
+    """Time of a frame, and the positions of its messages in the file."""
 
     stamp_ns: int
     places: dict[str, _MessagePlace]
@@ -39,15 +39,14 @@ class _FrameIndex(NamedTuple):
 class Recording:
     """An open recording.
 
-    times_s: when each frame was taken, rising, the first at 0; note: what is not as it
-        should be with the file, or ""
+    times_s: time of each frame, ascending, the first at 0; note: a problem of the file, or ""
     """
 
     def __init__(self, path: Path) -> None:
-        """Open the file and find its frames.
+        """Open the file and index its frames.
 
         Raises:
-            CameraError: it is absent, no recording, or holds no frame.
+            CameraError: it is absent, no recording, or contains no frame.
         """
         self._path = path
         self._file = open_mcap(path, CameraError, _CURE)
@@ -72,7 +71,7 @@ class Recording:
         )
 
     def shot(self, index: int) -> Shot:
-        """Read a frame, counted from 0, with its time from the first frame's.
+        """Read a frame, counted from 0, with its time since the first frame.
 
         Raises:
             CameraError: the file is damaged there.
@@ -128,7 +127,7 @@ class Recording:
             elif kind == Opcode.MESSAGE:
                 head = Message.read(self._content(place, _FIXED), _FIXED)
                 topic = self._channels.get(head.channel_id, "")
-                if head.log_time != stamp_ns:  # what came before belongs to no frame
+                if head.log_time != stamp_ns:  # earlier messages belong to no frame
                     stamp_ns, waiting = head.log_time, {}
                 waiting[topic] = place
                 if topic == fmt.PICTURE:
@@ -158,7 +157,7 @@ class Recording:
             self._channels[channel.id] = channel.topic
 
     def _records(self) -> Iterator[tuple[int, _MessagePlace]]:
-        """Walk over the records that are whole: kind and place of each."""
+        """Yield the kind and position of each complete record."""
         end = self._path.stat().st_size
         offset = len(MAGIC)
         while offset + _HEAD <= end:

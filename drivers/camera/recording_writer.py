@@ -1,7 +1,6 @@
-"""A camera recording being written: every frame is in the file when ``write`` returns.
+"""Writer of a camera recording: every frame is in the file when ``write`` returns.
 
-The file has no chunks, so a killed program leaves all that was written, readable to the last
-whole frame.
+The file has no chunks, so after a kill it can be read up to the last complete frame.
 """
 
 import json
@@ -16,14 +15,14 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.files.file_output import refuse_existing
 
-# What the system has may be lost with the power; so often it is put on the disk.
+# Interval of syncs to the disk, as a loss of power loses the system's buffers.
 _SYNC_NS = 1_000_000_000
 
 
 class RecordingWriter:
     """An MCAP file of frames.
 
-    written: frames so far
+    written: number of frames so far
     """
 
     def __init__(
@@ -31,11 +30,11 @@ class RecordingWriter:
     ) -> None:
         """Create the file.
 
-        about: what should be known of the recording, kept in it; jpeg_quality: 1..100, None
-            keeps frames exactly; over: an existing file is written over
+        about: metadata of the recording; jpeg_quality: 1..100, None keeps frames exactly; over:
+            whether to overwrite an existing file
 
         Raises:
-            CameraError: the file already exists or cannot be made.
+            CameraError: the file already exists or cannot be created.
         """
         self._path = path
         self._jpeg_quality = jpeg_quality
@@ -57,7 +56,7 @@ class RecordingWriter:
         self.written = 0
 
     def write(self, shot: Shot) -> None:
-        """Add a frame and what belongs to it.
+        """Add a frame and its data.
 
         Raises:
             OSError: the disk is full or gone.
@@ -65,7 +64,7 @@ class RecordingWriter:
         self.add(shot.captured_s, shot.number, encoded(shot, self._jpeg_quality))
 
     def add(self, captured_s: float, number: int, messages: list[tuple[str, bytes]]) -> None:
-        """Add a frame that is encoded already: topics and messages, the frame last.
+        """Add an encoded frame: topics and messages, the image last.
 
         Raises:
             OSError: the disk is full or gone.

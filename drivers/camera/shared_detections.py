@@ -1,7 +1,7 @@
-"""Detections of another process, whose image and depth are copied only if they are asked for.
+"""Detections of another process, whose image and depth are copied only on request.
 
-Most frames are never looked at in the loop's process: the page shows ten a second, a recording
-holds two, and copying all of them costs more than a tick.
+The loop's process never reads most frames: the page shows ten per second, a recording contains two,
+and copying all of them takes longer than a tick.
 """
 
 from dataclasses import fields
@@ -19,14 +19,14 @@ _UNREAD: Any = object()
 class SharedDetections(Detections):
     """Detections with image and depth in shared memory.
 
-    Both are None if they are first asked for when their slots have been written again, some frames
-    later; once read, they stay.
+    Both are None if they are first read after their slots were overwritten, some frames later; once
+    read, they stay.
 
     Args:
-        found: without image and depth.
-        image_at: where the image is; None: there is none.
-        depth_at: the same of the depth.
-        readers: of images and of depths; for any thread.
+        found: Detections without image and depth.
+        image_at: Address of the image; None for none.
+        depth_at: Address of the depth; None for none.
+        readers: Readers of images and of depths; for any thread.
     """
 
     __slots__ = ("_addresses", "_depth", "_image", "_readers")
@@ -52,7 +52,7 @@ class SharedDetections(Detections):
 
     @property
     def image(self) -> ImageArray | None:
-        """Return the image, if it is still there."""
+        """Return the image if it is still available."""
         if self._image is _UNREAD:
             object.__setattr__(self, "_image", self._read(0))
         image: ImageArray | None = self._image
@@ -60,7 +60,7 @@ class SharedDetections(Detections):
 
     @property
     def depth_m(self) -> Depth | None:
-        """Return the depth, if it is still there."""
+        """Return the depth if it is still available."""
         if self._depth is _UNREAD:
             object.__setattr__(self, "_depth", self._read(1))
         depth: Depth | None = self._depth

@@ -1,7 +1,7 @@
-"""Frames from one process to another through shared memory: a few slots, written in turn.
+"""Frames from one process to another through shared memory: a few slots, written in rotation.
 
-The reader copies a slot out and looks at its stamp before and after; a slot that was written
-meanwhile is given up. Neither side waits.
+The reader copies a slot and reads its stamp before and after; a slot that was written meanwhile is
+discarded. Neither side waits.
 """
 
 import threading
@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SLOTS = 6
-_STAMP_BYTES = 64  # one line of the processor's cache
+_STAMP_BYTES = 64  # a cache line
 
 
 class SlotAddress(NamedTuple):
-    """The position of an array in shared memory.
+    """Address of an array in shared memory.
 
-    memory: its name; slot, slot_bytes: which, and how large slots are; stamp: of this writing;
-    shape, dtype: of the array
+    memory: its name; slot, slot_bytes: index and size of the slot; stamp: stamp of this write;
+        shape, dtype: shape and type of the array
     """
 
     memory: str
@@ -32,7 +32,7 @@ class SlotAddress(NamedTuple):
 
 
 class SlotWriter:
-    """Puts arrays into slots; memory grows with them."""
+    """Writer of arrays into slots; memory grows with them."""
 
     def __init__(self) -> None:
         self._memory: SharedMemory | None = None
@@ -42,7 +42,7 @@ class SlotWriter:
     def put(self, array: NDArray[Any]) -> SlotAddress:
         """Copy an array into the next slot."""
         memory = self._room(array.nbytes)
-        self._stamp += 2  # odd while it is written
+        self._stamp += 2  # odd during a write
         slot = self._stamp // 2 % _SLOTS
         stamp, data = _views(memory, slot, self._slot_bytes)
         stamp[0] = self._stamp - 1
@@ -60,7 +60,7 @@ class SlotWriter:
         self._memory = None
 
     def _room(self, nbytes: int) -> SharedMemory:
-        """Return memory whose slots hold so many bytes."""
+        """Return memory with slots of at least ``nbytes`` bytes."""
         if self._memory is None or nbytes > self._slot_bytes:
             self.close()
             self._slot_bytes = -(-nbytes // _STAMP_BYTES) * _STAMP_BYTES
@@ -70,7 +70,7 @@ class SlotWriter:
 
 
 class SlotReader:
-    """Reads arrays out of slots of shared memory, in any thread."""
+    """Reader of arrays from slots of shared memory, for any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -78,12 +78,12 @@ class SlotReader:
         self._name = ""
 
     def see(self, where: SlotAddress | None) -> None:
-        """Record where the writer's memory is, also if nothing is ever read of it."""
+        """Record the writer's memory, even if it is never read."""
         if where is not None:
             self._name = where.memory
 
     def take(self, where: SlotAddress) -> NDArray[Any] | None:
-        """Copy an array out, read-only; None where its slot was written again meanwhile."""
+        """Return a read-only copy of an array; None if its slot was written again meanwhile."""
         with self._lock:
             return self._taken(where)
 
@@ -92,7 +92,7 @@ class SlotReader:
             self.close()
             try:
                 self._memory = SharedMemory(where.memory)
-            except FileNotFoundError:  # the writer has gone on to larger memory
+            except FileNotFoundError:  # the writer now uses larger memory
                 return None
         stamp, data = _views(self._memory, where.slot, where.slot_bytes)
         dtype = np.dtype(where.dtype)
@@ -104,7 +104,7 @@ class SlotReader:
         return array
 
     def close(self) -> None:
-        """Let the memory go; safe to call twice."""
+        """Release the memory; safe to call twice."""
         with self._lock:
             if self._memory is not None:
                 self._memory.close()

@@ -11,17 +11,17 @@ from gazerig.drivers.types import CameraTurn, Depth, DetectedFace, ImageArray
 
 
 class Shot(NamedTuple):
-    """One frame and when it was taken.
+    """A frame and its time.
 
-    captured_s: host time of the exposure (of a film: when the frame was due)
-    number: counts the source's frames from 1; skipped ones are counted too
+    captured_s: host time of the exposure (for a film: time at which the frame was due)
+    number: number of the frame from 1; skipped frames count too
 
-    What follows is None where the source does not give it:
+    The following fields are None if the source does not provide them:
 
     depth_m: distances, aligned with the frame and of its size, NaN where unknown
     lens: the lens of this frame
-    faces: those that the camera itself has found; no detector runs then
-    turn: how the camera was turned, by its own gyro
+    faces: faces that the camera itself has found; no detector runs in that case
+    turn: orientation of the camera from its own gyro
     """
 
     captured_s: float
@@ -40,12 +40,12 @@ class FrameSource(Protocol):
         """Open the device or file.
 
         Raises:
-            CameraError: it cannot; the message names the thing and the remedy.
+            CameraError: it cannot be opened; the message names it and the remedy.
         """
         ...
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for a frame newer than the last one; None where ``stop`` was set meanwhile.
+        """Wait for a frame newer than the last one; return None if ``stop`` was set meanwhile.
 
         Raises:
             CameraError: there will be no more frames.
@@ -53,7 +53,7 @@ class FrameSource(Protocol):
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call and the user should know, one line each."""
+        """Return events for the user since the last call, one line each."""
         ...
 
     def close(self) -> None:
@@ -62,10 +62,10 @@ class FrameSource(Protocol):
 
 
 def bgr(pixels: Any) -> ImageArray | None:
-    """Return what a camera or file delivered as a read-only BGR frame; None where it is none.
+    """Return pixels of a camera or file as a read-only BGR frame; None if they are no image.
 
-    pixels: (h, w) or (h, w, 1) grey, (h, w, 3) BGR or (h, w, 4) BGR with alpha, 8 bits, or
-        16 of which the upper 8 are kept
+    pixels: (h, w) or (h, w, 1) grey, (h, w, 3) BGR or (h, w, 4) BGR with alpha, 8 bits, or 16 bits,
+        of which the upper 8 are kept
     """
     found = np.asarray(pixels)
     if found.dtype == np.uint16:
@@ -74,7 +74,7 @@ def bgr(pixels: Any) -> ImageArray | None:
     if found.dtype != np.uint8 or not found.size or channels not in (1, 3, 4):
         return None
     if channels != 3:
-        import cv2  # in the process that has a camera, and not in that of the control loop
+        import cv2  # only in the process with the camera, not in that of the control loop
     if channels == 1:
         found = np.asarray(cv2.cvtColor(found, cv2.COLOR_GRAY2BGR), np.uint8)
     elif channels == 4:

@@ -1,6 +1,6 @@
-"""The sources of frames by name, each imported in the process that opens it.
+"""Factories of frame sources, each imported in the process that opens it.
 
-OpenCV and depthai are large; the process of the control loop only says which source it is to be.
+OpenCV and depthai are large, so the control loop's process only names the source.
 """
 
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""Detection in real time: a thread analyses frames and leaves the newest result in one slot.
+"""Detection in real time: a thread analyses frames and stores the newest result in one slot.
 
-No queue and no lock: the slot holds one frozen value, and a Python name is rebound in
-one piece. Frames that come while the detector works are skipped.
+No queue and no lock are needed: the slot contains one frozen value, and rebinding a Python name is
+atomic. Frames that arrive while the detector works are skipped.
 """
 
 import threading
@@ -17,7 +17,7 @@ from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.drivers.types import Detections, FaceDetector
 
-# OpenCV gives up waiting for a camera after 10 s; a film stops at once.
+# OpenCV stops waiting for a camera after 10 s; a film stops immediately.
 _LONGEST_WAIT_S = 12.0
 _MOST_EVENTS = 100
 
@@ -28,14 +28,14 @@ class CameraThread:
     While a lost source is reopened the last detections stay; their age shows the loss.
 
     Args:
-        source: the frames.
-        detector: finds faces.
-        now_s: the host's monotonic clock, seconds.
-        recovery: how a lost source is reopened.
-        motion: called in the camera's thread with every frame, None for none.
-        locate: locates what is found in the camera's axes, None for none.
+        source: Source of frames.
+        detector: Finds faces.
+        now_s: The host's monotonic clock, seconds.
+        recovery: Parameters of reopening a lost source.
+        motion: Called in the camera's thread with every frame, None for none.
+        locate: Locates detections in the camera's axes, None for none.
 
-    frames, frames_with_face: counts of frames looked at since open
+    frames, frames_with_face: counts of analysed frames since open
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class CameraThread:
         self.frames_with_face = 0
 
     def open(self) -> None:
-        """Open the source and start looking.
+        """Open the source and start detection.
 
         Raises:
             CameraError: the source cannot be opened, or is open already.
@@ -82,10 +82,10 @@ class CameraThread:
         self._watching.begin(self._watch)
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return what the newest frame showed, or None before the first.
+        """Return the detections of the newest frame, or None before the first.
 
         Raises:
-            CameraError: the source is gone for good, or looking has failed.
+            CameraError: the source is lost permanently, or detection has failed.
         """
         if self._failure is not None:
             raise failed(self._failure) from self._failure
@@ -97,27 +97,27 @@ class CameraThread:
         motion: Callable[[Motion | None], Motion | None] | None,
         locate: Locate | None = None,
     ) -> bool:
-        """Change detectors and calibration from one of the next frames on; always possible.
+        """Change detectors and calibration from one of the next frames on; always returns True.
 
-        A detector that cannot be made is reported as an event, and the old one goes on.
+        A detector that cannot be created is reported as an event, and the old one stays.
 
         Args:
-            detector: makes another one; None: no change.
-            motion: returns a motion detector from the present one; None: no change.
-            locate: locates by another calibration; None: no change.
+            detector: Creates another detector; None: no change.
+            motion: Returns a motion detector from the present one; None: no change.
+            locate: Locates by another calibration; None: no change.
         """
         self._requests.append(Retune(detector, motion, locate))
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         messages = []
         while self._events:
             messages.append(self._events.popleft())
         return tuple(messages)
 
     def close(self) -> None:
-        """Stop looking and free the source; what does not stop is ended. Safe to call twice."""
+        """Stop detection, by force if needed, and free the source; safe to call twice."""
         self._stop.set()
         if self._watching is not None:
             stopped = self._watching.idle(_LONGEST_WAIT_S)
@@ -133,16 +133,16 @@ class CameraThread:
                 self.frames_with_face += bool(found.faces)
                 self._newest = found
                 self._apply_requests()
-        except BaseException as failure:  # handed to the loop by latest()
+        except BaseException as failure:  # raised to the loop by latest()
             self._failure = failure
         finally:
-            # Freed by the thread that reads it: never under a frame being fetched.
+            # Freed by the thread that reads it, never while a frame is fetched.
             self._camera.close()
 
     def _apply_requests(self) -> None:
-        """Apply what has been asked for since the frame before."""
+        """Apply requests since the previous frame."""
         while self._requests:
             try:
                 self._camera.retune(*self._requests.popleft())
             except SetupError as error:
-                self._events.append(f"the detector stays as it was: {error}")
+                self._events.append(f"the detector is unchanged: {error}")

@@ -1,7 +1,7 @@
-"""The newer of two entries in shared memory, from one process to another without a lock.
+"""Double buffer in shared memory, from one process to another without a lock.
 
-The writer fills the older entry and then counts it; the reader looks at the count before and
-after, and reads again what was overwritten meanwhile.
+The writer fills the older entry and then increments the count. The reader reads the count before
+and after, and reads again if the entry was overwritten meanwhile.
 """
 
 import multiprocessing
@@ -11,35 +11,35 @@ from typing import TypeVar
 T = TypeVar("T")
 
 CONTEXT = multiprocessing.get_context("spawn")
-"""Makes shared memory that can be handed to a process that is being started."""
+"""Creates shared memory that can be passed to a new process."""
 
 
 class TwoEntries:
-    """Which of two entries is the newer; what is in them belongs to who uses this."""
+    """Index of the newer of two entries; the user of this class owns their contents."""
 
     def __init__(self) -> None:
         self._count = CONTEXT.RawValue("q", 0)
 
     @property
     def count(self) -> int:
-        """Return how many entries have been written since the start."""
+        """Return the number of entries written since the start."""
         return int(self._count.value)
 
     @property
     def older(self) -> int:
-        """Return which entry to fill next, 0 or 1."""
+        """Return the index of the entry to fill next, 0 or 1."""
         return self.count % 2
 
     def filled(self) -> None:
-        """Make the older entry the newer; only one thread writes."""
+        """Mark the older entry as the newer; only one thread writes."""
         self._count.value += 1
 
     def read(self, copy: Callable[[int], T], above: int = 0) -> tuple[int, T] | None:
         """Return the number of the newest entry and its copy, None without one.
 
         Args:
-            copy: returns a copy of entry 0 or 1.
-            above: numbers from 1 to this are known already.
+            copy: Returns a copy of entry 0 or 1.
+            above: Numbers up to this are known already.
         """
         while (count := self.count) > above:
             copied = copy((count - 1) % 2)

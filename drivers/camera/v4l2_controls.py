@@ -1,7 +1,7 @@
-"""Exposure, gain, mains frequency and focus of a webcam, by the controls of Video4Linux.
+"""Exposure, gain, mains frequency and focus of a webcam, set with Video4Linux controls.
 
-OpenCV knows some of them and not why one was refused, so they are set on the device file itself.
-A camera keeps its settings after the program ends, so automatic modes are set as well.
+OpenCV supports only some of them and does not report why one was refused, so they are set on the
+device file. A camera keeps its settings after the program ends, so automatic modes are set as well.
 """
 
 import errno
@@ -18,7 +18,7 @@ MAINS = 0x00980918
 AUTO_EXPOSURE, EXPOSURE = 0x009A0901, 0x009A0902
 FOCUS, AUTO_FOCUS = 0x009A090A, 0x009A090C
 SET_CONTROL = 0xC008561C
-"""The request VIDIOC_S_CTRL; its argument is the number of a control and a value."""
+"""Request VIDIOC_S_CTRL; its argument is the number of a control and a value."""
 
 _EXPOSURE_MANUAL, _EXPOSURE_AUTO, _EXPOSURE_BY_APERTURE = 1, 0, 3
 _EXPOSURE_UNIT_MS = 0.1
@@ -26,14 +26,14 @@ _MAINS = {"off": 0, "50hz": 1, "60hz": 2, "auto": 3}
 
 
 def apply(device: Path, params: WebcamParams) -> Iterator[str]:
-    """Set the controls; yield one line for each setting that the camera does not take.
+    """Set the controls; yield one line for each setting that the camera rejects.
 
-    Settings without a value become automatic; a camera that cannot do that is not reported.
+    Settings without a value become automatic; a camera without automatic modes is not reported.
     """
     try:
         file = os.open(device, os.O_RDWR | os.O_NONBLOCK)
     except OSError:
-        return  # the camera itself is refused with a message of its own
+        return  # the camera itself is rejected with another message
     try:
         if params.exposure_ms is None:
             if _refused(file, AUTO_EXPOSURE, _EXPOSURE_BY_APERTURE):
@@ -61,7 +61,7 @@ def apply(device: Path, params: WebcamParams) -> Iterator[str]:
 
 def _said(name: str, value: object, why: str) -> Iterator[str]:
     if why:
-        yield f"does not take webcam.{name}: {value} ({why}): leave it away or give another value"
+        yield f"does not accept webcam.{name}: {value} ({why}): omit it or give another value"
 
 
 def _refused(file: int, control: int, value: int) -> str:

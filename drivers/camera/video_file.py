@@ -1,7 +1,7 @@
-"""A film or still frame as a source of frames that never ends.
+"""A film or still frame as an endless source of frames.
 
-Film time starts at 0 with frame 1 and runs on through every repeat; so do numbers.
-Reading goes forward only. A still repeats ten times a second.
+Film time starts at 0 with frame 1 and continues through every repeat, as do frame numbers. Frames
+are only read forward. A still frame repeats ten times a second.
 """
 
 import threading
@@ -17,7 +17,7 @@ from gazerig.drivers.types import ImageArray
 
 
 class VideoFrame(NamedTuple):
-    """A frame of a film: its number from 1, the film time it is due, the frame (read-only)."""
+    """A frame of a film: its number from 1, its due film time and the image (read-only)."""
 
     number: int
     film_time_s: float
@@ -25,10 +25,10 @@ class VideoFrame(NamedTuple):
 
 
 class VideoFile:
-    """A film or still frame, repeated for ever."""
+    """A film or still frame, repeated forever."""
 
     def __init__(self, path: str | Path) -> None:
-        """Name the file; nothing is opened yet."""
+        """Set the path; nothing is opened yet."""
         self._path = Path(path).expanduser()
         self._reel: VideoReader | None = None
         self._pace = VideoPacing()
@@ -47,12 +47,12 @@ class VideoFile:
 
     @property
     def rate_hz(self) -> float:
-        """Frames a second."""
+        """Frames per second."""
         return self._opened().times.rate_hz
 
     @property
     def note(self) -> str:
-        """What had to be assumed about the file, in one line, or ""."""
+        """Assumptions about the file in one line, or ""."""
         return self._opened().times.note
 
     def due_s(self, number: int) -> float:
@@ -82,10 +82,10 @@ class VideoFile:
         return Shot(self.due_s(number), number, self.image(number))
 
     def frame_at(self, film_s: float) -> VideoFrame:
-        """Read the newest frame at a film time (0 or later, never running back).
+        """Read the newest frame at a film time (0 or later, never decreasing).
 
         Raises:
-            ValueError: film time is negative or ran back.
+            ValueError: film time is negative or decreased.
             CameraError: the file cannot be read any more.
         """
         number = self.number_at(film_s)
@@ -101,7 +101,7 @@ class VideoFile:
         return None if due is None else Shot(due.host_s, due.number, self.image(due.number))
 
     def events(self) -> tuple[str, ...]:
-        """Return what had to be assumed about the file, one line each, once."""
+        """Return assumptions about the file, one line each, once."""
         message, self._unreported = self._unreported, ""
         return (f"{self._path.name}: {message}",) if message else ()
 

@@ -1,4 +1,4 @@
-"""Showing a film in real time: the newest frame that is due, none twice."""
+"""Pacing of a film in real time: the newest frame that is due, none twice."""
 
 import threading
 from collections.abc import Callable
@@ -8,14 +8,14 @@ from gazerig.drivers.camera.video_timestamps import VideoTimestamps
 
 
 class Due(NamedTuple):
-    """A frame that is due: its number, and the host time at which it was."""
+    """A due frame: its number, and the host time at which it was due."""
 
     number: int
     host_s: float
 
 
 class VideoPacing:
-    """Film time begins at the first wait and runs with the host's clock."""
+    """Film time that begins at the first wait and follows the host's clock."""
 
     def __init__(self) -> None:
         self._zero_s: float | None = None
@@ -30,6 +30,6 @@ class VideoPacing:
         wait_s = self._zero_s + times.due_s(self._taken + 1) - now_s()
         if stop.wait(max(0.0, wait_s)):
             return None
-        # A wait may end a shade early; the frame waited for is the least that is given.
+        # A wait may end slightly early; at least the awaited frame is returned.
         self._taken = max(self._taken + 1, times.number_at(now_s() - self._zero_s))
         return Due(self._taken, self._zero_s + times.due_s(self._taken))

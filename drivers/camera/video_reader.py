@@ -1,4 +1,4 @@
-"""An open film, or a still frame, read forward by number and repeated for ever."""
+"""Readers of films and still frames, read forward by number and repeated forever."""
 
 from math import isfinite
 from pathlib import Path
@@ -20,7 +20,7 @@ from gazerig.drivers.types import ImageArray
 
 _STILL_RATE_HZ, _ASSUMED_RATE_HZ = 10.0, 25.0
 _RATES_HZ = (0.5, 1000.0)
-# A container may promise a few frames too many without being damaged.
+# A container may state a few frames too many without being damaged.
 _LEAST_COMPLETE = 0.95
 _MOST_TIMES = 20_000  # frames of an uneven film whose times are read at the start
 
@@ -28,13 +28,13 @@ _MOST_TIMES = 20_000  # frames of an uneven film whose times are read at the sta
 class VideoReader(Protocol):
     """An open film or still.
 
-    times: when its frames are due, and what had to be assumed for it
+    times: due times of its frames, and assumptions about them
     """
 
     times: VideoTimestamps
 
     def image(self, number: int) -> ImageArray:
-        """Return a frame, counted through all repeats, not before the last one given."""
+        """Return a frame, counted through all repeats, not before the last one returned."""
         ...
 
     def close(self) -> None:
@@ -43,7 +43,7 @@ class VideoReader(Protocol):
 
 
 def open_video(path: Path) -> VideoReader:
-    """Open a file as what it is.
+    """Open a file as a film or a still frame.
 
     Raises:
         CameraError: it is absent, no film or frame, empty or cut short.
@@ -56,13 +56,13 @@ def open_video(path: Path) -> VideoReader:
         path.open("rb").close()
     except OSError as error:
         raise CameraError(f"cannot read {path} ({error.strerror}): check its rights") from error
-    # A GIF is a film; OpenCV's frame reader would give its first frame alone.
+    # A GIF is a film; OpenCV's image reader would return only its first frame.
     still = path.suffix.lower() != ".gif" and cv2.haveImageReader(str(path))
     return _Still(path) if still else _Film(path)
 
 
 def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
-    """Return the frame rate to use, and a note where the stated one is no rate."""
+    """Return the frame rate to use, and a note if the stated one is invalid."""
     low, high = _RATES_HZ
     if isfinite(stated_hz) and low <= stated_hz <= high:
         return stated_hz, ""
@@ -72,7 +72,7 @@ def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
 
 
 class _Still:
-    """One frame that is always there."""
+    """A still frame."""
 
     times = VideoTimestamps(_STILL_RATE_HZ)
 
@@ -95,11 +95,11 @@ class _Still:
         return self._image
 
     def close(self) -> None:
-        """Have nothing to free."""
+        """Do nothing."""
 
 
 class _Film:
-    """A film read from its start, again and again."""
+    """A film that is repeated forever."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -112,17 +112,17 @@ class _Film:
         if times is None:
             times = by_table(rising(first_s + _times_s(self._capture, _MOST_TIMES)))
         elif times.rate_hz == stated[0]:
-            # The number of frames stated is often the length times the rate: where the
-            # rate is wrong, so is that.
+            # The stated number of frames is often the length times the rate: if the rate is wrong,
+            # so is the number.
             _check_complete(path, self._capture, len(first_s))
         self.times = times
         self._rewind()
-        self._number, self._index = 0, 0  # last frame reached, and its place in this showing
-        self._length: int | None = None  # known after the first showing
+        self._number, self._index = 0, 0  # last frame reached, and its index in this repeat
+        self._length: int | None = None  # known after the first repeat
         self._seen: tuple[int, ImageArray] | None = None
 
     def image(self, number: int) -> ImageArray:
-        """Read on to a frame; those on the way are decoded but not converted."""
+        """Read up to a frame; frames before it are decoded but not converted."""
         _check_forward(number, max(1, self._number))
         if self._seen is None or self._seen[0] != number:
             while self._number < number:
@@ -138,7 +138,7 @@ class _Film:
         self._capture.release()
 
     def _advance(self, goal: int) -> None:
-        """Go to the next frame, from the end to the start, past whole showings at once."""
+        """Go to the next frame, from the end to the start, and skip whole repeats."""
         if not self._capture.grab():
             self._length, self._index = self._index, 0
             self._rewind()
@@ -151,13 +151,13 @@ class _Film:
             self._number += (goal - self._number) // self._length * self._length
 
     def _rewind(self) -> None:
-        """Start again; opening again is exact where seeking back may not be."""
+        """Start again; reopening is exact, while seeking back may not be."""
         self._capture.release()
         self._capture = _open_film(self._path)
 
 
 def _open_film(path: Path) -> cv2.VideoCapture:
-    """Open a film with FFmpeg, the one reader that takes no name for a pattern."""
+    """Open a film with FFmpeg, the only reader that does not treat a name as a pattern."""
     with quiet_opencv():
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     if not capture.isOpened():
@@ -169,7 +169,7 @@ def _open_film(path: Path) -> cv2.VideoCapture:
 
 
 def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
-    """Read on, and return the times that the frames carry."""
+    """Read frames and return their time stamps, seconds."""
     found: list[float] = []
     for _ in range(most):
         if not capture.grab():
@@ -179,12 +179,12 @@ def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
 
 
 def _check_complete(path: Path, capture: cv2.VideoCapture, seen: int) -> None:
-    """Refuse a film that ends long before the end it states.
+    """Reject a film that ends long before its stated end.
 
-    seen: so many frames have been read already
+    seen: number of frames read already
     """
     stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    if stated <= seen:  # all there, or a stream without a table of contents
+    if stated <= seen:  # complete, or a stream without an index
         return
     capture.set(cv2.CAP_PROP_POS_FRAMES, stated - 1)
     reached = stated if capture.grab() else int(capture.get(cv2.CAP_PROP_POS_FRAMES))
@@ -195,7 +195,7 @@ def _check_complete(path: Path, capture: cv2.VideoCapture, seen: int) -> None:
 
 
 def _check_forward(number: int, least: int) -> None:
-    """Refuse to go back."""
+    """Reject frames before the last one."""
     if number < least:
         raise ValueError(f"films are read forward: frame {number} wanted, {least} is the least")
 
@@ -204,7 +204,7 @@ def _frozen(image: Any, path: Path) -> ImageArray:
     """Return a frame as a read-only BGR array.
 
     Raises:
-        CameraError: the file holds another pixel format.
+        CameraError: the file has another pixel format.
     """
     pixels = bgr(image)
     if pixels is None:

@@ -1,6 +1,6 @@
-"""When each frame of a film is due: by its rate, or by a table where frames come unevenly.
+"""Due times of a film's frames: from its rate, or from a table if frames are unevenly spaced.
 
-What the container states is checked against the times that its frames carry.
+The container's rate is checked against the time stamps of its frames.
 """
 
 from bisect import bisect_right
@@ -11,20 +11,20 @@ from typing import NamedTuple
 import numpy as np
 
 SAMPLE = 100
-"""So many frames are looked at; only where these come unevenly, all are."""
+"""Number of frames that are checked; only if these are uneven, all are."""
 _LEAST = 8
-# Containers round times; half a frame is no rounding any more.
+# Containers round times, but by less than half a frame.
 _UNEVEN = 0.5
 _LIE = 0.02
 
 
 class VideoTimestamps(NamedTuple):
-    """Due times of a film that is repeated for ever; numbers are from 1.
+    """Due times of a film that is repeated forever; numbers begin at 1.
 
-    rate_hz: frames a second, the mean where they come unevenly
-    starts_s: due time of each frame of one showing, or () if the rate is constant
-    length_s: of one showing, where there is a table
-    note: what a person should know, or ""
+    rate_hz: frames per second, the mean if they are uneven
+    starts_s: due time of each frame of one repeat, or () if the rate is constant
+    length_s: duration of one repeat, if there is a table
+    note: information for the user, or ""
     """
 
     rate_hz: float
@@ -47,7 +47,7 @@ class VideoTimestamps(NamedTuple):
             showing = int(film_s // self.length_s)
             rest_s = film_s - showing * self.length_s
             number = showing * len(self.starts_s) + bisect_right(self.starts_s, rest_s)
-        # Arithmetic may round across a due time; due_s alone decides.
+        # Rounding may cross a due time; only due_s decides.
         while self.due_s(number + 1) <= film_s:
             number += 1
         while self.due_s(number) > film_s:
@@ -56,7 +56,7 @@ class VideoTimestamps(NamedTuple):
 
 
 def even(times_s: Sequence[float], rate_hz: float) -> bool:
-    """Return whether frames come at a rate, but for rounding; too few are taken as even."""
+    """Return whether frames have a constant rate, except for rounding; too few count as even."""
     if len(times_s) < _LEAST:
         return True
     off = np.asarray(times_s) - times_s[0] - np.arange(len(times_s)) / rate_hz
@@ -64,9 +64,9 @@ def even(times_s: Sequence[float], rate_hz: float) -> bool:
 
 
 def rising(times_s: Sequence[float]) -> list[float]:
-    """Return the times with those that do not rise put right; [] where few do.
+    """Return ascending times, with wrong ones corrected; [] if few are right.
 
-    The last frame of a film often carries none.
+    The last frame of a film often has no time stamp.
     """
     steps = [b - a for a, b in zip(times_s, times_s[1:], strict=False) if b > a]
     if len(steps) < len(times_s) // 2:
@@ -78,7 +78,7 @@ def rising(times_s: Sequence[float]) -> list[float]:
 
 
 def measured_rate_hz(times_s: Sequence[float]) -> float | None:
-    """Return the rate at which frames come if they come evenly, else None."""
+    """Return the rate of evenly spaced frames, otherwise None."""
     if len(times_s) < _LEAST:
         return None
     rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
@@ -86,9 +86,9 @@ def measured_rate_hz(times_s: Sequence[float]) -> float | None:
 
 
 def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTimestamps | None:
-    """Judge by the first frames; None where they come unevenly.
+    """Return time stamps based on the first frames; None if they are uneven.
 
-    stated_hz, note: the rate to use from the container's header, and what was assumed for it
+    stated_hz, note: the rate from the container's header, and assumptions about it
     """
     if even(times_s, stated_hz) and (not note or measured_rate_hz(times_s) is None):
         return VideoTimestamps(stated_hz, note=note)
@@ -105,7 +105,7 @@ def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTim
 
 
 def by_table(times_s: Sequence[float]) -> VideoTimestamps:
-    """Return the times as they are; the last frame stays as long as most do."""
+    """Return a table of the times; the last frame lasts as long as most frames do."""
     starts = tuple(t - times_s[0] for t in times_s)
     last_s = median(b - a for a, b in zip(starts, starts[1:], strict=False))
     length_s = starts[-1] + last_s

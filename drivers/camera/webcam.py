@@ -1,4 +1,4 @@
-"""A camera of Video4Linux, read through OpenCV."""
+"""A Video4Linux camera, read through OpenCV."""
 
 import os
 import threading
@@ -15,18 +15,18 @@ from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.camera.source import Shot, bgr
 from gazerig.drivers.errors import CameraError
 
-# Frames in a row that may fail before the camera counts as gone; one fails now and
-# then where a cable is long.
+# Consecutive failed frames after which the camera counts as lost; one fails at times with a long
+# cable.
 _MOST_FAILURES = 5
-# The kernel's stamp is believed if it is this young on the same clock.
+# The kernel's stamp is used if it is at most this old on the same clock.
 _OLDEST_STAMP_S = 1.0
 _FOURCC = {"mjpg": "MJPG", "yuyv": "YUYV"}
-# OpenCV waits 10 s for a frame unless told otherwise; it reads this once.
+# Time-out for a frame; OpenCV's default is 10 s, and it reads this once.
 _SELECT_TIMEOUT = ("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "2")
 
 
 def open_v4l2(device: str) -> cv2.VideoCapture:
-    """Open a device file by Video4Linux alone."""
+    """Open a device file only with Video4Linux."""
     os.environ.setdefault(*_SELECT_TIMEOUT)
     return cv2.VideoCapture(device, cv2.CAP_V4L2)
 
@@ -34,7 +34,7 @@ def open_v4l2(device: str) -> cv2.VideoCapture:
 class Webcam:
     """A camera at /dev/video<N>, or at a device file such as /dev/v4l/by-id/...
 
-    has_unknown_lens: the camera itself cannot tell its field of view
+    has_unknown_lens: whether the camera does not report its field of view
     """
 
     has_unknown_lens = True
@@ -45,19 +45,19 @@ class Webcam:
         params: WebcamParams | None = None,
         capture: Callable[[str], cv2.VideoCapture] = open_v4l2,
     ) -> None:
-        """Name the camera and what is asked of it; it gives what comes nearest.
+        """Set the camera and its requested settings; it uses the nearest ones that it has.
 
-        capture: opens a device file; another one serves where there is no camera
+        capture: opens a device file; replaced where no camera is available
         """
         self._file = Path(f"/dev/video{device}" if isinstance(device, int) else device)
         self._params = params = params or WebcamParams()
         self._wishes = {
-            # First, as sizes and rates depend on it.
+            # Set first, as sizes and rates depend on it.
             cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*_FOURCC[params.format]),
             cv2.CAP_PROP_FRAME_WIDTH: params.width_px,
             cv2.CAP_PROP_FRAME_HEIGHT: params.height_px,
             cv2.CAP_PROP_FPS: params.rate_hz,
-            # One buffer: a frame fetched late is a fresh one, not an old one kept.
+            # One buffer, so that a frame fetched late is a fresh one.
             cv2.CAP_PROP_BUFFERSIZE: 1,
         }
         self._open_capture = capture
@@ -70,7 +70,7 @@ class Webcam:
         self._told: set[str] = set()
 
     def open(self) -> None:
-        """Open the camera and fetch one frame as a proof.
+        """Open the camera and fetch one frame as a check.
 
         Raises:
             CameraError: it is absent, not permitted, busy or delivers no frame.
@@ -97,7 +97,7 @@ class Webcam:
             self._tell_once(f"camera {self._file} {line}")
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next frame; its time is the kernel's stamp, else that of its arrival.
+        """Wait for the next frame; its time is the kernel's stamp or its time of arrival.
 
         Raises:
             CameraError: the camera is not open or delivers no more frames.
@@ -118,7 +118,7 @@ class Webcam:
                 away_s = 0.0 if self._left_s is None else came_s - self._left_s
                 self._tell(self._rate.update(captured_s, away_s))
                 self._left_s = now_s()
-                # Frames that came while the reader was away count as skipped.
+                # Frames that arrived while the reader was away count as skipped.
                 rate_hz = self._rate.measured_hz or self._rate_hz
                 missed = away_s * rate_hz if isfinite(rate_hz) else 0.0
                 self._number += 1 + max(0, int(missed) - 1)
@@ -129,7 +129,7 @@ class Webcam:
         )
 
     def events(self) -> tuple[str, ...]:
-        """Return what the camera did not take, and that its rate is not the stated one."""
+        """Return rejected settings, and a line if the rate is not the stated one."""
         messages, self._events = tuple(self._events), []
         return messages
 
@@ -140,7 +140,7 @@ class Webcam:
         self._capture = None
 
     def _check_file(self) -> None:
-        """Refuse a device file that is absent or not permitted; the message lists the others."""
+        """Reject a device file that is absent or not permitted; the message lists the others."""
         if not self._file.exists():
             there = ", ".join(sorted(str(f) for f in self._file.parent.glob("video*")))
             raise CameraError(
@@ -154,29 +154,29 @@ class Webcam:
             )
 
     def _tell(self, line: str) -> None:
-        """Keep a line for ``events``."""
+        """Store a line for ``events``."""
         if line and line not in self._told:
             self._events.append(line)
 
     def _tell_once(self, line: str) -> None:
-        """Do so once, however often the camera is opened again."""
+        """Store a line once, even if the camera is reopened."""
         self._tell(line)
         self._told.add(line)
 
     def _refused_format(self, capture: cv2.VideoCapture) -> str:
-        """Return that the camera gives another format than requested, "" if it does not."""
+        """Return a message if the camera uses another format than requested, otherwise ""."""
         given = int(capture.get(cv2.CAP_PROP_FOURCC))
         name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
         wanted = _FOURCC[self._params.format]
         if not name or name == wanted:
             return ""
         return (
-            f"camera {self._file} gives {name} and not {wanted} (webcam.format): large frames may "
+            f"camera {self._file} uses {name} instead of {wanted} (webcam.format): large frames may "
             "come slowly"
         )
 
     @staticmethod
     def _stamp_s(capture: cv2.VideoCapture, arrived_s: float) -> float:
-        """Return the kernel's stamp of the last frame where it is on our clock."""
+        """Return the kernel's stamp of the last frame if it is on our clock."""
         stamp_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         return stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s

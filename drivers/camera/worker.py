@@ -1,4 +1,4 @@
-"""The camera's process, from its start to its end (see ``process``)."""
+"""Main function of the camera's process (see ``process``)."""
 
 import os
 import signal
@@ -18,16 +18,16 @@ from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import Detections, FaceDetector
 
-NICE = 10  # the loop goes first
+NICE = 10  # lower priority than the loop
 LONGEST_END_S = 12.0
-"""A process that was stopped, or whose program is gone, ends after this whatever blocks it."""
+"""Time after which a stopped or orphaned process ends, even if it is blocked."""
 
 
 class CameraParts(NamedTuple):
-    """How to make the parts, in the process that uses them; all must be picklable.
+    """Factories of the parts, called in the process that uses them; all must be picklable.
 
-    source, detector: functions without arguments; motion: the same, or None
-    locate: locates what is found in the camera's axes; None: that is left to the loop
+    source, detector: functions without arguments; motion: likewise, or None
+    locate: locates detections in the camera's axes; None: the loop does
     """
 
     source: Callable[[], FrameSource]
@@ -37,7 +37,7 @@ class CameraParts(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Detections in one frame, and where the frame is in shared memory."""
+    """Detections in one frame, and the address of the frame in shared memory."""
 
     detections: Detections  # without frame and depth
     image: SlotAddress | None
@@ -53,9 +53,10 @@ class Retune(NamedTuple):
 
 
 class Ended(NamedTuple):
-    """Why the process ends.
+    """Reason for the end of the process.
 
-    final: the camera has been tried for as long as it may be; else a new process may do better
+    final: whether the time limit for reopening the camera has passed; otherwise a new process may
+        succeed
     """
 
     reason: str
@@ -65,17 +66,17 @@ class Ended(NamedTuple):
 def run(
     pipe: Connection, parts: CameraParts, now_s: Callable[[], float], recovery: CameraRecoveryParams
 ) -> None:
-    """Run the process: open, detect and report, until stopped or the other side is gone."""
-    import cv2  # the control loop's process, which imports this module too, does without
+    """Run the process: open, detect and report, until it is stopped or the other side has ended."""
+    import cv2  # the control loop's process imports this module too, without OpenCV
 
-    # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
+    # Ctrl-C reaches all processes of a terminal; only the loop may end this one.
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    if hasattr(os, "nice"):  # Windows has priorities of another kind
+    if hasattr(os, "nice"):  # Windows has other priorities
         os.nice(NICE)
-    # One processor stays the loop's: with all of them in OpenCV's hands the loop is later, and
-    # no more frames are looked at.
+    # One core is left to the loop: if OpenCV uses all cores, the loop is later and no more frames
+    # are analysed.
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
     try:
         motion = parts.motion() if parts.motion is not None else None
@@ -95,7 +96,7 @@ def run(
         while (found := camera.next(stop)) is not None:
             pipe.send(_message(found, slots))
             _retune(camera, requests, pipe)
-    except OSError:  # the parent has gone
+    except OSError:  # the parent has ended
         pass
     except Exception as failure:
         pipe.send(Ended(str(failed(failure)), isinstance(failure, CameraError)))
@@ -116,18 +117,18 @@ def _message(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> Found:
 
 
 def _receive_requests(pipe: Connection, stop: threading.Event, requests: deque[Retune]) -> None:
-    """Queue requests until the one to stop comes or the other side is gone."""
+    """Queue requests until a stop request arrives or the other side has ended."""
     with suppress(EOFError, OSError):
         while isinstance(message := pipe.recv(), Retune):
             requests.append(message)
     stop.set()
-    # A thread that is blocked in a camera's driver would hold that camera for ever.
+    # A thread that is blocked in a camera's driver would keep that camera busy forever.
     threading.Event().wait(LONGEST_END_S)
     os._exit(1)
 
 
 def _retune(camera: CaptureLoop, requests: deque[Retune], pipe: Connection) -> None:
-    """Apply queued requests; of several detectors only the last is made."""
+    """Apply queued requests; of several detectors only the last is created."""
     detector: Callable[[], FaceDetector] | None = None
     while requests:
         message = requests.popleft()
@@ -138,4 +139,4 @@ def _retune(camera: CaptureLoop, requests: deque[Retune], pipe: Connection) -> N
     try:
         camera.retune(detector, None)
     except SetupError as error:
-        pipe.send(f"the detector stays as it was: {error}")
+        pipe.send(f"the detector is unchanged: {error}")

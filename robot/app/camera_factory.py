@@ -390,7 +390,7 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = _retune_detecting(camera, after, detector, motion if moves else None, locate)
     except SetupError as error:
-        return f"the detector stays as it was: {error}"
+        return f"the detector is unchanged: {error}"
     return "" if done else "the camera's process is busy and looks as before: set it once more"
 
 

@@ -183,7 +183,7 @@ def test_an_upside_down_camera_is_found_and_its_end_too():
     down = np.ascontiguousarray(room()[::-1, ::-1])
     told, _ = looked([down] * 22 + [np.asarray(room())] * 20, MtcnnDetector(FaceDetectorParams()))
     assert [line.split(":")[1] for line in told] == [
-        " the camera is turned by 180 deg, by the faces that it shows",
+        " the camera is turned by 180 deg, according to the faces",
         " the picture is upright again",
     ]
 
@@ -201,13 +201,13 @@ def test_frames_that_come_too_fast_are_told_with_the_stage():
         health.look(shot, (), {"faces": 0.01, "motion": 0.1})
         told += health.events()
     assert told == [
-        "camera: 8 of 60 frames a second are looked at; motion takes 100 of 125 ms a frame: "
+        "camera: 8 of 60 frames a second are analysed; motion takes 100 of 125 ms a frame: "
         "lower motion.work_px, or set motion.enabled: false"
     ]
     for k in range(60, 200):
         health.look(Shot(k / 8.0, 391 + k, np.asarray(room())), (), FAST)
         told += health.events()
-    assert told[1:] == ["camera: frames are looked at in time again"]
+    assert told[1:] == ["camera: frames are analysed in time again"]
 
 
 def test_twenty_of_sixty_frames_are_enough():

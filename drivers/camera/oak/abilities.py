@@ -1,4 +1,4 @@
-"""What a camera cannot do of what the rig asks: told, and left out."""
+"""Removal and report of settings that a camera does not support."""
 
 from dataclasses import replace
 from typing import Any
@@ -9,15 +9,15 @@ from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.errors import CameraError
 
 _USB2_BYTES_S = 30e6
-"""What a USB 2 line carries of frames."""
-_COLOUR_BYTES, _DEPTH_BYTES = 1.5, 2.0  # a pixel, NV12 and RAW16
+"""Capacity of a USB 2 line for frames."""
+_COLOUR_BYTES, _DEPTH_BYTES = 1.5, 2.0  # per pixel, NV12 and RAW16
 
 
 def possible(dai: Any, device: Any, params: OakParams) -> tuple[OakParams, tuple[str, ...]]:
-    """Return what to ask of a camera, and what had to be left out, one line each.
+    """Return the supported settings, and one line for each omitted one.
 
     Raises:
-        CameraError: it has no colour camera, or there is no file of the face model.
+        CameraError: it has no colour camera, or the file of the face model is absent.
     """
     sockets = set(device.getConnectedCameras())
     socket, label = dai.CameraBoardSocket, device.getDeviceName() or "this OAK camera"
@@ -41,13 +41,13 @@ def possible(dai: Any, device: Any, params: OakParams) -> tuple[OakParams, tuple
             events.append(f"{error}; until then faces are found on the host")
             params = replace(params, face_model="")
     if params.gyro and (why := _no_gyro(dai, device, params)):
-        events.append(f"{label} has no gyro to go by: {why}")
+        events.append(f"{label} has no usable gyro: {why}")
         params = replace(params, gyro=False)
     return params, tuple(events)
 
 
 def usb2_text(params: OakParams, speed: str) -> str:
-    """Return what a USB 2 line means for the frames asked for."""
+    """Return a message about the effect of a USB 2 line on the requested frames."""
     frame = params.width_px * params.height_px * (_COLOUR_BYTES + _DEPTH_BYTES * params.depth)
     most_hz = _USB2_BYTES_S / frame
     text = f"the OAK camera runs at USB 2 speed ({speed}), which carries about 30 MB a second"
@@ -62,7 +62,7 @@ def usb2_text(params: OakParams, speed: str) -> str:
 
 
 def full_line_text(params: OakParams, measured_hz: float) -> str:
-    """Return what to do about a USB 2 line that is full."""
+    """Return a message about a full USB 2 line, with the remedy."""
     return (
         f"the OAK camera's USB 2 line is full: {measured_hz:.1f} of {params.rate_hz:g} frames a "
         f"second arrive; use a USB 3 cable and port, or set oak.rate_hz {max(1.0, measured_hz):.0f}"
@@ -70,7 +70,7 @@ def full_line_text(params: OakParams, measured_hz: float) -> str:
 
 
 def _no_stereo(dai: Any, device: Any, sockets: set[Any]) -> str:
-    """Return why there is no depth, "" where there is."""
+    """Return why depth is not available, "" if it is."""
     socket = dai.CameraBoardSocket
     missing = [one.name for one in (socket.CAM_B, socket.CAM_C) if one not in sockets]
     if missing:
@@ -83,13 +83,13 @@ def _no_stereo(dai: Any, device: Any, sockets: set[Any]) -> str:
 
 
 def _no_gyro(dai: Any, device: Any, params: OakParams) -> str:
-    """Return why there is no gyro, "" where there is."""
+    """Return why the gyro is not available, "" if it is."""
     imu = device.getConnectedIMU()
     if not imu or imu.upper() == "NONE":
         return "it has no IMU; oak.gyro: false says so in the rig"
     if params.imu_rotation_deg is None and imu_to_camera(dai, device.readCalibration()) is None:
         return (
-            "its calibration does not say how the IMU sits: give oak.imu_rotation_deg, "
+            "its calibration lacks the IMU's orientation: set oak.imu_rotation_deg, "
             "or set oak.gyro: false"
         )
     return ""

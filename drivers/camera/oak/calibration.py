@@ -1,4 +1,4 @@
-"""What the factory's calibration of an OAK camera says, in the terms of the rig's file."""
+"""Factory calibration of an OAK camera, in the terms of the rig file."""
 
 from math import atan, degrees
 from typing import Any, NamedTuple
@@ -28,33 +28,33 @@ def rotation_of(vector_deg: tuple[float, float, float]) -> Floats:
     x, y, z = np.radians(vector_deg)
     angle = float(np.linalg.norm((x, y, z)))
     K = np.array([(0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)])
-    # sin(a) / a and (1 - cos(a)) / a^2, both good at 0 too.
+    # sin(a) / a and (1 - cos(a)) / a^2, both also accurate at 0.
     first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
     return np.asarray(np.eye(3) + first * K + second * (K @ K))
 
 
 def imu_to_camera(dai: Any, calibration: Any) -> Floats | None:
-    """Return R_camera_imu (3, 3); None where the calibration does not hold it."""
+    """Return R_camera_imu (3, 3); None if the calibration does not contain it."""
     try:
         found = calibration.getImuToCameraExtrinsics(dai.CameraBoardSocket.CAM_A)
     except RuntimeError:
         return None
     R = np.asarray(found, dtype=np.float64)[:3, :3]
-    # A memory that was never written holds zeros.
+    # A memory that was never written contains zeros.
     return R if np.abs(R @ R.T - np.eye(3)).max() < 1e-2 else None
 
 
 class OakCalibration(NamedTuple):
-    """What the memory of an OAK camera says of its colour camera.
+    """Calibration of the colour camera in the memory of an OAK camera.
 
     label: product name
-    lens: of frames as the rig asks for them; without distortion if the camera straightens them
+    lens: lens of the frames that the rig requests; without distortion if the camera undistorts them
     width_px, height_px: size of these frames
     own_distortion: k1 k2 p1 p2 k3 of the lens itself, fitted to the factory's model of it
-    fit_px: what that fit leaves, root mean square over the frame
-    R_camera_imu: takes directions from the gyro's axes to the camera's; None where unknown
-    left_m, right_m: where the stereo cameras are, in the colour camera's axes; None where unknown
-    focus: position of the lens at which it was measured, None where it is fixed or unknown
+    fit_px: residual of that fit, root mean square over the frame
+    R_camera_imu: takes directions from the gyro's axes to the camera's; None if unknown
+    left_m, right_m: positions of the stereo cameras in the colour camera's axes; None if unknown
+    focus: lens position at which it was measured, None if it is fixed or unknown
     """
 
     label: str
@@ -70,14 +70,14 @@ class OakCalibration(NamedTuple):
 
     @property
     def horizontal_field_deg(self) -> float:
-        """Return the horizontal field of view, from edge to edge of a straightened frame."""
+        """Return the horizontal field of view of an undistorted frame, from edge to edge."""
         left = (self.lens.cx_px + 0.5) / self.lens.fx_px
         right = (self.width_px - 0.5 - self.lens.cx_px) / self.lens.fx_px
         return degrees(atan(left) + atan(right))
 
     @property
     def imu_rotation_deg(self) -> Vec3 | None:
-        """Return how the gyro sits, as a rotation vector in degrees."""
+        """Return the gyro's orientation as a rotation vector, degrees."""
         if self.R_camera_imu is None:
             return None
         x, y, z = np.degrees(cv2.Rodrigues(self.R_camera_imu)[0].ravel()).tolist()
@@ -85,10 +85,10 @@ class OakCalibration(NamedTuple):
 
 
 def read_calibration(dai: Any, calibration: Any, params: OakParams) -> OakCalibration:
-    """Return what a calibration says of frames as the rig asks for them.
+    """Return the calibration of the frames that the rig requests.
 
     Raises:
-        CameraError: it does not hold the colour camera's lens, or one that cannot be used.
+        CameraError: it does not contain the colour camera's lens, or the lens cannot be used.
     """
     socket, size = dai.CameraBoardSocket, (params.width_px, params.height_px)
     try:
@@ -123,7 +123,7 @@ def read_calibration(dai: Any, calibration: Any, params: OakParams) -> OakCalibr
 
 
 def _place(calibration: Any, socket: Any, colour: Any) -> Vec3 | None:
-    """Return where a camera is in the colour camera's axes, metres; None where unknown."""
+    """Return a camera's position in the colour camera's axes, metres; None if unknown."""
     try:
         found = np.asarray(calibration.getCameraExtrinsics(socket, colour), dtype=np.float64)
     except RuntimeError:
@@ -137,7 +137,7 @@ def _place(calibration: Any, socket: Any, colour: Any) -> Vec3 | None:
 def _five_numbers(
     K: Floats, coefficients: Floats, fisheye: bool, size: tuple[int, int]
 ) -> tuple[Distortion, float]:
-    """Fit k1 k2 p1 p2 k3 to a lens of any of OpenCV's models; return them and what is left, px."""
+    """Fit k1 k2 p1 p2 k3 to a lens of any OpenCV model; return them and the residual, px."""
     u, v = np.meshgrid(np.linspace(0, size[0] - 1, 33), np.linspace(0, size[1] - 1, 21))
     pixels = np.column_stack((u.ravel(), v.ravel()))[:, None]
     if fisheye:

@@ -1,4 +1,4 @@
-"""Exposure, flicker and focus as the rig's file asks for them."""
+"""Exposure, anti-flicker and focus controls, set as in the rig file."""
 
 from typing import Any
 
@@ -8,9 +8,9 @@ _ANTI_FLICKER = {"off": "OFF", "50hz": "MAINS_50_HZ", "60hz": "MAINS_60_HZ", "au
 
 
 def set_controls(dai: Any, control: Any, params: OakParams) -> None:
-    """Enter exposure limit, anti-flicker and focus into a CameraControl.
+    """Set exposure limit, anti-flicker and focus in a CameraControl.
 
-    What the rig leaves open stays as the camera does it by itself.
+    Settings that the rig leaves open stay at the camera's defaults.
     """
     if params.exposure_limit_ms is not None:
         control.setAutoExposureLimit(round(params.exposure_limit_ms * 1e3))

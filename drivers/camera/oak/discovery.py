@@ -1,7 +1,7 @@
-"""Which OAK camera is there, and why none can be used: looked up before anything is opened.
+"""Discovery of OAK cameras, and of the reason why none can be used, before any is opened.
 
-Opening an absent device makes depthai search for more than ten seconds; asking what there
-is takes half a second.
+Opening an absent device makes depthai search for more than ten seconds; listing the devices takes
+half a second.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from typing import Any
 from gazerig.drivers.errors import CameraError
 
 UDEV_RULE = 'SUBSYSTEM=="usb", ATTRS{idVendor}=="03e7", MODE="0666"'
-"""What lets all users use the camera (Luxonis documentation, troubleshooting)."""
+"""Rule that gives all users access to the camera (Luxonis documentation, troubleshooting)."""
 _VENDOR = "03e7"  # Movidius, the chip in every OAK with USB
 _RIGHTS = (
     "an OAK camera is plugged in but may not be opened: put this line into "
@@ -21,12 +21,12 @@ _RIGHTS = (
 
 
 def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices")) -> Any:
-    """Return the DeviceInfo of the camera wanted, or of the first one.
+    """Return the DeviceInfo of the wanted camera, or of the first one.
 
-    wanted: device id or name (USB port, IP address); usb: where the system lists USB devices
+    wanted: device id or name (USB port, IP address); usb: the system's folder of USB devices
 
     Raises:
-        CameraError: there is none, or it cannot be used; the message says why.
+        CameraError: there is none, or it cannot be used; the message contains the reason.
     """
     free = list(dai.Device.getAllAvailableDevices())
     for info in free:
@@ -46,7 +46,7 @@ def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices"
             f"no OAK camera {wanted!r} (there is: {there}): plug it in, or name another"
         )
     if _plugged_in(usb):
-        # Cameras without rights are not listed at all by some versions of the USB library.
+        # Some versions of the USB library do not list cameras without permission.
         raise CameraError(_RIGHTS)
     raise CameraError(
         "no OAK camera found: plug it in with a USB 3 cable, give it its power supply, "
@@ -55,13 +55,13 @@ def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices"
 
 
 def _check_rights(dai: Any, info: Any) -> None:
-    """Refuse a camera that may not be opened."""
+    """Reject a camera without permission."""
     if info.status == dai.XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS:
         raise CameraError(_RIGHTS)
 
 
 def _all_connected(dai: Any) -> Sequence[Any]:
-    """Return all cameras, with those in use and those without rights."""
+    """Return all cameras, including those in use and those without permission."""
     return list(
         dai.XLinkConnection.getAllConnectedDevices(
             dai.XLinkDeviceState.X_LINK_ANY_STATE, skipInvalidDevices=False
@@ -70,16 +70,16 @@ def _all_connected(dai: Any) -> Sequence[Any]:
 
 
 def _name(info: Any) -> str:
-    """Call a camera by what a person can write into the configuration."""
+    """Return a camera's name as it can be written into the configuration."""
     return str(info.deviceId or info.name or "without id")
 
 
 def _plugged_in(usb: Path) -> bool:
-    """Return whether the system sees an OAK at USB."""
+    """Return whether the system lists an OAK on USB."""
     for file in usb.glob("*/idVendor"):
         try:
             if file.read_text(encoding="ascii", errors="replace").strip() == _VENDOR:
                 return True
-        except OSError:  # unplugged in this moment
+        except OSError:  # unplugged at this moment
             continue
     return False

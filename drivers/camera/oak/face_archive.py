@@ -1,4 +1,4 @@
-"""Face networks for the camera's chip: archives, and whether one will do on a camera."""
+"""Archives of face networks for the camera's chip, and their check."""
 
 from pathlib import Path
 from typing import Any, Literal
@@ -16,7 +16,7 @@ _CURE = (
 
 
 class UnusableModel(CameraError):
-    """An archive that this camera cannot find faces with; the message says why and the cure."""
+    """An archive that this camera cannot use; the message contains reason and remedy."""
 
 
 def read_archive(dai: Any, path: str) -> Any:
@@ -39,15 +39,15 @@ def read_archive(dai: Any, path: str) -> Any:
 
 
 def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
-    """Return what network an archive holds.
+    """Return the kind of network in an archive.
 
     Args:
-        archive: as read.
-        platform: the camera's chip, a dai.Platform.
-        file: the archive's path, for messages.
+        archive: The archive.
+        platform: The camera's chip, a dai.Platform.
+        file: The archive's path, for messages.
 
     Raises:
-        UnusableModel: it is made for another chip, or finds no faces with five landmarks.
+        UnusableModel: it is for another chip, or does not detect faces with five landmarks.
     """
     wrong = _made_for_another(archive, platform)
     heads = archive.getConfig().model.heads or []
@@ -75,7 +75,7 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
 
 
 def _yunet_fault(archive: Any) -> str:
-    """Return why the network of an archive is no YuNet, "" where it is."""
+    """Return why the network of an archive is no YuNet, "" if it is."""
     names = [str(output.name) for output in archive.getConfig().model.outputs]
     if wrong := fault_of_names(names):
         return wrong
@@ -86,7 +86,7 @@ def _yunet_fault(archive: Any) -> str:
 
 
 def _made_for_another(archive: Any, platform: Any) -> str:
-    """Return why an archive does not run on a chip, "" where it does."""
+    """Return why an archive does not run on a chip, "" if it does."""
     chips = list(archive.getSupportedPlatforms())
     if not chips:
         return "its network is not converted for the chip of an OAK camera"

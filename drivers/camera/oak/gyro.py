@@ -1,7 +1,7 @@
-"""How an OAK camera turned, by its gyro: readings summed up in the device's own time.
+"""Orientation of an OAK camera from its gyro: readings integrated in the device's own time.
 
-Pure. Frames and readings carry stamps of one clock, the device's, so a frame's orientation needs
-no translation of times. What the gyro shows while it is at rest, its bias, is subtracted.
+Pure. Frames and readings have time stamps of the device's clock, so a frame's orientation needs no
+conversion of times. The gyro's bias, its reading at rest, is subtracted.
 """
 
 from bisect import bisect_left
@@ -19,23 +19,23 @@ _Quaternion = tuple[float, float, float, float]
 
 _KEPT = 400  # readings: 2 s at 200 Hz
 _MOST_RAD_S = radians(2100.0)  # IMUs of OAK cameras measure up to 2000 deg/s
-# Readings farther apart than this do not tell what was between them.
+# Motion between readings farther apart than this is unknown.
 _GAP_S = 0.1
-# A frame may be so much younger than the newest reading.
+# Largest time from the newest reading to a frame.
 _AHEAD_S = 0.03
 _STUCK_S = 0.5
 _NEVER_AT_REST_S = 20.0
-_WITHOUT = "the joints alone say how the camera turns; oak.gyro: false keeps it out"
+_WITHOUT = "only the joints measure the camera's turns; oak.gyro: false disables it"
 
 
 class Gyro:
-    """The camera's orientation at any instant of the last two seconds.
+    """Gyro that returns the camera's orientation at any time of the last two seconds.
 
     Args:
-        R_camera_imu: (3, 3) takes directions from the gyro's axes to the camera's (x right,
-            y down, z forward).
+        R_camera_imu: Rotation (3, 3) that takes directions from the gyro's axes to the camera's (x
+            right, y down, z forward).
 
-    fault: why it is not used, "" while it is
+    fault: reason why it is not used, "" for none
     """
 
     def __init__(self, R_camera_imu: NDArray[np.float64]) -> None:
@@ -45,7 +45,7 @@ class Gyro:
         self._turned: deque[_Quaternion] = deque(maxlen=_KEPT)
         self._rates: deque[Rates] = deque(maxlen=_KEPT)
         self._epoch = 0
-        self._last: Rates | None = None  # as the gyro gave it
+        self._last: Rates | None = None  # as read
         self._first_s: float | None = None
         self._same_since_s: float | None = None
         self._absurd_since_s: float | None = None
@@ -56,20 +56,20 @@ class Gyro:
 
     @property
     def settled(self) -> bool:
-        """Return whether its bias is known, or it is known to be of no use."""
+        """Return whether its bias is known, or it is known to be unusable."""
         return bool(self.fault) or self._bias.rad_s is not None
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         found, self._events = tuple(self._events), []
         return found
 
     def add(self, device_s: float, rates_rad_s: Rates) -> None:
-        """Add a reading; those not later than the last are left out.
+        """Add a reading; readings not later than the last are ignored.
 
         Args:
-            device_s: its time by the device's clock.
-            rates_rad_s: about the gyro's own axes.
+            device_s: Time of the device's clock, seconds.
+            rates_rad_s: Rates about the gyro's own axes.
         """
         if self.fault or (self._times and device_s <= self._times[-1]):
             return
@@ -89,11 +89,11 @@ class Gyro:
             if self._restless_told:
                 self._events.append(
                     f"the OAK camera's gyro has not been at rest for {_NEVER_AT_REST_S:g} s, which "
-                    "it needs once for 1.5 s: until then the joints say how the camera turns"
+                    "it needs once for 1.5 s: until then only the joints measure the camera's turns"
                 )
 
     def at(self, device_s: float) -> CameraTurn | None:
-        """Return the orientation at a time of the device's clock, None where it is not known."""
+        """Return the orientation at a time of the device's clock, None if it is unknown."""
         if self.fault:
             return None
         if self._asked_since_s is None:
@@ -107,7 +107,7 @@ class Gyro:
             return None
         after = bisect_left(self._times, device_s)
         at = min(after, len(self._times) - 1)
-        # On from the reading before, or from the newest with the rate that it had.
+        # Extrapolated from the previous reading, or from the newest one with its rate.
         base = max(0, after - 1)
         rates, since_s = _mean(self._rates[base], self._rates[at]), device_s - self._times[base]
         w, x, y, z = _multiplied(self._turned[base], _small_turn(rates, bias, since_s))
@@ -121,7 +121,7 @@ class Gyro:
         )
 
     def _sum_up(self, device_s: float, rates: Rates) -> None:
-        """Turn on by the mean of this reading and the last."""
+        """Integrate the mean of this reading and the last."""
         if not self._times or device_s - self._times[-1] > _GAP_S:
             self._epoch += 1
             for column in (self._times, self._turned, self._rates):
@@ -136,21 +136,21 @@ class Gyro:
         self._rates.append(rates)
 
     def _is_stuck(self, device_s: float, rates: Rates) -> bool:
-        """Return whether readings have not changed at all for too long: noise always does."""
+        """Return whether readings have not changed for too long, although they are always noisy."""
         if rates != self._last or self._same_since_s is None:
             self._last, self._same_since_s = rates, device_s
         elif device_s - self._same_since_s > _STUCK_S:
             x, y, z = map(degrees, rates)
-            self._fail(f"is stuck: one and the same reading ({x:.2f}, {y:.2f}, {z:.2f} deg/s)")
+            self._fail(f"is stuck: always the same reading ({x:.2f}, {y:.2f}, {z:.2f} deg/s)")
         return bool(self.fault)
 
     def _absurd(self, device_s: float, rates: Rates) -> None:
-        """Leave out a reading that cannot be; one alone may be a disturbance."""
+        """Reject an impossible reading; a single one may be a disturbance."""
         if self._absurd_since_s is None:
             self._absurd_since_s = device_s
         if device_s - self._absurd_since_s > _STUCK_S:
             x, y, z = map(degrees, rates)
-            self._fail(f"gives readings that cannot be ({x:g}, {y:g}, {z:g} deg/s)")
+            self._fail(f"returns impossible readings ({x:g}, {y:g}, {z:g} deg/s)")
 
     def _fail(self, why: str) -> None:
         self.fault = why
@@ -162,7 +162,7 @@ def _mean(a: Rates, b: Rates) -> Rates:
 
 
 def _small_turn(rates: Rates, bias: Rates, dt_s: float) -> _Quaternion:
-    """Return the turn by rates, less the bias, in a time."""
+    """Return the rotation by rates, minus the bias, in a time."""
     x, y, z = ((rate - off) * dt_s for rate, off in zip(rates, bias, strict=True))
     angle = hypot(x, y, z)
     share = 0.5 if angle < 1e-9 else sin(0.5 * angle) / angle
@@ -170,7 +170,7 @@ def _small_turn(rates: Rates, bias: Rates, dt_s: float) -> _Quaternion:
 
 
 def _multiplied(a: _Quaternion, b: _Quaternion) -> _Quaternion:
-    """Return the turn a followed by b, b about the axes that a led to."""
+    """Return the rotation a followed by b, about the rotated axes."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     w = aw * bw - ax * bx - ay * by - az * bz

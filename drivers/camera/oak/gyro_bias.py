@@ -1,7 +1,7 @@
-"""The bias of a gyro: what it shows while it is at rest.
+"""Bias of a gyro: its reading at rest.
 
-At rest, averages of .3 s hardly differ, however much single readings shake; in
-motion they do, even if it is as slow as breathing.
+At rest, averages of .3 s hardly differ, even if single readings are noisy. In motion they differ,
+even if it is as slow as breathing.
 """
 
 from math import radians
@@ -12,16 +12,16 @@ Rates = tuple[float, float, float]
 
 _BLOCK_S, _BLOCKS = 0.3, 5
 _FEWEST = 8  # readings in a block
-# How far blocks at rest lie from their mean, and how large a bias may be.
+# Largest deviation of blocks at rest from their mean, and largest bias.
 _SPREAD_RAD_S, _MOST_RAD_S = radians(0.06), radians(3.0)
-# A bias wanders with the temperature by no more than this from one rest to the next; a larger
-# change is a slow and even motion, unless it lasts.
+# Largest drift of a bias with temperature from one rest to the next; a larger change is a slow,
+# even motion, unless it lasts.
 _STEP_RAD_S, _LASTING = radians(0.3), 10
 _SHARE = 0.3
 
 
 class GyroBias:
-    """Finds the bias in readings, of 1.5 s at rest each.
+    """Estimator of the bias, from readings of 1.5 s at rest.
 
     rad_s: the bias, None before the first rest
     """
@@ -34,8 +34,8 @@ class GyroBias:
         self._elsewhere = 0
 
     def add(self, t_s: float, rates_rad_s: Rates) -> None:
-        """Add a reading; times rise."""
-        if self._began_s is None or t_s - self._began_s > 2.0 * _BLOCK_S:  # the first, or a gap
+        """Add a reading; times must ascend."""
+        if self._began_s is None or t_s - self._began_s > 2.0 * _BLOCK_S:  # first reading, or a gap
             self._block, self._means, self._began_s = [], [], t_s
         self._block.append(rates_rad_s)
         if t_s - self._began_s < _BLOCK_S:
@@ -48,7 +48,7 @@ class GyroBias:
             self._means.clear()
 
     def _judge(self, means: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
-        """Replace the bias by these averages if they are those of a rest."""
+        """Replace the bias by these averages if the gyro was at rest."""
         mean = means.mean(axis=0)
         if np.abs(means - mean).max() > _SPREAD_RAD_S or np.abs(mean).max() > _MOST_RAD_S:
             self._elsewhere = 0

@@ -1,4 +1,4 @@
-"""Messages of an OAK pipeline as frames with distances, lens and faces."""
+"""Conversion of an OAK pipeline's messages to frames with distances, lens and faces."""
 
 from math import isfinite
 from typing import Any
@@ -12,17 +12,17 @@ from gazerig.drivers.camera.source import bgr
 from gazerig.drivers.types import Depth, DetectedFace, ImageArray
 
 _LANDMARKS = 5
-# A frame that never saw a lens carries the unit matrix.
+# A frame without a lens contains the unit matrix.
 _LEAST_FOCAL_PX = 10.0
 
 
 def names(group: Any) -> set[str]:
-    """Return which messages are in a group."""
+    """Return the names of the messages in a group."""
     return set(group.getMessageNames())
 
 
 def image_of(group: Any) -> ImageArray | None:
-    """Return the colour frame of a group, None where it is none."""
+    """Return the colour frame of a group, None if it has none."""
     return bgr(group[COLOUR].getCvFrame())
 
 
@@ -37,7 +37,7 @@ def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
 
 
 def lens_of(group: Any) -> Intrinsics | None:
-    """Return the lens that the frame carries, None where it carries none."""
+    """Return the lens of the frame, None if it has none."""
     matrix = np.asarray(group[COLOUR].getTransformation().getIntrinsicMatrix(), dtype=float)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or matrix[0, 0] < _LEAST_FOCAL_PX:
         return None
@@ -49,9 +49,9 @@ def lens_of(group: Any) -> Intrinsics | None:
 def faces_of(
     group: Any, width_px: int, height_px: int, min_confidence: float
 ) -> tuple[DetectedFace, ...] | None:
-    """Return the faces that the camera found, the largest first; None where it did not look.
+    """Return the faces that the camera found, the largest first; None if it did not search.
 
-    Detections without five landmarks are left out: their gaze is unknown.
+    Detections without five landmarks are omitted, as their gaze is unknown.
     """
     if FACES not in names(group):
         return None
@@ -65,7 +65,7 @@ def faces_of(
 
 
 def _face(detection: Any, width_px: int, height_px: int) -> DetectedFace | None:
-    """Turn a detection in shares of the frame into one in pixels."""
+    """Convert a detection from shares of the frame to pixels."""
     points = np.array([[p.x, p.y] for p in detection.getKeypoints2f()], dtype=np.float64)
     edges = (detection.xmin, detection.ymin, detection.xmax, detection.ymax)
     if points.shape != (_LANDMARKS, 2) or not all(map(isfinite, (*edges, *points.ravel()))):

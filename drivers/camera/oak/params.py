@@ -8,7 +8,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class OakParams:
-    """Size and rate of the frames, how stereo depth is found, and where faces are found."""
+    """Parameters of frames, stereo depth and face detection on the camera."""
 
     # fmt: off
     device: Annotated[str, "device id or IP address, if there are several cameras; empty: the first one found"] = ""
@@ -44,10 +44,10 @@ class OakParams:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that the camera can do all of it together.
+        """Check that the settings are consistent.
 
         Raises:
-            ValueError: a size that frames cannot have, or an exposure longer than a frame lasts.
+            ValueError: an invalid frame size, or an exposure longer than a frame period.
         """
         if self.width_px % 16 or self.height_px % 2:
             raise ValueError(

@@ -1,7 +1,7 @@
-"""The nodes that run on the camera, and how their messages are brought together.
+"""Nodes that run on the camera, and synchronisation of their messages.
 
-``device_nodes`` is all that needs a camera. Any other function that gives the same outputs
-serves as well: depthai's replay and host nodes do, without a camera.
+Only ``device_nodes`` needs a camera. Any other function with the same outputs can replace it:
+depthai's replay and host nodes work without a camera.
 """
 
 from collections.abc import Callable
@@ -15,17 +15,17 @@ from gazerig.drivers.camera.oak.yunet_node import FoundFaces, yunet_faces
 
 COLOUR, DEPTH, FACES = "colour", "depth", "faces"
 """Names of the messages in a group."""
-# Two groups may wait: one that is read and the newest.
+# Two groups may be queued: the one that is read and the newest.
 _QUEUE = 2
 _GYRO_HZ, _GYRO_BATCH = 200, 2
-_READINGS = 100  # messages that may wait: a second
+_READINGS = 100  # messages in the queue: one second
 
 
 class Outputs(NamedTuple):
-    """Outputs of nodes: frames, depth in millimetres (RAW16), found faces, and the gyro's readings.
+    """Outputs of nodes: frames, depth in millimetres (RAW16), faces, and the gyro's readings.
 
-    depth, faces and imu are None where they are not wanted
-    face_fault: returns why no faces can be found there, "" while they can
+    depth, faces, imu: None if they are not wanted
+    face_fault: returns why no faces can be found on the camera, "" if they can
     """
 
     colour: Any
@@ -36,11 +36,11 @@ class Outputs(NamedTuple):
 
 
 MakeNodes = Callable[[Any, Any, OakParams], Outputs]
-"""Takes depthai, a pipeline and the parameters; return the outputs of the nodes it made."""
+"""Creates nodes from depthai, a pipeline and the parameters, and returns their outputs."""
 
 
 def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
-    """Make the nodes on the camera: colour without distortion, aligned depth, faces.
+    """Create the nodes on the camera: colour without distortion, aligned depth, faces.
 
     Raises:
         CameraError: the face model cannot be read.
@@ -67,7 +67,7 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
 
 
 def _imu(dai: Any, pipeline: Any) -> Any:
-    """Make the gyro's readings."""
+    """Create the node of the gyro's readings."""
     imu = pipeline.create(dai.node.IMU)
     imu.enableIMUSensor(dai.IMUSensor.GYROSCOPE_RAW, _GYRO_HZ)
     imu.setBatchReportThreshold(_GYRO_BATCH)
@@ -76,12 +76,12 @@ def _imu(dai: Any, pipeline: Any) -> Any:
 
 
 def _faces(dai: Any, pipeline: Any, params: OakParams, camera: Any) -> FoundFaces:
-    """Make the network that finds faces on the camera; a YuNet is decoded on the host."""
+    """Create the face network on the camera; a YuNet is decoded on the host."""
     archive = read_archive(dai, params.face_model)
     platform = pipeline.getDefaultDevice().getPlatform()
     if kind_of(archive, platform, params.face_model) == "yunet":
         network = pipeline.create(dai.node.NeuralNetwork)
-        # Fitted in whole: cut to the network's shape, the sides would not be looked at.
+        # Letterboxed: if cropped to the network's shape, the sides would not be searched.
         whole = dai.ImgResizeMode.LETTERBOX
         network = network.build(camera, archive, fps=params.rate_hz, resizeMode=whole)
         size = archive.getInputSize()
@@ -104,9 +104,9 @@ def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
 
 
 def readings(outputs: Outputs) -> Any | None:
-    """Return the queue of the gyro's readings, None where there is none.
+    """Return the queue of the gyro's readings, None without a gyro.
 
-    They are not joined to frames: there are many of them to each, in messages of their own.
+    They are not joined to frames, as there are many per frame, in separate messages.
     """
     if outputs.imu is None:
         return None
@@ -114,7 +114,7 @@ def readings(outputs: Outputs) -> Any | None:
 
 
 def _stereo(dai: Any, pipeline: Any, params: OakParams, colour: Any) -> Any:
-    """Make depth that lies on the colour frame pixel by pixel."""
+    """Create depth that is aligned with the colour frame pixel by pixel."""
     socket = dai.CameraBoardSocket
     stereo = pipeline.create(dai.node.StereoDepth)
     preset = getattr(dai.node.StereoDepth.PresetMode, params.stereo_preset.upper())
@@ -130,7 +130,7 @@ def _stereo(dai: Any, pipeline: Any, params: OakParams, colour: Any) -> Any:
     if platform != dai.Platform.RVC4:
         colour.link(stereo.inputAlignTo)
         return stereo.depth
-    # The newer chip aligns in a node of its own.
+    # The newer chip aligns depth in a separate node.
     align = pipeline.create(dai.node.ImageAlign)
     stereo.depth.link(align.input)
     colour.link(align.inputAlignTo)

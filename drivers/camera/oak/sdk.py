@@ -1,8 +1,8 @@
-"""The one place where depthai is imported: only when asked for, and quietly.
+"""Import of depthai, only on request and without its log.
 
-depthai sends usage figures unless DEPTHAI_TELEMETRY is 0, and logs to the standard output,
-which belongs to the output that the user asked for. Both are read at its import; the
-environment variable DEPTHAI_LEVEL brings its log back.
+depthai sends usage figures unless DEPTHAI_TELEMETRY is 0, and logs to the standard output, which
+must contain only the requested output. It reads both settings at its import; the environment
+variable DEPTHAI_LEVEL enables its log.
 """
 
 import os

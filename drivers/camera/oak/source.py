@@ -31,10 +31,10 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import CameraTurn, DetectedFace
 
-_SLICE = timedelta(milliseconds=100)  # so long may a request to stop wait
-# The camera's stamp in host time is believed if it is no older than this, nor of the future.
+_SLICE = timedelta(milliseconds=100)  # longest delay of a stop request
+# The camera's stamp in host time is used if it is not older than this and not in the future.
 _OLDEST_STAMP_S = 1.0
-# The gyro needs 1.5 s at rest; it is waited for a little longer.
+# The gyro needs 1.5 s at rest; the wait is a little longer.
 _SETTLING, _SETTLING_S = 100, 0.02
 
 
@@ -42,10 +42,10 @@ class OakSource:
     """An OAK-D as a source of frames; nothing is imported or opened before ``open``.
 
     Args:
-        params: what is asked of the camera.
-        nodes: makes the nodes of the pipeline.
+        params: Requested settings of the camera.
+        nodes: Creates the nodes of the pipeline.
         on_device: False for nodes that all run on the host and need no camera.
-        load: returns the module depthai.
+        load: Returns the module depthai.
     """
 
     def __init__(
@@ -73,14 +73,14 @@ class OakSource:
         self._face_fault_told = False
         self._gyro: Gyro | None = None
         self._slow_line: FrameRateMonitor | None = None
-        self._waited = False  # the newest frame was waited for: none had come since the last
+        self._waited = False  # whether the newest frame arrived during a wait
 
     def open(self) -> None:
-        """Find the camera, start it, and make sure of its rate.
+        """Find the camera, start it, and check its rate.
 
         Raises:
-            CameraError: there is none, it may not be used, is busy, or hangs on
-                USB 2 where that is refused.
+            CameraError: there is none, it may not be used, is busy, or is on USB 2 and that is
+                refused.
         """
         self.close()
         self._dai = self._load()
@@ -110,7 +110,7 @@ class OakSource:
         self._bridge, self._in_step, self._number = ClockSync(), True, 0
 
     def _settle_gyro(self) -> None:
-        """Let the gyro find its bias before the head moves."""
+        """Wait until the gyro has found its bias, before the head moves."""
         if self._gyro_queue is None:
             return
         R = self._R_camera_imu()
@@ -123,7 +123,7 @@ class OakSource:
             pause.wait(_SETTLING_S)
 
     def _R_camera_imu(self) -> NDArray[np.float64]:
-        """Return how the gyro sits: as the rig says, else the camera's calibration."""
+        """Return the gyro's orientation, from the rig or the camera's calibration."""
         if self._asked.imu_rotation_deg is not None:
             return rotation_of(self._asked.imu_rotation_deg)
         found = None
@@ -132,7 +132,7 @@ class OakSource:
         return np.eye(3) if found is None else found
 
     def _read_gyro(self) -> None:
-        """Hand over the readings that have come, and what is to be told of them."""
+        """Pass new readings to the gyro, and collect its events."""
         if self._gyro_queue is None or self._gyro is None:
             return
         while (message := self._gyro_queue.tryGet()) is not None:
@@ -164,10 +164,10 @@ class OakSource:
         return None
 
     def calibration(self) -> OakCalibration:
-        """Return what the open camera's memory says of its colour camera.
+        """Return the calibration of the colour camera from the open camera's memory.
 
         Raises:
-            CameraError: it is not open, or its memory does not hold it.
+            CameraError: it is not open, or its memory does not contain it.
         """
         if isinstance(self._calibration, CameraError):
             raise self._calibration
@@ -184,7 +184,7 @@ class OakSource:
         """Stop and free the camera; safe to call twice."""
         pipeline, device = self._pipeline, self._device
         self._pipeline = self._device = self._queue = self._gyro_queue = self._gyro = None
-        # A camera that was unplugged throws from whatever it is asked; it is gone already.
+        # An unplugged camera raises an error from every call.
         for end in (_ended(pipeline), device.close if device is not None else None):
             if end is not None:
                 try:
@@ -193,22 +193,22 @@ class OakSource:
                     self._events.append(f"closing the OAK camera: {_line(error)}")
 
     def __del__(self) -> None:
-        """Close a camera that was dropped open: the SDK's own destructor would wait for ever."""
+        """Close a camera that was not closed: the SDK's own destructor would wait forever."""
         self.close()
 
     def _connect(self) -> Any:
         """Open the device."""
         info = find_oak(self._dai, self._params.device)
         device = self._dai.Device(info)
-        # It is this program that opens a lost camera again, and tells.
+        # This program itself reopens a lost camera and reports it.
         device.setMaxReconnectionAttempts(0)
         return device
 
     def _prepare(self) -> None:
-        """See what the device can do and how fast its USB is; light its dots.
+        """Check the device's features and USB speed; switch its dot projector on.
 
         Raises:
-            CameraError: it has no colour camera, or hangs on USB 2 where that is refused.
+            CameraError: it has no colour camera, or is on USB 2 and that is refused.
         """
         stored = self._device.readCalibration()
         try:
@@ -244,7 +244,7 @@ class OakSource:
         return group
 
     def _shot(self, group: Any, arrived_s: float) -> Shot | None:
-        """Make a frame of a group of messages."""
+        """Convert a group of messages to a frame."""
         image = image_of(group)
         if image is None:
             return None
@@ -263,27 +263,27 @@ class OakSource:
         )
 
     def _lens(self, group: Any) -> Intrinsics | None:
-        """Return the lens of a frame; one that the camera has not straightened bends lines."""
+        """Return the lens of a frame, with distortion if the camera has not undistorted it."""
         lens, stored = lens_of(group), self._calibration
         if lens is None or self._asked.undistort or not isinstance(stored, OakCalibration):
             return lens
         return replace(lens, distortion=stored.own_distortion)
 
     def _faces(self, group: Any, width_px: int, height_px: int) -> tuple[DetectedFace, ...] | None:
-        """Return the faces that the camera found; None where it did not look, or cannot."""
+        """Return the faces that the camera found; None if it did not or cannot search."""
         why = self._face_fault()
         if not why:
             return faces_of(group, width_px, height_px, self._params.min_confidence)
         if not self._face_fault_told:
             self._face_fault_told = True
             self._events.append(
-                f"the face model {self._params.face_model} gives what cannot be read ({why}): faces "
+                f"the face model {self._params.face_model} has unreadable outputs ({why}): faces "
                 "are found on the host; take another archive, or leave oak.face_model empty"
             )
         return None
 
     def _turn(self, frame: Any) -> CameraTurn | None:
-        """Return how the camera was turned in the middle of a frame's exposure."""
+        """Return the camera's orientation at the middle of a frame's exposure."""
         if self._gyro is None:
             return None
         self._read_gyro()
@@ -293,10 +293,10 @@ class OakSource:
         return turn
 
     def _watch_line(self, captured_s: float) -> None:
-        """Report a USB 2 line that does not carry the frames asked for."""
+        """Report a USB 2 line that does not carry the requested frames."""
         if self._slow_line is None:
             return
-        # A frame that lay waiting may have had others before it, which its reader was late for.
+        # Before a frame that was queued, others may have been lost because the reader was late.
         line = self._slow_line.update(captured_s, 0.0 if self._waited else inf)
         measured_hz = self._slow_line.measured_hz
         if not line or measured_hz is None:
@@ -306,10 +306,10 @@ class OakSource:
         self._events.append(line)
 
     def _captured_s(self, frame: Any, arrived_s: float) -> float:
-        """Translate the device's own stamp by the bridge.
+        """Return the host time of a frame's exposure.
 
-        depthai measures the offset of the clocks by asking to and fro, so its stamp in host
-        time holds no transport; where it cannot be right, arrivals serve instead.
+        depthai measures the offset of the clocks by round trips, so its stamp in host time contains
+        no transport delay. If the stamp is implausible, times of arrival are used.
         """
         middle = self._dai.CameraExposureOffset.MIDDLE
         device_s = frame.getTimestampDevice(middle).total_seconds()
@@ -330,20 +330,20 @@ class OakSource:
 
 
 def _ended(pipeline: Any) -> Callable[[], None] | None:
-    """Return what stops a pipeline and waits for its threads."""
+    """Return a function that stops a pipeline and waits for its threads."""
     if pipeline is None:
         return None
 
     def end() -> None:
         if pipeline.isRunning():
             pipeline.stop()
-        # Also where the stream has ended by itself: left to its destructor, the wait for its
-        # threads would keep the interpreter's lock that nodes written in Python need to end.
+        # Also if the stream has ended already: the destructor would wait for the threads with the
+        # interpreter lock, which nodes written in Python need to end.
         pipeline.wait()
 
     return end
 
 
 def _line(error: BaseException) -> str:
-    """Return an error's words on one line."""
+    """Return an error's text on one line."""
     return " ".join(str(error).split())

@@ -1,4 +1,4 @@
-"""What depthai's errors at the start of a camera mean, and what helps."""
+"""Causes and remedies of depthai's errors at the start of a camera."""
 
 _CURES = (
     (("already_in_use", "already in use"), "another program uses it: end that"),
@@ -22,12 +22,12 @@ _CURES = (
     ),
     (("host only",), "its nodes need a camera"),
 )
-"""Parts of messages, in lower case -> what they mean and what helps."""
+"""Parts of messages, in lower case -> cause and remedy."""
 _OTHERWISE = "unplug it, wait a second, plug it in again; if another program uses it, end that"
 
 
 def start_cure(message: str) -> str:
-    """Return what helps against an error at the start."""
+    """Return the remedy for an error at the start."""
     lower = message.lower()
     for parts, cure in _CURES:
         if any(part in lower for part in parts):

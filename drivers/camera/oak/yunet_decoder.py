@@ -1,8 +1,8 @@
-"""The outputs of a YuNet that runs on the camera, turned into faces on the host. Pure.
+"""Decoder on the host for the outputs of a YuNet that runs on the camera; pure.
 
-Two generations of the network are about. The later one (OpenCV zoo, 2023 and after) gives scores,
-boxes and landmarks a cell for strides of 8, 16 and 32 px; the earlier one (Luxonis' model hub)
-gives them for boxes of fixed sizes, in the manner of SSD. Wu, Peng, Yu, "YuNet: a tiny
+Two generations of the network are in use. The later one (OpenCV zoo, 2023 and after) outputs
+scores, boxes and landmarks per cell for strides of 8, 16 and 32 px; the earlier one (Luxonis' model
+hub) outputs them for anchor boxes of fixed sizes, like SSD. Wu, Peng, Yu, "YuNet: a tiny
 millisecond-level face detector", 2023; Liu et al., "SSD: single shot multibox detector", 2016.
 """
 
@@ -17,17 +17,17 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 STRIDES = (8, 16, 32)
-_WIDTHS = {"cls": 1, "obj": 1, "bbox": 4, "kps": 10}  # numbers a cell
-_EARLIER = {"loc": 14, "conf": 2, "iou": 1}  # numbers a fixed box
+_WIDTHS = {"cls": 1, "obj": 1, "bbox": 4, "kps": 10}  # numbers per cell
+_EARLIER = {"loc": 14, "conf": 2, "iou": 1}  # numbers per fixed box
 _SIZES_PX = ((8, (10, 16, 24)), (16, (32, 48)), (32, (64, 96)), (64, (128, 192, 256)))
 _VARIANCES = 0.1, 0.2
-# Boxes that share more than this part of their union are one face: the zoo's own value.
+# Boxes with a larger intersection over union are one face; value of the OpenCV zoo.
 _SAME = 0.3
 _MOST = 50
 
 
 class DecodedFaces(NamedTuple):
-    """Faces in shares of the network's image, the surest first.
+    """Faces in shares of the network's image, the most confident first.
 
     boxes: (n, 4) left, top, right, bottom; points: (n, 5, 2) in the order of DetectedFace;
     scores: (n,) 0..1
@@ -39,11 +39,11 @@ class DecodedFaces(NamedTuple):
 
 
 class UnreadableOutputs(ValueError):
-    """The network gave something else than a YuNet; the message says what."""
+    """The outputs are not those of a YuNet; the message contains the difference."""
 
 
 def fault_of_names(names: Sequence[str]) -> str:
-    """Return what outputs of a YuNet are missing among these, "" where none is."""
+    """Return the missing outputs of a YuNet as text, "" for none."""
     if all(any(kind in name for name in names) for kind in _EARLIER):
         return ""
     missing = [n for kind in _WIDTHS for s in STRIDES if (n := f"{kind}_{s}") not in names]
@@ -56,10 +56,10 @@ def decode(
     """Return the faces in the outputs of one image.
 
     Args:
-        tensors: by the names of the outputs.
-        width_px: of the network's image.
-        height_px: of the network's image.
-        least: smallest score of a face.
+        tensors: Outputs by name.
+        width_px: Width of the network's image.
+        height_px: Height of the network's image.
+        least: Smallest score of a face.
 
     Raises:
         UnreadableOutputs: an output is missing, or of another size.
@@ -150,7 +150,7 @@ def _fixed_boxes(width_px: int, height_px: int) -> Floats:
 
 
 def _table(tensors: Mapping[str, NDArray[np.float32]], name: str, width: int, count: int) -> Floats:
-    """Return an output as (count, width), whichever way its axes are."""
+    """Return an output as (count, width), for any order of its axes."""
     found = np.asarray(tensors[name], dtype=np.float64)
     if found.size != count * width:
         raise UnreadableOutputs(

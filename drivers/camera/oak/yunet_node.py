@@ -1,4 +1,4 @@
-"""YuNet on the camera with its decoder on the host, as one output of found faces."""
+"""YuNet on the camera with its decoder on the host, as one output of faces."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -9,10 +9,10 @@ from gazerig.drivers.camera.oak.yunet_decoder import DecodedFaces, UnreadableOut
 
 
 class FoundFaces(NamedTuple):
-    """Faces as a network sends them.
+    """Output of a network's faces.
 
-    out: ImgDetections with five key points
-    fault: returns why its outputs cannot be read, "" while they can
+    out: output of ImgDetections with five key points
+    fault: returns why its outputs cannot be read, "" if they can
     """
 
     out: Any
@@ -22,25 +22,25 @@ class FoundFaces(NamedTuple):
 def yunet_faces(
     dai: Any, pipeline: Any, network_out: Any, size: tuple[int, int], min_confidence: float
 ) -> FoundFaces:
-    """Make the decoder of a network's outputs.
+    """Create the decoder of a network's outputs.
 
     Args:
-        dai: depthai.
-        pipeline: gets the node.
-        network_out: sends NNData.
-        size: width and height of the network's image, pixels.
-        min_confidence: smallest score of a face.
+        dai: Module depthai.
+        pipeline: Pipeline to add the node to.
+        network_out: Output of NNData.
+        size: Width and height of the network's image, pixels.
+        min_confidence: Smallest score of a face.
     """
     faults: list[str] = []
 
     class YunetDecoder(dai.node.HostNode):  # type: ignore[misc]
-        """Makes detections of the numbers of each image; what cannot be read shows no face."""
+        """Decoder of the outputs of each image; unreadable outputs contain no face."""
 
-        # depthai takes an annotation here for the name of a message.
+        # depthai interprets an annotation here as the name of a message.
         def process(self, data):  # type: ignore[no-untyped-def]
             """Return the faces of one message of the network."""
             found = None
-            if not faults:  # it will not get better
+            if not faults:  # later outputs have the same fault
                 try:
                     names = data.getAllLayerNames()
                     tensors = {name: data.getTensor(name, dequantize=True) for name in names}
@@ -55,7 +55,7 @@ def yunet_faces(
 
 
 def detections(dai: Any, found: DecodedFaces | None, data: Any) -> Any:
-    """Return faces as a message with the times and the place of the network's own."""
+    """Return faces as a message with time stamps and transformation of the network's message."""
     message = dai.ImgDetections()
     faces = []
     if found is not None:
