@@ -1,1 +1,1 @@
-"""What is seen in images."""
+"""Detection in images: faces, people, palms, motion."""

@@ -1,4 +1,4 @@
-"""Faces, people without a visible face, and palms: what is searched for with which files."""
+"""Detection of faces, people without a visible face, and palms, depending on the model files."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -27,10 +27,10 @@ class DetectorWithPeople:
     """A face detector that also finds people whose face is not visible, and palms.
 
     Args:
-        detector: finds faces.
-        people: finds people; None: it cannot.
-        palms: finds palms; None: it cannot.
-        faults: why it cannot, one line each.
+        detector: Finds faces.
+        people: Finds people; None if it cannot.
+        palms: Finds palms; None if it cannot.
+        faults: Reasons why it cannot, one line each.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class DetectorWithPeople:
             self._log.add(fault)
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
+        """Return faces, the largest first, in pixels of the image."""
         return self._detector.find(image)
 
     def people(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
@@ -66,18 +66,18 @@ class DetectorWithPeople:
     def meshed(
         self, image: ImageArray, faces: tuple[DetectedFace, ...]
     ) -> tuple[DetectedFace, ...]:
-        """Return faces that a camera itself has found, with meshes where they are wanted."""
+        """Return faces that a camera itself has found, with meshes if wanted."""
         meshed: Callable[..., Any] | None = getattr(self._detector, "meshed", None)
         return faces if meshed is None else tuple(meshed(image, faces))
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         events = getattr(self._detector, "events", None)
         return (*self._log.drain(), *(events() if events is not None else ()))
 
 
 def with_people(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
-    """Return a detector that also finds people and palms, or the one given without their files.
+    """Return a detector that also finds people and palms, or the given one without their files.
 
     A file that cannot be used is reported as an event.
     """
@@ -104,7 +104,7 @@ def with_people(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetec
 
 
 def _load(file: ModelFile) -> Network | None:
-    """Return a network, None if the user has no file of it.
+    """Return a network, None if the user has no file for it.
 
     Raises:
         ModelFileError: the file is damaged, or LiteRT is not installed.
@@ -134,7 +134,7 @@ def _load(file: ModelFile) -> Network | None:
 
 @contextmanager
 def _quiet_stderr() -> Iterator[None]:
-    """Keep LiteRT's greeting, which native code writes, off the terminal."""
+    """Suppress LiteRT's greeting, which native code writes to the terminal."""
     kept = os.dup(2)
     with open(os.devnull, "w") as nothing:
         os.dup2(nothing.fileno(), 2)

@@ -1,8 +1,8 @@
-"""Colours of the clothes below a head: by them people are told apart whose faces are not compared.
+"""Colours of the clothes below a head, which distinguish people without comparing faces.
 
-What counts is a box of the chest, whose place and size follow from those of the head. Its colours
-are two histograms, of lightness and of a* and b* (CIELAB), in each of which a pixel counts in the
-bins about it by how near it is to them, so that a little more light or noise changes little.
+They are measured in a box on the chest, whose position and size follow from those of the head. They
+are two histograms, of lightness and of a* and b* (CIELAB). A pixel contributes to all bins near its
+value, weighted by distance, so that small changes of light or noise have a small effect.
 """
 
 from collections.abc import Sequence
@@ -18,39 +18,40 @@ from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, ImageA
 
 Floats = NDArray[np.float32]
 
-# Eyes of an adult are so far apart, and so far above the mouth; from the hips to the top of the
-# head; from the middle of the head to the tip of the nose.
+# Dimensions of an adult: distance of the eyes, eyes to mouth, hips to top of the head, and centre
+# of the head to the tip of the nose.
 _EYES_M, _EYES_TO_MOUTH_M, _TRUNK_M, _NOSE_BELOW_M = 0.062, 0.071, 0.83, 0.05
-# The box: half its width, and from where to where below the tip of the nose it reaches.
+# The box: half its width, and its top and bottom below the tip of the nose.
 _HALF_WIDTH_M, _TOP_M, _BOTTOM_M = 0.11, 0.20, 0.50
-# A nearer person covers so much about the tip of the nose, to either side, upwards and downwards.
+# Area that a nearer person covers around the tip of the nose, to either side, upwards and
+# downwards.
 _HEAD_HALF_M, _HEAD_UP_M, _BODY_HALF_M = 0.1, 0.18, 0.22
-# Sizes in the image that differ less may be equal, and then neither is known to be nearer.
+# Ratio of sizes below which neither of two people is known to be nearer.
 _NEARER = 1.1
-# Of one head by its face and by its body, or in two frames, they differ by no larger factor.
+# Largest ratio of sizes of one head from its face and its body, or in two frames.
 _AS_LARGE = 1.4
-# Pixels of a box that count, to a side; seldom more than this part of it may be out of sight.
+# Sampled pixels per side of a box, and smallest visible share of it.
 _SIDE = 12
 _LEAST_SHARE = 0.12
 _LEAST_PX = 3.0
-# A face that is missed in a frame is there still, for so long.
+# Time for which a missed face counts as present.
 _MISSED_S = 0.15
 
 
 def _shares(middles: NDArray[np.float64], sd: float) -> Floats:
-    """Return (256, bins): how much of each value counts in each bin, 1 together."""
+    """Return (256, bins): share of each value in each bin, with a sum of 1."""
     near = np.exp(-0.5 * ((np.arange(256.0)[:, None] - middles) / sd) ** 2)
     return np.asarray(near / near.sum(axis=1, keepdims=True), np.float32)
 
 
-# Bins of lightness, wide as people walk from light to shade, and of a* and b*, whose values for
-# clothes lie about that of grey.
+# Bins of lightness, wide because people walk from light to shade, and of a* and b*, whose values
+# for clothes are near that of grey.
 _OF_LIGHT = _shares(np.linspace(0.0, 255.0, 8), 36.0)
 _OF_CHROMA = _shares(128.0 + np.array([-30.0, -10.0, 10.0, 30.0]), 10.0)
 
 
 class _Head(NamedTuple):
-    """The tip of a nose in an image, and how many pixels a metre has there."""
+    """The tip of a nose in an image, and the scale there in pixels per metre."""
 
     x: float
     y: float
@@ -58,7 +59,7 @@ class _Head(NamedTuple):
 
 
 class ClothingReader:
-    """Reads the colours of clothes from one frame after another."""
+    """Reader of the colours of clothes in consecutive frames."""
 
     def __init__(self) -> None:
         self._before: list[tuple[float, _Head]] = []
@@ -70,13 +71,13 @@ class ClothingReader:
         faces: tuple[DetectedFace, ...],
         people: tuple[DetectedPerson, ...] = (),
     ) -> tuple[tuple[DetectedFace, ...], tuple[DetectedPerson, ...]]:
-        """Return faces and people with the colours of their clothes, where they are seen.
+        """Return faces and people with the colours of their clothes, if visible.
 
         Args:
-            image: BGR, in which they were found.
-            captured_s: when it was taken.
-            faces: as detected.
-            people: the same.
+            image: BGR image in which they were found.
+            captured_s: Time of its capture, seconds.
+            faces: Detected faces.
+            people: Detected people.
         """
         of_faces = [_of_face(one) for one in faces]
         now = [(captured_s, head) for head in of_faces if head is not None]
@@ -104,12 +105,12 @@ class ClothingReader:
 def clothes(
     image: ImageArray, heads: Sequence[_Head | None], covering: Sequence[_Head]
 ) -> list[Clothing | None]:
-    """Return the colours below each head, None where too little is seen of what is there.
+    """Return the colours below each head, None if too little is visible.
 
     Args:
-        image: BGR.
-        heads: whose clothes are looked at.
-        covering: heads of people, the same and others, who cover those farther away.
+        image: BGR image.
+        heads: Heads whose clothes are measured.
+        covering: Heads of all people, who cover those farther away.
     """
     height, width = image.shape[:2]
     patches, kept, shares = [], [], []
@@ -153,7 +154,7 @@ def clothes(
 
 
 def _is_same(one: _Head, other: _Head) -> bool:
-    """Return whether two heads are of one person."""
+    """Return whether two heads belong to one person."""
     as_large = 1.0 / _AS_LARGE < one.px_m / other.px_m < _AS_LARGE
     return as_large and hypot(one.x - other.x, one.y - other.y) < _HEAD_HALF_M * other.px_m
 
@@ -161,21 +162,21 @@ def _is_same(one: _Head, other: _Head) -> bool:
 def _covered(
     by: _Head, xs: NDArray[np.floating[Any]], ys: NDArray[np.floating[Any]]
 ) -> NDArray[np.bool_]:
-    """Return what of a grid of pixels a nearer person covers."""
+    """Return a mask of the grid of pixels that a nearer person covers."""
     aside, below = np.abs(xs - by.x) / by.px_m, (ys - by.y) / by.px_m
     head = (below > -_HEAD_UP_M)[:, None] & (aside < _HEAD_HALF_M)
     return np.asarray(head | ((below > _HEAD_HALF_M)[:, None] & (aside < _BODY_HALF_M)))
 
 
 def _colours(lab: NDArray[np.uint8]) -> tuple[float, ...]:
-    """Return the roots of the shares of the bins, whose squares add up to one, of pixels (n, 3)."""
+    """Return the square roots of the bins' shares of pixels (n, 3), whose squares add up to 1."""
     light, a, b = _OF_LIGHT[lab[:, 0]].sum(axis=0), _OF_CHROMA[lab[:, 1]], _OF_CHROMA[lab[:, 2]]
     both = np.concatenate([light, (a.T @ b).ravel()]) / np.float32(2 * len(lab))
     return tuple(np.sqrt(both, dtype=np.float64).round(4).tolist())
 
 
 def _of_face(face: DetectedFace) -> _Head | None:
-    """Return where and how large a face is; a face turned away shows one of its lengths shorter."""
+    """Return the position and scale of a face; turning away shortens one of its lengths."""
     points: list[list[float]] = face.landmarks_px.tolist()
     if len(points) != 5:
         return None
@@ -186,6 +187,6 @@ def _of_face(face: DetectedFace) -> _Head | None:
 
 
 def _of_person(person: DetectedPerson) -> _Head | None:
-    """Return where and how large the head of a person is."""
+    """Return the position and scale of a person's head."""
     (x, y), px_m = person.head_px, person.trunk_px / _TRUNK_M
     return _Head(x, y + _NOSE_BELOW_M * px_m, px_m) if px_m > 0.0 else None

@@ -1,9 +1,9 @@
-"""Cuts: a frame that shows another scene than the one before it.
+"""Detection of cuts: a frame that shows another scene than the previous one.
 
-Films have them, and so has a camera that is plugged in elsewhere. People who are seen after a cut
-are not those of before it, wherever in the image they are. Judged is what a very small grey image
-looks like beside the one before: as a whole, and its middle wherever it may have moved to, because
-a camera that pans shows the same scene. Brighter or darker light changes neither.
+Cuts occur in films, and if a camera is plugged in elsewhere. People after a cut are not those
+before it, even at the same position. A very small grey image is compared with the previous one: as
+a whole, and its centre at any displacement, because a camera that pans shows the same scene.
+Brighter or darker light changes neither.
 """
 
 from typing import Any
@@ -14,32 +14,32 @@ from numpy.typing import NDArray
 
 WIDTH, HEIGHT = 48, 32
 """Size of the small image."""
-# Pixels of the frame of which the small ones are means; more of them tell nothing more.
+# Width in pixels to which the frame is sampled before averaging; more adds no information.
 _SAMPLED_PX = 192
-# Correlations below which two images show two scenes. From one frame of a film to the next they are
-# above .9 as a whole, of pans above .9 in the middle; across cuts below .3 and .72.
+# Correlations below which two images show two scenes. Between consecutive frames of a film they are
+# above .9 as a whole, in pans above .9 in the middle; across cuts below .3 and .72.
 _WHOLE, _MIDDLE = 0.4, 0.8
-# What has less contrast, grey levels, shows nothing: dark, covered, blinded.
+# Contrast in grey levels below which an image shows nothing: dark, covered, blinded.
 _LEAST_CONTRAST = 6.0
 _MARGIN = 4  # the middle is all but a fourth of the image on each side
 
 
 class CutDetector:
-    """Counts the scenes of a camera's images."""
+    """Counter of the scenes in a camera's images."""
 
     def __init__(self) -> None:
         self._before: NDArray[np.float32] | None = None
         self._scene = 0
 
     def scene(self, image: NDArray[Any]) -> int:
-        """Return the number of the scene that an image shows, from 0; it rises with each cut.
+        """Return the number of an image's scene, from 0; it increases with each cut.
 
         Args:
-            image: (h, w) or (h, w, channels) uint8, of any size.
+            image: Image (h, w) or (h, w, channels), uint8, of any size.
         """
         now = _small(image)
         if now.std() < _LEAST_CONTRAST:
-            return self._scene  # what follows is compared with the last that showed something
+            return self._scene  # later images are compared with the last one that showed something
         before, self._before = self._before, now
         if before is not None and _is_cut(before, now):
             self._scene += 1
@@ -66,5 +66,5 @@ def _is_cut(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
 
 
 def _correlation(image: NDArray[np.float32], part: NDArray[np.float32]) -> float:
-    """Return the highest correlation of a part with any place of an image."""
+    """Return the highest correlation of a part with any position in an image."""
     return float(cv2.matchTemplate(image, part, cv2.TM_CCOEFF_NORMED).max())

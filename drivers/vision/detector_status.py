@@ -1,4 +1,4 @@
-"""What finds faces, people and palms with the files and packages here, and what would find more."""
+"""Status of the detectors of faces, people and palms, and what would improve them."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,22 +17,22 @@ from gazerig.drivers.vision.model_files import (
 
 
 class DetectorStatus(NamedTuple):
-    """What runs, and what it lacks.
+    """Active detectors and remedy for missing ones.
 
-    text: what finds faces, people and palms
-    cure: what brings the rest, "" if nothing is missing
+    text: active detectors of faces, people and palms
+    cure: commands that install the others, "" if nothing is missing
     """
 
     text: str
     cure: str
 
     def __str__(self) -> str:
-        """Write it on one line."""
+        """Return the status on one line."""
         return f"{self.text}: {self.cure}" if self.cure else self.text
 
 
 def detector_status(params: FaceDetectorParams) -> DetectorStatus:
-    """Return which detectors run with these parameters, and what they lack."""
+    """Return the detectors that run with these parameters, and what is missing."""
     lacks: list[str] = []
     kind = params.kind
     if kind == "auto":
@@ -62,5 +62,5 @@ def detector_status(params: FaceDetectorParams) -> DetectorStatus:
 
 
 def _missing(file: ModelFile) -> list[str]:
-    """Return what brings a file, nothing if it is there."""
+    """Return the command that fetches a file, or an empty list if it exists."""
     return [] if file.state() == "there" else [file.cure]

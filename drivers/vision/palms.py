@@ -1,7 +1,7 @@
-"""Palms of the nearest person, also of hands that are held still.
+"""Detection of palms of the nearest person, including still hands.
 
-The network is the palm detector of MediaPipe's hands, run by LiteRT. It sees hands well in a square
-of 192 pixels that is as wide as a person's reach.
+The network is the palm detector of MediaPipe's hands, run by LiteRT. It detects hands well in a
+square of 192 pixels that is as wide as a person's reach.
 
 Source: Zhang et al., "MediaPipe Hands: on-device real-time hand tracking" (2020). Input and output:
 opencv_zoo, models/palm_detection_mediapipe.
@@ -19,28 +19,28 @@ from gazerig.drivers.vision.face.preprocess import as_bgr
 from gazerig.drivers.vision.people import Network, anchors, confidences
 
 _SIDE_PX = 192
-# Cells of the anchors: pixels of a cell, and anchors in each.
+# Cells of the anchors: size in pixels, and anchors per cell.
 _CELLS = ((8, 2), (16, 6))
-# Of three films of people before a webcam, 228 pictures, this square shows most palms: one in .92,
+# In three films of people in front of a webcam, 228 pictures, this square shows most palms: in .92,
 # .90 and .86 of the pictures; a square of 1 m in .84, .90 and .62.
 _REACH_M, _BELOW_M = 1.3, 0.26
 # Height of a face's box, and length of a person from the hips to the top of the head.
 _FACE_M, _TRUNK_M = 0.163, 0.83
-# A person who was seen last so long ago is still there: a hand before the face hides it.
+# Time for which an unseen person counts as present, as a hand may hide the face.
 _THERE_S = 1.0
 _CONFIDENCE = 0.5
-# Wrist to middle finger over index to little finger of a palm.
+# Ratio of a palm's length (wrist to middle finger) to its width (index to little finger).
 _LENGTH_OF_WIDTH = 1.4
-# Palms nearer to each other than this part of their size are one.
+# Palms nearer to each other than this share of their size are one.
 _SAME = 0.6
 
 
 class PalmDetector:
-    """Finds palms of the nearest person.
+    """Detector of palms of the nearest person.
 
     Args:
-        params: how often.
-        network: runs the network.
+        params: Rate of searches.
+        network: Runs the network.
     """
 
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
@@ -59,10 +59,10 @@ class PalmDetector:
         """Return the palms within the nearest person's reach, None while no search is due.
 
         Args:
-            image: the frame.
-            captured_s: when it was taken; searches are counted by it.
-            faces: found in it.
-            people: likewise.
+            image: The frame.
+            captured_s: Time of its capture, seconds, which schedules searches.
+            faces: Faces found in it.
+            people: People found in it.
         """
         seen = [(person.trunk_px / _TRUNK_M, *person.head_px) for person in people]
         for face in faces:

@@ -1,8 +1,8 @@
-"""People whose face need not be visible: turned away, in profile, hands before the face.
+"""Detection of people whose face need not be visible: turned away, in profile, or covered.
 
-The network is the person detector of MediaPipe's BlazePose, run by LiteRT. It sees one person
-well in a square of 224 pixels, so a search looks at overlapping squares as high as the frame, one
-in each frame, and of each counts what is in the strip that no other square shows better.
+The network is the person detector of MediaPipe's BlazePose, run by LiteRT. It detects one person
+well in a square of 224 pixels. So a search covers overlapping squares as high as the frame, one in
+each frame, and of each square uses the strip that no other square shows better.
 
 Source: Bazarevsky et al., "BlazePose: on-device real-time body pose tracking" (2020). Input and
 output: opencv_zoo, models/person_detection_mediapipe.
@@ -26,32 +26,33 @@ from gazerig.drivers.vision.face.preprocess import as_bgr
 Floats = NDArray[np.float32]
 
 _SIDE_PX = 224
-# Cells of the anchors: pixels of a cell, and anchors in each.
+# Cells of the anchors: size in pixels, and anchors per cell.
 _CELLS = ((8, 2), (16, 2), (32, 6))
-# Neighbouring squares lie this part of their side apart.
+# Distance of neighbouring squares as a share of their side.
 _STEP = 0.5
-# People within this part of the side of the border of two squares count in both, one frame apart.
+# People within this share of the side from the border of two squares count in both, one frame
+# apart.
 _BOTH = 0.05
-# Heads nearer to each other than this part of the trunk are one person's.
+# Heads nearer to each other than this share of the trunk belong to one person.
 _SAME = 0.35
-# A body reaches this part of the trunk, from head to hips, to either side.
+# Half the width of a body as a share of the trunk, from head to hips.
 _HALF_WIDTH = 0.35
 
 
 class Network(Protocol):
-    """Runs a network."""
+    """A network that can be run."""
 
     def __call__(self, square: Floats) -> tuple[Floats, Floats]:
-        """Return boxes with points and scores of an RGB square, a row an anchor.
+        """Return boxes with points and scores of an RGB square, one row per anchor.
 
-        For people (2254, 12) and (2254,) of values of -1..1, for palms (2016, 18) and (2016,) of
-        0..1.
+        Shapes are (2254, 12) and (2254,) for people, from values of -1..1, and (2016, 18) and
+        (2016,) for palms, from values of 0..1.
         """
         ...
 
 
 class _Square(NamedTuple):
-    """A square of a frame, and from where to where across it its people count, in pixels."""
+    """A square of a frame, and the range across it in which its people count, in pixels."""
 
     left: float
     side: float
@@ -60,11 +61,11 @@ class _Square(NamedTuple):
 
 
 class PeopleDetector:
-    """Finds people in frames, a part of each frame at a time.
+    """Detector of people, which searches a part of each frame.
 
     Args:
-        params: how often, and how sure.
-        network: runs the network.
+        params: Rate of searches and smallest confidence.
+        network: Runs the network.
     """
 
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
@@ -74,11 +75,11 @@ class PeopleDetector:
         self._due_s = self._started_s = -np.inf
 
     def find(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
-        """Return the people in the part of a frame whose turn it is; none while no search is due.
+        """Return the people in the next part of a frame; none while no search is due.
 
         Args:
-            image: the frame.
-            captured_s: when it was taken; searches are counted by it.
+            image: The frame.
+            captured_s: Time of its capture, seconds, which schedules searches.
         """
         if captured_s < self._due_s or image.size == 0:
             return ()
@@ -94,7 +95,7 @@ class PeopleDetector:
         return self._in_square(frame, square)
 
     def _in_square(self, frame: ImageArray, square: _Square) -> tuple[DetectedPerson, ...]:
-        """Return the people in a square, the surest first."""
+        """Return the people in a square, the most confident first."""
         box = np.array([square.left, 0.0, square.left + square.side, square.side])
         part, where = cut_square(frame, box, _SIDE_PX)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
@@ -130,7 +131,7 @@ def _squares(width: int, height: int) -> list[_Square]:
 
 
 def confidences(scores: Floats) -> NDArray[np.float64]:
-    """Return scores of a network as confidences of 0..1."""
+    """Return scores of a network as confidences, 0..1."""
     sure: NDArray[np.float64] = 1.0 / (
         1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64))
     )
@@ -138,9 +139,9 @@ def confidences(scores: Floats) -> NDArray[np.float64]:
 
 
 def anchors(side_px: int, cells: tuple[tuple[int, int], ...]) -> NDArray[np.float64]:
-    """Return the places (n, 2) from which boxes and points count, in sides of the square.
+    """Return the anchors (n, 2) of boxes and points, as shares of the square's side.
 
-    cells: pixels of a cell, and anchors in each
+    cells: size of a cell in pixels, and anchors per cell
     """
     levels = []
     for cell, count in cells:
@@ -151,12 +152,12 @@ def anchors(side_px: int, cells: tuple[tuple[int, int], ...]) -> NDArray[np.floa
 
 
 def _person(points: NDArray[np.float64], confidence: float) -> DetectedPerson | None:
-    """Return a person, None where the points are none of an upright body.
+    """Return a person, None if the points are not those of an upright body.
 
     Args:
-        points: (3, 2) the face's centre, the middle of the hips, and the top of the circle about
-            them that holds the body, in pixels.
-        confidence: 0..1.
+        points: Points (3, 2): centre of the face, centre of the hips, and top of the circle around
+            them that contains the body, pixels.
+        confidence: Confidence, 0..1.
     """
     (face_x, face_y), (hips_x, hips_y), (top_x, top_y) = points.tolist()
     trunk = hypot(top_x - hips_x, top_y - hips_y)
@@ -169,6 +170,6 @@ def _person(points: NDArray[np.float64], confidence: float) -> DetectedPerson | 
 
 
 def _is_same(one: DetectedPerson, other: DetectedPerson) -> bool:
-    """Return whether two detections are of one person."""
+    """Return whether two detections belong to one person."""
     apart = hypot(one.head_px[0] - other.head_px[0], one.head_px[1] - other.head_px[1])
     return apart < _SAME * max(one.trunk_px, other.trunk_px)

@@ -1,10 +1,10 @@
-"""Faces found in some frames and placed in all of them.
+"""Face detection that searches some frames and places known faces in all of them.
 
-In every frame the last network of MTCNN judges each known face where it was before and places its
-landmarks; a face that is not there any more is searched around its place. New faces come from two
-searches: of the whole frame, every few frames, by YuNet where its file is there, else by MTCNN;
-and, in the frames between, of one tile of the frame after another, in which far faces are found.
-So all frames cost about the same.
+In every frame the last network of MTCNN scores each known face at its previous position and places
+its landmarks; a face that is no longer there is searched nearby. New faces come from two searches:
+of the whole frame, every few frames, with YuNet if its file is present, otherwise with MTCNN; and,
+in the frames between, of one tile of the frame after another, for far faces. So all frames take
+about the same time.
 """
 
 from typing import NamedTuple
@@ -31,32 +31,33 @@ from gazerig.drivers.vision.face.search_plan import Tile, far_tiles
 from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row
 from gazerig.drivers.vision.model_files import yunet_file
 
-# Confidence that passes MTCNN's first network in a tile. At 0.8 twice as many pass, and no face
-# is found more.
+# Confidence threshold of MTCNN's first network in a tile. At 0.8 twice as many pass, without
+# finding more faces.
 _PROPOSE_AT = 0.9
-# A far face must be surer than a near one: a few pixels look like a face now and then.
+# A far face needs a higher confidence than a near one, as a few pixels can resemble a face.
 _FAR_CONFIDENCE = 0.9
-# Part of the smaller of two boxes above which they are the same face.
+# Common share of the smaller of two boxes above which they are the same face.
 _SAME = 0.5
-# A lost face is searched in a square so many times its own, in which it is as large as the first
-# network sees it best.
+# Square in which a lost face is searched: factor on its own square, and size in pixels at which the
+# first network works best.
 _AROUND, _AROUND_PX = 2.6, 40
-# YuNet judges a face that only it sees in a square so many times its own.
+# Square in which YuNet scores a face that only it finds: factor on its own square, and size in
+# pixels.
 _YUNET_AROUND, _YUNET_PX = 2.0, 96
-# Half the side of the square that the last network wants, in root mean square distances of the five
-# landmarks from their middle, and how far above that middle it lies.
+# Half the side of the last network's square, in root mean square distances of the five landmarks
+# from their centre, and its offset above that centre.
 _SQUARE, _ABOVE = 2.1, 0.13
-# With YuNet, MTCNN searches too in every so many searches: it sees tilted and drawn faces better.
+# With YuNet, MTCNN also runs in every n-th search, as it finds tilted and drawn faces better.
 _BOTH_EVERY = 4
-# What so many rows and columns of a frame show has changed by more grey levels: another shot.
+# Mean change in grey levels above which a frame is another shot; rows and columns sampled.
 _CUT_GREY, _SAMPLES = 30.0, 24
 
 
 class _Known(NamedTuple):
-    """A face of the frame before.
+    """A face of the previous frame.
 
-    box: (4,) square in which it is looked for next, in pixel edges
-    by_yunet: whether YuNet alone sees it
+    box: (4,) square in which it is searched next, in pixel edges
+    by_yunet: whether only YuNet finds it
     """
 
     box: Floats
@@ -65,10 +66,10 @@ class _Known(NamedTuple):
 
 
 class AutoDetector:
-    """Finds faces with five landmarks; remembers those of the frame before."""
+    """Detector of faces with five landmarks, which stores those of the previous frame."""
 
     def __init__(self, params: FaceDetectorParams) -> None:
-        """Load the networks; a YuNet file that is none is reported, and MTCNN searches.
+        """Load the networks; an invalid YuNet file is reported, and MTCNN searches instead.
 
         Raises:
             ModelFileError: MTCNN's package or one of its files is missing or altered.
@@ -83,7 +84,7 @@ class AutoDetector:
         self._since_search, self._searches, self._next_tile = 0, 0, 0
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
+        """Return faces, the largest first, in pixels of the image."""
         frame = as_bgr(image)
         if frame.size == 0:
             return ()
@@ -105,11 +106,11 @@ class AutoDetector:
         return largest_first([one.face for one in known])
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return self._log.drain()
 
     def _optional_yunet(self) -> YunetNetwork | None:
-        """Return YuNet where the user has its file."""
+        """Return YuNet if the user has its file."""
         file = self._params.model_file or yunet_file()
         if not file:
             return None
@@ -120,7 +121,7 @@ class AutoDetector:
             return None
 
     def _search_due(self, soon: bool, nothing_known: bool) -> bool:
-        """Whether the whole frame is searched now rather than a tile."""
+        """Return whether the whole frame is searched now instead of a tile."""
         self._since_search += 1
         every = self._params.search_every
         if nothing_known or soon:
@@ -128,7 +129,7 @@ class AutoDetector:
         return self._since_search >= every
 
     def _is_cut(self, frame: ImageArray) -> bool:
-        """Whether a frame shows something else than the one before."""
+        """Return whether a frame shows another shot than the previous one."""
         height, width = frame.shape[:2]
         rows, columns = max(1, height // _SAMPLES), max(1, width // _SAMPLES)
         samples = frame[::rows, ::columns, 1].astype(np.float64)
@@ -136,7 +137,7 @@ class AutoDetector:
         return before.shape == samples.shape and float(np.abs(samples - before).mean()) > _CUT_GREY
 
     def _placed_again(self, frame: ImageArray) -> list[_Known]:
-        """Return the known faces that are still there, placed in this frame."""
+        """Return the known faces that are still present, placed in this frame."""
         if not self._known:
             return []
         boxes = np.array([one.box for one in self._known])
@@ -150,7 +151,7 @@ class AutoDetector:
         return _distinct([one for one in judged if one is not None], [])
 
     def _judged(self, frame: ImageArray, boxes: Floats, least: float) -> list[_Known | None]:
-        """Return the face in each square box, None where the last network sees none."""
+        """Return the face in each square box, None if the last network finds none."""
         placed = self._networks.place(frame, boxes)
         again = squared(placed.tight)
         return [
@@ -159,7 +160,7 @@ class AutoDetector:
         ]
 
     def _around(self, frame: ImageArray, one: _Known) -> _Known | None:
-        """Search a face that has gone from its place around it."""
+        """Search for a lost face around its previous position."""
         part, where = cut_square(frame, _widened(one.box, _AROUND), _AROUND_PX)
         boxes, _ = self._networks.propose(part, _PROPOSE_AT)
         boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
@@ -168,7 +169,7 @@ class AutoDetector:
         return max(found, key=lambda face: face.face.confidence, default=None)
 
     def _by_yunet(self, frame: ImageArray, one: _Known) -> _Known | None:
-        """Place a face that YuNet alone sees."""
+        """Place a face that only YuNet finds."""
         if self._yunet is None:
             return None
         part, where = cut_square(frame, _widened(one.box, _YUNET_AROUND), _YUNET_PX)
@@ -182,7 +183,7 @@ class AutoDetector:
         return _Known(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
 
     def _near(self, frame: ImageArray, known: list[_Known], first: bool) -> list[_Known]:
-        """Search the whole frame: return the faces that are new."""
+        """Search the whole frame; return the new faces."""
         prepared = prepare(frame, self._params.work_width_px)
         assert prepared is not None
         self._searches += 1
@@ -199,7 +200,7 @@ class AutoDetector:
     def _near_by_yunet(
         self, yunet: YunetNetwork, prepared: Prepared, known: list[_Known]
     ) -> list[_Known]:
-        """Search the whole frame by YuNet; the last network of MTCNN places what it sees too."""
+        """Search the whole frame with YuNet; MTCNN's last network places faces it also finds."""
         least = self._params.min_confidence
         rows = yunet.search(prepared.small, least)
         rows[:, :14] *= np.tile(prepared.stretch, 7)
@@ -219,7 +220,7 @@ class AutoDetector:
         return far_tiles(width, height, self._params.far_width_px, near)
 
     def _tile(self, frame: ImageArray) -> Tile | None:
-        """Return the tile whose turn it is."""
+        """Return the next tile."""
         tiles = self._tiles(frame)
         if not tiles:
             return None
@@ -227,7 +228,7 @@ class AutoDetector:
         return tiles[self._next_tile]
 
     def _far(self, frame: ImageArray, known: list[_Known], tile: Tile | None) -> list[_Known]:
-        """Search a tile for small faces: return those that are new."""
+        """Search a tile for small faces; return the new ones."""
         if tile is None:
             return []
         part = frame[tile.top : tile.bottom, tile.left : tile.right]
@@ -245,28 +246,28 @@ class AutoDetector:
     def _accepted(
         self, frame: ImageArray, known: list[_Known], boxes: Floats, least: float
     ) -> list[_Known]:
-        """Return the faces in square boxes that the last network is sure of and that are new."""
+        """Return the new faces in square boxes that the last network confirms."""
         found = [one for one in self._judged(frame, boxes, least) if one is not None]
         return _distinct(found, known)
 
 
 def _moving(now: _Known, before: _Known) -> _Known:
-    """Return a face that is looked for where it will be if it moves on as from frame to frame.
+    """Return a face with its search box predicted by its motion between frames.
 
-    A face beside the middle of its box is placed too near to that middle.
+    The network places a face that is off the centre of its box too near to that centre.
     """
     moved = (now.face.landmarks_px - before.face.landmarks_px).mean(axis=0)
     return now._replace(box=now.box + np.tile(moved, 2))
 
 
 def _widened(box: Floats, times: float) -> Floats:
-    """Return a square about the same middle, so many times as wide."""
+    """Return a square with the same centre, wider by a factor."""
     middle, half = (box[:2] + box[2:]) / 2.0, times * (box[2] - box[0]) / 2.0
     return np.concatenate([middle - half, middle + half])
 
 
 def _square_of(points: Floats) -> Floats:
-    """Return the square in which the last network sees a face with these landmarks best."""
+    """Return the square in which the last network best detects a face with these landmarks."""
     middle = points.mean(axis=0)
     spread = float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
     middle = middle - (0.0, _ABOVE * spread)
@@ -274,13 +275,13 @@ def _square_of(points: Floats) -> Floats:
 
 
 def _is_new(boxes: Floats, known: list[_Known]) -> NDArray[np.bool_]:
-    """Return which boxes are not those of known faces."""
+    """Return a mask of the boxes that are not those of known faces."""
     others = np.array([one.box for one in known]).reshape(-1, 4)
     return np.asarray(~(shares(boxes, others) > _SAME).any(axis=1))
 
 
 def _distinct(found: list[_Known], known: list[_Known]) -> list[_Known]:
-    """Return which of the found faces are neither known nor another one that is surer."""
+    """Return the found faces that are not known and not duplicates of a more confident one."""
     kept: list[_Known] = []
     for one in sorted(found, key=lambda face: (face.by_yunet, -face.face.confidence)):
         if _is_new(one.box[np.newaxis], [*known, *kept])[0]:

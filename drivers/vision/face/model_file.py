@@ -1,4 +1,4 @@
-"""Network files that a package carries: read only if they are the ones known."""
+"""Network files of a package, verified by their hash."""
 
 import hashlib
 from pathlib import Path
@@ -13,10 +13,10 @@ def read_known(file: Path, sha256: str, package: str, cure: str) -> NDArray[np.u
     """Return the content of a file whose hash is known, as OpenCV reads it.
 
     Args:
-        file: the file.
-        sha256: its hash, in hexadecimal digits.
-        package: name and version of what carries it.
-        cure: the command that installs it.
+        file: Path of the file.
+        sha256: Its hash, in hexadecimal digits.
+        package: Name and version of its package.
+        cure: Command that installs it.
 
     Raises:
         ModelFileError: the file is missing or altered.

@@ -1,4 +1,4 @@
-"""Faces by MTCNN alone: every frame is searched whole, at every scale."""
+"""Face detection with MTCNN alone: every frame is searched completely, at every scale."""
 
 from collections.abc import Iterator
 
@@ -21,17 +21,17 @@ from gazerig.drivers.vision.face.preprocess import Prepared, largest_first, prep
 
 # Ratio of neighbouring scales of the pyramid: areas halve.
 _SHRINK = 0.709
-# Confidence that passes the first stage. A gate of 0.6 lets twice as many through, at twice
-# the time, and finds no face more.
+# Confidence threshold of the first stage. At 0.6 twice as many candidates pass, in twice the time,
+# without finding more faces.
 _PROPOSE_AT = 0.8
-# Part of the smaller of two boxes above which they are the same face.
+# Common share of the smaller of two boxes above which they are the same face.
 _NESTED = 0.7
-# Most candidates carried to the second stage: bounds the time a busy image can take.
+# Most candidates of the second stage, which limits the time for a complex image.
 _MOST = 96
 
 
 class MtcnnDetector:
-    """Finds faces with five landmarks."""
+    """Detector of faces with five landmarks."""
 
     def __init__(self, params: FaceDetectorParams) -> None:
         """Load the networks.
@@ -43,7 +43,7 @@ class MtcnnDetector:
         self._networks = MtcnnNetworks()
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
+        """Return faces, the largest first, in pixels of the image."""
         prepared = prepare(image, self._params.work_width_px)
         if prepared is None:
             return ()
@@ -57,7 +57,7 @@ class MtcnnDetector:
 
 
 def proposed(networks: MtcnnNetworks, prepared: Prepared, min_face_px: int) -> Floats:
-    """Search a whole image at every scale: (n, 4) square boxes in full size, the surest first."""
+    """Search an image at every scale; return (n, 4) square boxes, most confident first."""
     boxes, scores = [np.zeros((0, 4))], [np.zeros(0)]
     for scaled in _pyramid(prepared.small, WINDOW_PX / min_face_px):
         found, sure = networks.propose(scaled, _PROPOSE_AT)
@@ -69,7 +69,7 @@ def proposed(networks: MtcnnNetworks, prepared: Prepared, min_face_px: int) -> F
 
 
 def _pyramid(small: ImageArray, scale: float) -> Iterator[ImageArray]:
-    """Shrink a image until it is one window wide: at each scale, faces of another size fit."""
+    """Yield an image at decreasing scales until it is one window wide, for faces of all sizes."""
     scaled, fine = small, cv2.INTER_AREA
     while min(size := (round(small.shape[1] * scale), round(small.shape[0] * scale))) >= WINDOW_PX:
         scaled = np.asarray(cv2.resize(scaled, size, interpolation=fine), dtype=np.uint8)
@@ -78,7 +78,7 @@ def _pyramid(small: ImageArray, scale: float) -> Iterator[ImageArray]:
 
 
 def outermost(boxes: Floats, scores: Floats) -> Rows:
-    """Return the rows that stay when a box mostly inside a surer one, or around it, goes."""
+    """Return the rows that remain without boxes mostly inside or around a more confident one."""
     common = shares(boxes, boxes)
     kept: list[int] = []
     for i in np.argsort(-scores, kind="stable").tolist():
@@ -88,9 +88,9 @@ def outermost(boxes: Floats, scores: Floats) -> Rows:
 
 
 def face_of(placed: Placed, row: int) -> DetectedFace:
-    """Put a find into pixels of the image given, whose centres are whole numbers."""
-    # The network names points by the viewer's left and right, which are the owner's
-    # right and left: its order is the order of DetectedFace.
+    """Return a face in pixels of the image, whose centres are whole numbers."""
+    # The network names points by the viewer's left and right, which are the person's right and
+    # left, so its order is that of DetectedFace.
     landmarks = placed.points[row] - 0.5
     landmarks.setflags(write=False)
     left, top, right, bottom = placed.tight[row].tolist()

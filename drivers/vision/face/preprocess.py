@@ -1,4 +1,4 @@
-"""Images made ready for a face network, and its finds put back into the image given."""
+"""Preparation of images for a face network."""
 
 from typing import Any, NamedTuple
 
@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.types import DetectedFace, ImageArray
 
-# Grey levels of an image: this share lies beyond its range at each end; one of less contrast is
-# flat, and gets so much, by no more than the gain.
+# Grey levels of an image: share outside its range at each end; contrast below which it is flat,
+# wanted contrast, and largest gain.
 _OUTSIDE, _FLAT_GREY, _WANTED_GREY, _MOST_GAIN = 0.01, 110.0, 200.0, 8.0
-# From this gain on the noise of a sensor would be seen, and so it is smoothed.
+# Gain from which sensor noise would be visible, so that the image is smoothed.
 _NOISY_GAIN, _SMOOTHED_PX = 2.5, 0.8
 _SAMPLED = 4
 
 
 class Prepared(NamedTuple):
-    """A image in the two sizes a detector needs.
+    """An image in the two sizes that a detector needs.
 
-    full: (height, width, 3) BGR, the size given
+    full: (height, width, 3) BGR, in the original size
     small: the same, scaled down to the working width
     stretch: (2,) full size over small size, x and y
     """
@@ -30,10 +30,10 @@ class Prepared(NamedTuple):
 
 
 def prepare(image: ImageArray, work_width_px: int) -> Prepared | None:
-    """Bring a grey, BGR or BGRA image to BGR and scale it down; None where it has no pixels.
+    """Convert a grey, BGR or BGRA image to BGR and scale it down; return None if it has no pixels.
 
     Raises:
-        ValueError: the array is not a image of 8-bit numbers.
+        ValueError: the array is not an 8-bit image.
     """
     full = as_bgr(image)
     height, width = full.shape[:2]
@@ -48,16 +48,16 @@ def prepare(image: ImageArray, work_width_px: int) -> Prepared | None:
 
 
 def grey_range(samples: NDArray[Any]) -> tuple[float, float]:
-    """Return between which grey levels all but a hundredth of an image lie at each end."""
+    """Return the grey levels below and above which a hundredth of an image is."""
     ordered = np.sort(samples, axis=None)
     count = len(ordered)
     return float(ordered[int(_OUTSIDE * count)]), float(ordered[int((1.0 - _OUTSIDE) * count)])
 
 
 def with_contrast(image: ImageArray) -> ImageArray:
-    """Return a dark or pale image with the contrast that a network is used to, others as they are.
+    """Return a dark or pale image with the contrast that a network needs, others unchanged.
 
-    What is raised much has its noise raised too: it is smoothed a little.
+    A high gain also amplifies noise, so the image is then smoothed.
     """
     dark, bright = grey_range(image[::_SAMPLED, ::_SAMPLED, 1])
     if bright - dark >= _FLAT_GREY:
@@ -71,12 +71,12 @@ def with_contrast(image: ImageArray) -> ImageArray:
 
 
 def largest_first(faces: list[DetectedFace]) -> tuple[DetectedFace, ...]:
-    """Sort by box area; equal areas by place, so that the order never depends on chance."""
+    """Return faces sorted by box area, equal areas by position, so that the order is fixed."""
     return tuple(sorted(faces, key=lambda f: (-f.box_px[2] * f.box_px[3], f.box_px)))
 
 
 def as_bgr(image: ImageArray) -> ImageArray:
-    """Bring any of the usual pixel layouts to contiguous BGR.
+    """Convert any of the usual pixel layouts to contiguous BGR.
 
     Raises:
         ValueError: the array is not an image of 8-bit numbers.

@@ -1,4 +1,4 @@
-"""Which part of a frame is searched for small faces, at which scale: one tile after another."""
+"""Plan of the search for small faces: one tile of the frame after another, at several scales."""
 
 from functools import cache
 from math import ceil
@@ -6,20 +6,20 @@ from typing import NamedTuple
 
 from gazerig.drivers.vision.face.mtcnn_networks import WINDOW_PX
 
-# Ratio of neighbouring scales: a network that sees 12 pixels also finds faces of 20.
+# Ratio of neighbouring scales: a network for 12 pixels also finds faces of 20.
 _SHRINK = 0.6
-# A tile is about so many pixels wide and high in the scale at which it is searched, and shares
-# so many with its neighbour: a face of 20 pixels is whole in one of them.
+# Approximate size of a tile in pixels of its scale, and its overlap with the next one: a face of 20
+# pixels is complete in one of them.
 _TILE_PX, _SHARED_PX = 160, 24
-# No frame is enlarged more than this to find small faces: there is nothing more to be seen.
+# Largest enlargement of a frame to find small faces; more would show no more detail.
 _MOST_ENLARGED = 1.2
 
 
 class Tile(NamedTuple):
-    """A part of a frame and the size in which it is searched.
+    """A part of a frame and the size at which it is searched.
 
     left, top, right, bottom: in pixels of the frame
-    width_px, height_px: the size it is brought to
+    width_px, height_px: its size after scaling
     """
 
     left: int
@@ -34,16 +34,16 @@ class Tile(NamedTuple):
 def far_tiles(
     width_px: int, height_px: int, far_width_px: int, near_scale: float
 ) -> tuple[Tile, ...]:
-    """Return the tiles in which faces are searched that are too small for the whole frame's search.
+    """Return the tiles to search for faces that are too small for the search of the whole frame.
 
     Args:
-        width_px: the frame's width.
-        height_px: its height.
-        far_width_px: width of the frame in which faces of 12 pixels are found; 0 for none.
-        near_scale: scale at which the search of the whole frame begins.
+        width_px: Width of the frame.
+        height_px: Height of the frame.
+        far_width_px: Width of the frame at which faces of 12 pixels are found; 0 for none.
+        near_scale: Scale at which the search of the whole frame begins.
 
     Returns:
-        The largest faces first.
+        Tiles, those for the largest faces first.
     """
     tiles: list[Tile] = []
     scale = min(far_width_px / width_px, _MOST_ENLARGED)

@@ -1,7 +1,7 @@
-"""Eyes from frame to frame: the network that places irises and lids looks where they have changed.
+"""Tracking of eyes: the network for irises and lids runs only on eyes that have changed.
 
-It costs more than that of the whole face, and eyes rest most of the time. A crop of an eye that
-looks as it did when the network saw it last shows the same iris between the same lids.
+The network takes longer than that for the whole face, and eyes rest most of the time. If the crop
+of an eye is unchanged since the network last ran, the iris and lids are the same.
 """
 
 from collections.abc import Callable
@@ -17,28 +17,27 @@ Floats = NDArray[np.float64]
 EyePoints = tuple[Floats, Floats]
 """Five points of an iris and the contour of its lids, in pixels of the crop."""
 
-# The part of a crop that holds the eye, and over what noise is averaged in it.
+# Part of a crop that contains the eye, and size of the average against noise.
 _EYE, _AVERAGED_PX = np.s_[16:48, 12:52], (5, 5)
-# A change anywhere in it of more than this share of its contrast, and of so many grey levels, is
-# one of the eye: 5 deg of gaze at .4 to 1.2 m change it by .35, a blink by more than .9; noise of
-# the sensor and of the mesh by .1 to .25.
+# Smallest change of an eye, as a share of its contrast and in grey levels: 5 deg of gaze at .4 to
+# 1.2 m change it by .35, a blink by more than .9, noise of sensor and mesh by .1 to .25.
 _CHANGED, _LEAST_GREY = 0.3, 4.0
-# Even what does not seem to change is looked at again after so many frames.
+# Number of frames after which even an unchanged eye is analysed again.
 _LONGEST_FRAMES = 8
-# Looks that each frame allows, and how many can be saved: eyes that never rest, or a face that
-# turns, are looked at in every fourth frame, a blink in the frames in which it comes.
+# Network runs allowed per frame, and the most that can be saved: eyes that never rest, or a turning
+# face, are analysed in every fourth frame, a blink in its own frames.
 _LOOKS_A_FRAME, _MOST_LOOKS = 0.25, 2.0
 
 
 class _Look(NamedTuple):
-    """What the network saw: (2, ...) eyes, the middles of their crops, and what it made of them."""
+    """Last run of the network: (2, ...) eyes, centres of their crops, and resulting points."""
 
     eyes: NDArray[np.float32]
     points: tuple[EyePoints | None, ...]
 
 
 class WatchedEyes:
-    """Both eyes of one face, or of whoever has taken its place: looks decide, not identity."""
+    """Tracker of both eyes of one face, or of its successor: appearance decides, not identity."""
 
     def __init__(self) -> None:
         self._last: _Look | None = None
@@ -48,11 +47,11 @@ class WatchedEyes:
     def read(
         self, crops: list[ImageArray], look: Callable[[ImageArray, int], EyePoints | None]
     ) -> tuple[EyePoints | None, ...] | None:
-        """Return the points of both eyes, None where they have changed and are not looked at.
+        """Return the points of both eyes, None if they have changed and are not analysed.
 
         Args:
-            crops: (64, 64, 3) of the right and of the left eye.
-            look: runs the network on a crop; the right eye is 0.
+            crops: Crops (64, 64, 3) of the right and of the left eye.
+            look: Runs the network on a crop; the right eye is 0.
         """
         self._allowed = min(self._allowed + _LOOKS_A_FRAME, _MOST_LOOKS)
         self._frames += 1
@@ -72,6 +71,6 @@ class WatchedEyes:
 
 
 def _differs(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
-    """Return whether an eye looks otherwise than it did."""
+    """Return whether the appearance of an eye has changed."""
     change = cv2.blur(now - before, _AVERAGED_PX)
     return float(np.abs(change).max()) > max(_LEAST_GREY, _CHANGED * float(before.std()))

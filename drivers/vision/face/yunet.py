@@ -1,4 +1,4 @@
-"""Faces by YuNet alone: every frame is searched whole."""
+"""Face detection with YuNet alone: every frame is searched completely."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from gazerig.drivers.vision.model_files import yunet_file
 
 
 class YunetDetector:
-    """Finds faces with five landmarks."""
+    """Detector of faces with five landmarks."""
 
     def __init__(self, params: FaceDetectorParams, model_file: str) -> None:
         """Load the network and try it on an empty image.
@@ -22,7 +22,7 @@ class YunetDetector:
         self._network = YunetNetwork(model_file or yunet_file())
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
+        """Return faces, the largest first, in pixels of the image."""
         prepared = prepare(image, self._params.work_width_px)
         if prepared is None:
             return ()

@@ -1,4 +1,4 @@
-"""YuNet: a network file that the user has, run by OpenCV's own decoder."""
+"""YuNet: a network file of the user, run by OpenCV's own decoder."""
 
 from pathlib import Path
 
@@ -13,13 +13,13 @@ from gazerig.drivers.vision.face.preprocess import with_contrast
 from gazerig.drivers.vision.model_files import YUNET
 
 _CURE = f"{YUNET.cure}, or name a YuNet file of the OpenCV zoo as model_file"
-# Boxes that share more than this part of their union are the same face, and the most
-# boxes looked at: the values OpenCV's zoo runs the network with.
+# Intersection over union above which boxes are the same face, and most boxes: values of the OpenCV
+# zoo.
 _SAME, _MOST = 0.3, 5000
 _CONFIDENCE = 0.7
-# No frame is searched that is narrower: OpenCV reads beyond the memory of strips a few pixels wide.
+# Narrower frames are not searched: OpenCV reads beyond the memory of strips a few pixels wide.
 _LEAST_PX = 24
-# What other files begin with, and outputs that only YuNet has.
+# First bytes of other files, and outputs that only YuNet has.
 _KINDS = (
     (b"\x89PNG", "a PNG image"),
     (b"\xff\xd8\xff", "a JPEG image"),
@@ -31,7 +31,7 @@ _KINDS = (
 
 
 class YunetNetwork:
-    """Finds faces in an image of any size."""
+    """Network that finds faces in an image of any size."""
 
     def __init__(self, model_file: str) -> None:
         """Load the network and try it on an empty image.
@@ -42,9 +42,10 @@ class YunetNetwork:
         self._net = _load(model_file)
 
     def search(self, scaled: ImageArray, least: float) -> NDArray[np.float64]:
-        """Return a row a face at least so sure: OpenCV's fifteen numbers, in its pixel edges.
+        """Return one row per face with at least this confidence, in OpenCV's pixel edges.
 
-        Box, right eye, left eye, nose, right and left mouth corner, confidence.
+        The fifteen numbers are box, right eye, left eye, nose, right and left mouth corner,
+        confidence.
         """
         height, width = scaled.shape[:2]
         if min(height, width) < _LEAST_PX:
@@ -52,14 +53,14 @@ class YunetNetwork:
         self._net.setInputSize((width, height))
         self._net.setScoreThreshold(least)
         rows = self._net.detect(np.ascontiguousarray(with_contrast(scaled)))[1]
-        if rows is None:  # OpenCV's word for no face
+        if rows is None:  # OpenCV's value for no face
             return np.zeros((0, 15))
         found = np.asarray(rows, dtype=np.float64)
         return found[np.isfinite(found).all(axis=1)]
 
 
 def face_of_row(row: NDArray[np.float64]) -> DetectedFace:
-    """Return a face of OpenCV's fifteen numbers in pixels of an image.
+    """Return a face from OpenCV's fifteen numbers, in pixels of an image.
 
     The network counts from the outer edge of the first pixel, DetectedFace from its centre.
     """
@@ -70,7 +71,7 @@ def face_of_row(row: NDArray[np.float64]) -> DetectedFace:
 
 
 def _load(model_file: str) -> cv2.FaceDetectorYN:
-    """Make the network out of the file's bytes."""
+    """Create the network from the file's bytes."""
     if not model_file:
         raise ModelFileError(f"the yunet detector needs a model file: {_CURE}")
     try:
@@ -83,7 +84,7 @@ def _load(model_file: str) -> cv2.FaceDetectorYN:
         raise ModelFileError(f"{model_file} is damaged or another version: {_CURE}")
     weights, nothing = np.frombuffer(content, dtype=np.uint8), np.zeros(0, np.uint8)
     try:
-        # Any network loads; only YuNet's outputs can be decoded, so it is tried at once.
+        # Any network loads, but only YuNet's outputs can be decoded, so it is tried immediately.
         with quiet_opencv():
             net = cv2.FaceDetectorYN.create(
                 "onnx", weights, nothing, (64, 64), _CONFIDENCE, _SAME, _MOST
@@ -97,7 +98,7 @@ def _load(model_file: str) -> cv2.FaceDetectorYN:
 
 
 def _kind(content: bytes) -> str:
-    """Return what a file is that is not YuNet."""
+    """Return the kind of a file that is not YuNet."""
     if not content:
         return "empty"
     if content[4:8] == b"TFL3":

@@ -1,1 +1,1 @@
-"""Moving things by optical flow."""
+"""Detection of moving things by optical flow."""

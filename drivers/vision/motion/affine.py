@@ -1,8 +1,8 @@
-"""Slide, growth and spin of a patch of flow: an affine motion, fitted robustly.
+"""Slide, growth and spin of a patch of flow: a robust fit of an affine motion.
 
-A thing that turns fast moves its points along arcs between two images, not along the
-tangents; growth and spin are therefore taken from the whole map from now to before, as
-the logarithm of its scale and its angle, not from the divergence and curl of the flow.
+Between two images, points of a thing that turns fast move along arcs, not along tangents. So growth
+and spin are computed from the whole map from now to before, as the logarithm of its scale and its
+angle, not from the divergence and curl of the flow.
 """
 
 from math import atan2, log, sqrt
@@ -13,23 +13,23 @@ import numpy as np
 from gazerig.drivers.vision.motion.image import Floats, middle
 from gazerig.drivers.vision.motion.lucas_kanade import Back
 
-# Flow at neighbouring pixels is found from the same patches: so many square pixels count
-# as one measurement (8 px at half size).
+# Flow at neighbouring pixels comes from the same patches: this area counts as one measurement (8 px
+# at half size).
 _PATCH_PX2 = 64.0
 _TUKEY, _STEPS = 4.685, 4
 _LEAST_POINTS = 6
-# What flow is off by at best.
+# Smallest noise of flow.
 _NOISE_PX = 0.03
 
 
 class PatchMotion(NamedTuple):
-    """How a patch moves between two images.
+    """Motion of a patch between two images.
 
     slide_px: motion of its centre
-    growth: logarithm of its size now by its size before
-    spin_rad: clockwise in the image above 0
+    growth: logarithm of the ratio of its size now to its size before
+    spin_rad: rotation, positive clockwise in the image
     growth_sd, spin_sd: standard deviations
-    rest_px: what the affine motion leaves unexplained, along one axis
+    rest_px: residual of the affine motion, along one axis
     """
 
     slide_px: tuple[float, float]
@@ -41,11 +41,11 @@ class PatchMotion(NamedTuple):
 
 
 def flow_map(places: Floats, flow: Floats, centre: Floats, area_px: float) -> tuple[Back, float]:
-    """Fit the map from now to before of points that flow, and what it leaves unexplained.
+    """Fit the map from now to before to flow at points; return it and its residual.
 
-    places, flow: (n, 2) where they are now, and their motion from the older image
-    centre: (2,) whose motion is the map's shift
-    area_px: what the points stand for
+    places, flow: (n, 2) present positions, and their motion from the older image
+    centre: (2,) point whose motion is the map's shift
+    area_px: area that the points represent
     """
     arms = places - centre
     rows = np.column_stack((arms, np.ones(len(arms))))
@@ -59,13 +59,13 @@ def patch_motion(back: Back, rest_px: float) -> PatchMotion:
     """Return slide, growth and spin of a map from now to before."""
     (a, b), (c, d) = back.matrix.tolist()
     shrink = sqrt(max(abs(a * d - b * c), 1e-6))
-    sd = back.slope_sd / sqrt(2.0)  # growth and spin are half the sum of two numbers each
+    sd = back.slope_sd / sqrt(2.0)  # growth and spin are each half the sum of two numbers
     slide = float(-back.shift[0]), float(-back.shift[1])
     return PatchMotion(slide, -log(shrink), -atan2(c - b, a + d), sd, sd, rest_px)
 
 
 def affine_rest(places: Floats, flow: Floats) -> float:
-    """Return what one affine motion leaves of a flow, root mean square of the lengths."""
+    """Return the residual of a flow after one affine motion, root mean square of the lengths."""
     if len(places) < _LEAST_POINTS:
         return 0.0
     rows = np.column_stack((places - places.mean(axis=0), np.ones(len(places))))
@@ -74,7 +74,7 @@ def affine_rest(places: Floats, flow: Floats) -> float:
 
 
 def _fit(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
-    """Fit (3, 2) numbers by reweighted least squares: them, the weights, what is left."""
+    """Fit (3, 2) numbers by reweighted least squares; return them, the weights and the residual."""
     weights = np.ones(len(rows))
     numbers: Floats | None = None
     scale = _NOISE_PX
@@ -91,7 +91,7 @@ def _fit(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
 
 
 def _flat(normal: Floats) -> bool:
-    """Return whether points lie in a row: no area of moments is left."""
+    """Return whether points are on a line, so that their moments have no area."""
     xx, xy, yy = normal[0, 0], normal[0, 1], normal[1, 1]
     return bool(xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12)
 

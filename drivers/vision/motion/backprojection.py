@@ -1,8 +1,8 @@
-"""A moving patch of the image -> a thing in the camera frame, with place and velocity.
+"""Back-projection of a moving patch to a thing in the camera frame, with position and velocity.
 
-Camera frame: optical, x right, y down, z forward. With p = z (x', y', 1), x' and y' being
-the pixel by focal length, the velocity is z (dx'/dt, dy'/dt, 0) + (dz/dt) (x', y', 1), and
-what grows by a share a second comes nearer by that share: dz/dt = -loom z.
+Camera frame: optical, x right, y down, z forward. With p = z (x', y', 1), where x' and y' are the
+pixel divided by the focal length, the velocity is z (dx'/dt, dy'/dt, 0) + (dz/dt) (x', y', 1). A
+thing that grows by a share per second approaches by that share: dz/dt = -loom z.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from gazerig.drivers.vision.motion.params import MotionParams
 
 Vec3 = tuple[float, float, float]
 
-# A depth image has holes and, at edges, the background; a tenth of a thing must be known.
+# A depth image has holes and, at edges, the background; a tenth of a thing must have depth.
 _LEAST_SHARE, _LEAST_PIXELS = 0.1, 5
 _LEAST_SD_M = 0.005
 # Median absolute deviation to standard deviation.
@@ -25,7 +25,7 @@ _MAD = 1.4826
 
 
 class Distance(NamedTuple):
-    """How far along the optical axis a thing is, in metres, how sure, and whether measured."""
+    """Distance of a thing along the optical axis, its standard deviation, and whether measured."""
 
     z_m: float
     sd_m: float
@@ -33,11 +33,11 @@ class Distance(NamedTuple):
 
 
 def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane | None:
-    """Bring a depth image to the small image's size; what is no distance becomes NaN."""
+    """Resize a depth image to the small image's size; invalid distances become NaN."""
     if depth_m is None or depth_m.ndim != 2 or depth_m.size == 0:
         return None
     depth = np.asarray(depth_m, dtype=np.float32)
-    if depth.shape != shape:  # nearest: the mean of two surfaces is on neither
+    if depth.shape != shape:  # nearest neighbour, as the mean of two surfaces is on neither
         size = shape[1], shape[0]
         depth = np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST), np.float32)
     out: Plane = np.where(np.isfinite(depth) & (depth > 0.0), depth, np.float32(np.nan))
@@ -45,7 +45,7 @@ def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane |
 
 
 def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distance:
-    """Return a thing's distance from the depth image, else the assumed one."""
+    """Return a thing's distance from the depth image, or the assumed one."""
     if depth is not None:
         values = depth[group.y, group.x]
         values = values[np.isfinite(values)]
@@ -58,13 +58,13 @@ def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distanc
 
 
 def place(point_px: Floats, z_m: float, K: Floats) -> Vec3:
-    """Return the point at depth ``z_m`` that a pixel shows."""
+    """Return the point at depth ``z_m`` of a pixel."""
     x, y = ((point_px - K[:2, 2]) / K[[0, 1], [0, 1]]).tolist()
     return z_m * x, z_m * y, z_m
 
 
 def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floats) -> Vec3:
-    """Return the velocity of a thing at ``p_m`` whose image moves and grows so."""
+    """Return the velocity of a thing at ``p_m`` from the motion and growth of its image."""
     x, y, z = p_m
     return (
         z * flow_px_s[0] / float(K[0, 0]) - loom_1_s * x,
@@ -74,5 +74,5 @@ def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floa
 
 
 def radius_m(area_px: float, z_m: float, K: Floats) -> float:
-    """Return the radius of the disc that covers as much of the image."""
+    """Return the radius of a disc with this area in the image."""
     return z_m * float(np.sqrt(area_px / (np.pi * K[0, 0] * K[1, 1])))

@@ -1,7 +1,7 @@
-"""Pixels that move, gathered to things: neighbours belong together, unless they part.
+"""Clustering of moving pixels to things: neighbours belong together, unless they separate.
 
-What one affine motion explains is one thing, however it turns or grows. What it does not
-explain and what falls into two clearly different motions is two: people who pass.
+Pixels that one affine motion explains are one thing, however it turns or grows. Pixels with two
+clearly different motions are two things, such as people who pass each other.
 """
 
 from typing import NamedTuple
@@ -18,19 +18,19 @@ from gazerig.drivers.vision.motion.segmentation import Things
 
 Indices = NDArray[np.intp]
 
-# Two motions are two things when they differ by this share of the faster one ...
+# Two motions are two things if they differ by this share of the faster one ...
 _PARTING_SHARE = 0.8
-# ... and leave less than this of what one motion left unexplained.
+# ... and their residual is below this share of that of one motion.
 _BETTER_SHARE = 0.6
 _MOST_SPLITS = 3
-# Patches that are looked at for each that may be reported.
+# Number of patches that are examined per reported one.
 _LOOKED_AT = 3
 _SMOOTH_PX = 3
 # Relative change of brightness at the edges of a thing that is no faint shadow, and the share of
-# the image from which on less is enough: what is near is large, and its edges are soft.
+# the image above which less is enough: near things are large, with soft edges.
 _LEAST_CHANGE, _SMALL_SHARE = 0.13, 0.008
 _SAMPLE = 400
-# A patch so near to the image's edge, where flow is not known, goes on beyond it.
+# Distance from the image's edge, where flow is unknown, at which a patch continues beyond it.
 _CUT_PX = 3
 _HOLES = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
 
@@ -54,7 +54,7 @@ class Group(NamedTuple):
 
 
 def fastest(group: Group) -> tuple[Floats, Floats]:
-    """Return the mean place and the mean motion, (2,) each, of a group's fastest quarter."""
+    """Return the mean position and the mean motion, (2,) each, of a group's fastest quarter."""
     speed = (group.flow * group.flow).sum(axis=1)
     fast = speed >= np.partition(speed, (3 * len(speed)) // 4)[(3 * len(speed)) // 4]
     at: Floats = np.array((group.x[fast].mean(), group.y[fast].mean()))
@@ -63,7 +63,7 @@ def fastest(group: Group) -> tuple[Floats, Floats]:
 
 
 def gathered(things: Things, params: MotionParams) -> list[Group]:
-    """Return the things that move, the largest first."""
+    """Return the moving things, the largest first."""
     least = max(4, round(params.min_area_share * things.mask.size))
     pieces = [
         piece
@@ -85,15 +85,15 @@ def gathered(things: Things, params: MotionParams) -> list[Group]:
 
 
 def _sharpest(values: NDArray[np.float32]) -> float:
-    """Return what three in a hundred values exceed."""
+    """Return the 97th percentile of values."""
     at = int(0.97 * len(values))
     return float(np.partition(values, at)[at])
 
 
 def _connected(mask: Mask, flow: Flow, close_px: int, least: int, most: int = 100) -> list[Group]:
-    """Return the pixels of the mask by neighbourhood, gaps up to ``close_px`` being bridged.
+    """Return the connected components of the mask; gaps up to ``close_px`` are bridged.
 
-    Of very many the ``most`` largest are returned.
+    Of very many, the ``most`` largest are returned.
     """
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (close_px, close_px))
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
@@ -116,7 +116,7 @@ def _group(x: Indices, y: Indices, flow: Flow) -> Group:
 
 
 def _parted(group: Group, things: Things, least: int, splits: int) -> list[Group]:
-    """Split a group of two motions, again and again."""
+    """Split a group of several motions recursively."""
     if splits == 0 or len(group.x) < 2 * least:
         return [group]
     sides = _sides(group, things.threshold_px)
@@ -137,7 +137,7 @@ def _parted(group: Group, things: Things, least: int, splits: int) -> list[Group
 
 
 def _sides(group: Group, threshold_px: float) -> Mask | None:
-    """Return which pixels of two things are the one's; None where there is but one."""
+    """Return a mask of the first of two things; None if there is only one."""
     step = max(1, len(group.x) // _SAMPLE)
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     flow = group.flow
@@ -160,11 +160,11 @@ def _sides(group: Group, threshold_px: float) -> Mask | None:
 
 
 def inscribed_px(group: Group, shape: tuple[int, ...]) -> float:
-    """Return the radius of the largest disc within a patch; beyond the image's edge it goes on.
+    """Return the radius of the largest disc within a patch, continued beyond the image's edge.
 
     Args:
-        group: the patch.
-        shape: height and width of the image.
+        group: The patch.
+        shape: Height and width of the image.
     """
     x, y, width, height = group.box
     mask = np.zeros((height + 2, width + 2), np.uint8)
@@ -179,13 +179,13 @@ def inscribed_px(group: Group, shape: tuple[int, ...]) -> float:
         _go_on(mask[0], mask[1])
     if y + height >= shape[0] - _CUT_PX:
         _go_on(mask[-1], mask[-2])
-    # In a plain skin no flow shows: what moves all around moves, too.
+    # Plain skin shows no flow: an area surrounded by motion moves too.
     outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(mask, outlines, -1, 1, cv2.FILLED)
     return float(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_3).max())
 
 
 def _go_on(beyond: NDArray[np.uint8], edge: NDArray[np.uint8]) -> None:
-    """Let a patch that the image's edge cuts go on beyond it in one piece."""
+    """Extend a patch that the image's edge cuts beyond it in one piece."""
     at = np.flatnonzero(edge)
     beyond[at[0] : at[-1] + 1] = 1

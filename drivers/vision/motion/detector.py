@@ -1,13 +1,14 @@
-"""Things that move, found in a image and the one before it, whatever the camera did itself.
+"""Detection of moving things between two images, independent of the camera's own motion.
 
-The newer image is compared with the older one, turned as the joints say. Where most of the room
-keeps its place flow is searched only where the images differ (optical_flow); else everywhere, and
-the camera's own motion is found in it (ego_motion). What moves besides (segmentation) is gathered
-to patches (clustering); their slide, growth and spin (affine, lucas_kanade) give place and velocity
-(backprojection), and numbers that last (tracking). No clock: times come with images.
+The newer image is compared with the older one, which is turned as the joints measured. If most of
+the room keeps its position, flow is computed only where the images differ (optical_flow); otherwise
+everywhere, and the camera's own motion is estimated from it (ego_motion). Other motion
+(segmentation) is clustered to patches (clustering). Their slide, growth and spin (affine,
+lucas_kanade) give position and velocity (backprojection), and persistent ids (tracking). No clock
+is used: times come with images.
 
-While the camera turns fast, and where the image does not tell its own motion from that
-of things, nothing is said, as our own eyes say nothing during a saccade.
+While the camera turns fast, and if the camera's motion cannot be separated from that of things,
+nothing is reported, like human vision during a saccade.
 """
 
 from dataclasses import replace
@@ -53,29 +54,29 @@ from gazerig.drivers.vision.motion.segmentation import Unlike, unlike, what_move
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 _KIND = "thing"
-# Flow is searched again where the camera moved the image by more than was foreseen: what is seen
-# through a shift is blurred, and at the edges lost.
+# Unpredicted motion of the image above which flow is computed again, as a shift blurs flow and
+# loses it at the edges.
 _SEARCH_AGAIN_PX = 1.5
-# A camera that shook is believed to move for so long: where a shake turns back, it stands.
+# Time for which a camera counts as moving after a shake, as it is at rest where a shake reverses.
 _SHAKES_ON_S = 0.5
-# With less of the older image in view, too little is left to tell motions apart.
+# Smallest common share of both images, below which motions cannot be separated.
 _LEAST_KNOWN = 0.4
-# So near to the image's edge, parts of its width, flow is not known where the camera turns.
+# Margin at the image's edge, as a share of its width, where flow is unknown if the camera turns.
 _EDGE_SHARE = 0.06
-# A patch that comes as near as this to the edge goes on beyond it.
+# Distance from the edge at which a patch continues beyond it.
 _CUT_PX = 1
-# Points enough for an affine fit.
+# Number of points for an affine fit.
 _SAMPLE = 400
 
 
 class MotionReport(NamedTuple):
-    """What became of a image, for the page and the summary.
+    """Result for one image, for the page and the summary.
 
-    blobs: what moves
-    silent: why nothing could be said, "" where it could
-    turn_deg_s: the camera's own turn as seen
-    background_share: share of the image's texture that moved as one
-    noise_px, threshold_px: flow noise of the still room, and the least motion believed, in
+    blobs: moving things
+    silent: reason why nothing could be detected, "" for none
+    turn_deg_s: the camera's own turn rate, as measured in the image
+    background_share: share of the image's texture with common motion
+    noise_px, threshold_px: flow noise of the still room, and the smallest detectable motion, in
         pixels of the small image
     """
 
@@ -88,7 +89,7 @@ class MotionReport(NamedTuple):
 
 
 class MotionDetector:
-    """Finds what moves from image to image; pure but for the memory of the last."""
+    """Detector of motion between consecutive images; pure except for the stored last image."""
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
@@ -96,11 +97,11 @@ class MotionDetector:
         self._tracks = MotionTracks(params)
         self._gloves = GloveFinder()
         self._before: SmallImage | None = None
-        self._moved_s = -np.inf  # when the image alone told of a motion of the camera
+        self._moved_s = -np.inf  # time of the last camera motion known only from the image
         self.report = MotionReport()
 
     def retune(self, params: MotionParams) -> None:
-        """Look more or less finely from the next image on; what is followed stays."""
+        """Apply changed parameters from the next image on; tracks stay."""
         if params.preset != self._params.preset:
             self._search = FlowSearch(params.preset)
         self._params = params
@@ -108,7 +109,7 @@ class MotionDetector:
 
     @property
     def before_s(self) -> float | None:
-        """Return the capture time of the image that the next one will be compared with."""
+        """Return the capture time of the stored image, with which the next one is compared."""
         return None if self._before is None else self._before.captured_s
 
     def find(
@@ -120,19 +121,19 @@ class MotionDetector:
         depth_m: NDArray[Any] | None = None,
         t_now_before_m: NDArray[np.float64] | None = None,
     ) -> tuple[MovingBlob, ...]:
-        """Find what moves between the last image and this one.
+        """Find moving things between the last image and this one.
 
         image: (h, w), or with 1, 3 or 4 channels, uint8
         lens: focal lengths and centre in pixels of this image
-        R_now_before: (3, 3) turns directions from the camera's axes at ``before_s`` into
-            those at ``captured_s``; identity for a camera that stands, None where unknown
-        depth_m: (any, any) distance along the optical axis, aligned with the image; 0, NaN
-            and infinite where unknown
-        t_now_before_m: (3,) where the lens was at ``before_s`` seen from where it is now, in
-            its axes of now; with it and depth, near things do not seem to move past far ones
+        R_now_before: (3, 3) turns directions from the camera's axes at ``before_s`` into those at
+            ``captured_s``; identity for a camera at rest, None if unknown
+        depth_m: (any, any) distance along the optical axis, aligned with the image; 0, NaN or
+            infinite if unknown
+        t_now_before_m: (3,) position of the lens at ``before_s`` relative to the present one, in
+            present axes; with it and depth, parallax of near things is not mistaken for motion
 
         Raises:
-            ValueError: the image is none of those.
+            ValueError: the image has another shape or type.
         """
         now = made_small(image, self._params.work_px, lens, captured_s, self._params.finest_level)
         before, self._before = self._before, now
@@ -143,7 +144,7 @@ class MotionDetector:
         return self.report.blobs
 
     def forget(self) -> None:
-        """Forget the last image: the next one is the first of another scene."""
+        """Discard the last image: the next one is the first of another scene."""
         self._before, self._moved_s = None, -np.inf
         self._tracks.forget()
         self._gloves.forget()
@@ -156,7 +157,7 @@ class MotionDetector:
         depth_m: NDArray[Any] | None,
         t_now_before_m: Floats | None,
     ) -> MotionReport:
-        """Compare two images; return the motion, or why they cannot be compared."""
+        """Compare two images; return the motion, or the reason why they cannot be compared."""
         if not searchable(now.grey):
             return MotionReport(silent="frame too small")
         if before is None or before.grey.shape != now.grey.shape:
@@ -182,10 +183,10 @@ class MotionDetector:
     def _compared(
         self, now: SmallImage, before: SmallImage, R_now_before: Floats | None, shift: Flow | None
     ) -> tuple[Compared, Ego, Unlike | None]:
-        """Find the flow and the camera's own motion; a large unforeseen one is taken out first.
+        """Compute the flow and the camera's own motion; a large unpredicted one is removed first.
 
-        Where the camera did what was predicted flow is searched only where the images differ, and
-        how they do is returned, too.
+        If the camera moved as predicted, flow is computed only where the images differ, and their
+        difference is returned too.
         """
         pair = laid(now, before, turn_homography(R_now_before, now, before))._replace(shift=shift)
         moved_before = now.captured_s - self._moved_s < _SHAKES_ON_S
@@ -223,7 +224,7 @@ class MotionDetector:
         dt_s: float,
         least_px: float,
     ) -> tuple[MovingBlob, ...]:
-        """Measure each patch, and give those that move by more than ``least_px`` their numbers."""
+        """Measure each patch, and assign ids to those that move by more than ``least_px``."""
         frames = levels(pair) if groups else ()
         measured = [(group, _measured(group, frames, _room(group, pair, ego))) for group in groups]
         measured = [
@@ -253,14 +254,14 @@ class MotionDetector:
         depth: Plane | None,
         dt_s: float,
     ) -> MovingBlob:
-        """Put together what is known of one thing."""
+        """Combine the measurements of one thing."""
         far = distance(group, depth, self._params)
         point = anchor(group, now.grey, follow.centre, follow.offset)
         follow.offset = point - follow.centre
         p = place(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
         edges = _edges(group, *now.grey.shape[:2])
-        # Of a thing that the edge of the image cuts, what comes into view is no growth.
+        # A thing that the edge of the image cuts does not grow when more of it becomes visible.
         growth_sd = np.inf if any(edges) else motion.growth_sd
         loom = _believed(motion.growth, growth_sd) / dt_s
         fastest_px, fastest_flow = fastest(group)
@@ -293,7 +294,7 @@ class MotionDetector:
 
 
 def at_level(params: MotionParams, now: SmallImage) -> MotionParams:
-    """Return the parameters with their lengths in pixels of the image that is searched."""
+    """Return the parameters with lengths in pixels of the searched image."""
     shrink = now.fine.shape[0] // now.grey.shape[0]
     return replace(
         params,
@@ -303,10 +304,10 @@ def at_level(params: MotionParams, now: SmallImage) -> MotionParams:
 
 
 def _goes_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> float:
-    """Return how far the pixels of a patch move, about their root mean square."""
+    """Return the approximate root mean square motion of a patch's pixels."""
     slide = float(np.hypot(*motion.slide_px))
     if any(_edges(group, *shape[:2])):
-        return slide  # its growth is not known
+        return slide  # its growth is unknown
     growth = _believed(motion.growth, motion.growth_sd)
     spin = _believed(motion.spin_rad, motion.spin_sd)
     return float(
@@ -315,7 +316,7 @@ def _goes_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> float
 
 
 class _Edges(NamedTuple):
-    """Beyond which edges of the image a patch goes on."""
+    """Edges of the image beyond which a patch continues."""
 
     left: bool
     top: bool
@@ -338,14 +339,14 @@ def turned_between(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> F
 
 
 def _room(group: Group, pair: Compared, ego: Ego) -> Room:
-    """Return where a patch would be in the older image if it stood still."""
+    """Return the map of a still patch to the older image."""
     if pair.shift is None:
         return Room(ego.B, np.zeros(2))
     return Room(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
 
 
 def _measured(group: Group, frames: tuple[Level, ...], room: Room) -> tuple[Floats, PatchMotion]:
-    """Return a patch's middle, and the motion there."""
+    """Return a patch's centre, and the motion there."""
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     middle = places.mean(axis=0)
     step = max(1, len(places) // _SAMPLE)
@@ -357,8 +358,8 @@ def _measured(group: Group, frames: tuple[Level, ...], room: Room) -> tuple[Floa
 def _believed(value: float, sd: float) -> float:
     """Shrink a measurement towards 0 by its noise; one within the noise is 0.
 
-    The positive part of James and Stein's estimator for one number; attention takes the
-    length of it, which noise would otherwise always make longer.
+    This is the positive part of the James-Stein estimator for one number. Attention uses the
+    magnitude, which noise would otherwise always increase.
     """
     if value == 0.0 or not np.isfinite(sd):
         return 0.0

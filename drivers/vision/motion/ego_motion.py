@@ -1,15 +1,14 @@
-"""What the camera itself did: the one motion that most of the still room agrees on.
+"""Estimation of the camera's own motion: the common motion of most of the still room.
 
-The joints give a first guess that lags, and knows nothing of the lens moving sideways as
-the neck turns. What is left in the flow is fitted by a homography (exact for a turn and
-for one plane, eight numbers for the rest), by iteratively reweighted least squares with
-Tukey's weights. The fit starts from the guess and from the scale of its usual error, so
-that a body which fills the image cannot pass for the room while the joints say that
-the camera stands.
+The joints provide a first guess, which lags and does not include the sideways motion of the lens
+when the neck turns. A homography is fitted to the remaining flow (exact for a turn and for one
+plane, an approximation otherwise), by iteratively reweighted least squares with Tukey's weights.
+The fit starts from the guess and from the scale of its usual error, so that a body that fills the
+image is not mistaken for the room while the joints measure that the camera is at rest.
 
-Where too little agrees with the guess, or there is none, the whole image may have moved: the
-table was bumped, a hand holds the camera. Without a guess the camera is taken to stand as long as
-a good part of the image does.
+If too little agrees with the guess, or there is none, the whole image may have moved: the table was
+bumped, or a hand holds the camera. Without a guess the camera counts as at rest while a good part
+of the image is.
 """
 
 from typing import NamedTuple
@@ -22,45 +21,47 @@ from gazerig.drivers.vision.motion.image import Floats, Grey, light_apart, middl
 from gazerig.drivers.vision.motion.optical_flow import Compared, Mask, corners, gradients, moved
 
 _GRID_PX = 4
-# At the edge the flow is worst, and leads out of the image.
+# Margin at the edge, where the flow is worst and leaves the image.
 _EDGE_PX = 3
-# Corner strength (smaller eigenvalue of the gradients' matrix, at half size) for which
-# noise of a few grey levels does not pass.
+# Corner strength (smaller eigenvalue of the gradients' matrix, at half size) that noise of a few
+# grey levels does not reach.
 _CORNER_BLOCK = 5
 _LEAST_CORNER = 2e-4
 _LEAST_POINTS = 30
-# A room is around us: what fills fewer of the image's 48 cells is a thing.
+# The room surrounds the camera: anything in fewer of the image's 48 cells is a thing.
 _CELLS, _LEAST_CELLS = (8, 6), 12
-# Of the points with texture, those that must agree with what was predicted.
+# Share of the textured points that must agree with the prediction.
 _LEAST_SHARE = 0.35
-# Share of the outlines that keep their place although all is said to have moved: .11 to .32 in
-# rendered rooms before a camera that moves, .49 to .77 behind people before one that stands. Their
-# brightness should change by more than so many grey levels, and does by less than a share of that.
+# Share of the outlines that keep their position although the whole image seems to have moved: .11
+# to .32 in rendered rooms with a moving camera, .49 to .77 behind people with one at rest.
+# Brightness change that they should exceed, grey levels, and share of it below which they are
+# unchanged.
 _KEPT_OUTLINES, _CLEAR_CHANGE, _UNCHANGED = 0.4, 4.0, 0.3
 _STEPS = 8
-# A step that moves the image by less is the last.
+# The iteration ends at a step that moves the image by less.
 _SMALL_PX = 0.01
 _TUKEY = 4.685
 _LEAST_NOISE_PX, _MOST_NOISE_PX = 0.02, 1.5
-# Joints at rest are right; in motion they may be wrong by all of the motion, at its onset.
+# Joints at rest are accurate; at the onset of motion they may be wrong by the whole motion.
 _STANDING_REACH_PX = 0.4
-# A fit that leaves more lies between two motions.
+# A fit with a larger residual is between two motions.
 _MIXED_PX = 0.25
-# What a homography's last numbers may be, in focal lengths: keeps it tame between points.
+# Standard deviations of a homography's numbers, in focal lengths, which regularise it between
+# points.
 _SPREADS = np.array([0.1, 0.1, 0.2, 0.1, 0.1, 0.2, 0.05, 0.05])
 _PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 _POINT_NOISE = 1e-3
-# A camera at rest: of every third pixel, those with so much texture that keep their brightness,
-# and how far they may have slid together.
+# Test of a camera at rest: pixel step, texture and number of the tested points, share that must
+# keep their brightness, and largest common slide.
 _REST_STEP, _REST_GRADIENT, _REST_POINTS = 3, 2.0, 60
 _REST_SHARE, _REST_PX = 0.6, 0.05
 
 
 class _Need(NamedTuple):
-    """What the image must show to be believed that all of it moved.
+    """Requirements for accepting that the whole image moved.
 
-    share: of the points with texture that moved as one; cells: of the image that they lie in
-    kept: of the points at the edge, fewer than this may have stayed where they were
+    share: share of the textured points that moved together; cells: number of image cells with them
+    kept: largest share of the points at the edge that may have kept their position
     """
 
     share: float
@@ -68,15 +69,15 @@ class _Need(NamedTuple):
     kept: float
 
 
-# Somebody close to the lens fills most of the image; a strip of wall that keeps its place tells.
-# A camera that moves follows somebody now and then, who keeps their place.
+# A person close to the lens fills most of the image; a strip of wall that keeps its position shows
+# that. A moving camera sometimes follows a person, who then keeps their position.
 _AGAINST_JOINTS, _STOOD, _MOVES = _Need(0.45, 24, 0.1), _Need(0.35, 24, 0.15), _Need(0.35, 12, 0.4)
 
 
 class HomographyFit(NamedTuple):
-    """Homography (3, 3), share of the points that agree on it, and their noise in pixels.
+    """Homography (3, 3), share of the points that agree with it, and their noise in pixels.
 
-    free: found without regard to what was predicted
+    free: whether it was found independently of the prediction
     """
 
     B: Floats
@@ -90,12 +91,11 @@ class Ego(NamedTuple):
 
     B: (3, 3) pixels of the newer image to those of the older one, turned as predicted
     total: (3, 3) pixels of the older image to those of the newer
-    share: of the points with texture, those that moved with the room; 0 where they agree on
-        nothing better than noise
-    noise_px: how far the flow there is from it, standard deviation along one axis
-    way_px: how far the camera's motion moved the image, median
-    unforeseen_px: the same where the image alone told of it, else 0
-    fitted: the image had enough texture to be asked
+    share: share of the textured points that moved with the room; 0 if they only agree on noise
+    noise_px: deviation of their flow from it, standard deviation along one axis
+    way_px: median motion of the image by the camera's motion
+    unforeseen_px: likewise if only the image shows it, otherwise 0
+    fitted: whether the image had enough texture for a fit
     """
 
     B: Floats
@@ -111,9 +111,9 @@ def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = 
     """Find the camera's own motion.
 
     K: (3, 3) camera matrix
-    predicted: ``pair`` was turned by what the joints said; else nothing is known of the
-        camera, and any motion that most agree on is taken for its
-    moved_before: the image alone told of a motion of the camera shortly before
+    predicted: whether ``pair`` was turned as the joints measured; otherwise the camera's motion is
+        unknown, and the motion of most points is taken for it
+    moved_before: whether the image alone showed a motion of the camera shortly before
     """
     points = _textured(pair)
     B, share, noise, fitted, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False, False
@@ -136,12 +136,12 @@ def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = 
 
 
 def at_rest(pair: Compared, changed: Mask) -> Ego | None:
-    """Return that the camera did what was predicted, where most of the texture bears it out.
+    """Return the predicted motion of the camera if most of the texture confirms it.
 
-    pair: whose flow need not have been searched
-    changed: (h, w) where the images differ by more than noise
+    pair: images whose flow need not have been computed
+    changed: (h, w) mask of differences above the noise
 
-    None where that takes the flow to tell.
+    The result is None if the flow is needed to decide.
     """
     window = np.s_[::_REST_STEP, ::_REST_STEP]
     gx, gy = (g[window].ravel() for g in gradients(pair.now))
@@ -162,7 +162,7 @@ def at_rest(pair: Compared, changed: Mask) -> Ego | None:
 
 
 def _textured(pair: Compared) -> Floats:
-    """Return the points of a grid, (n, 2), at which the flow can be believed."""
+    """Return the points of a grid, (n, 2), with reliable flow."""
     strength = cv2.cornerMinEigenVal(pair.now, _CORNER_BLOCK)
     height, width = pair.now.shape
     y, x = np.mgrid[_EDGE_PX : height - _EDGE_PX : _GRID_PX, _EDGE_PX : width - _EDGE_PX : _GRID_PX]
@@ -179,7 +179,7 @@ def _room(
     reach_px: float,
     need: _Need,
 ) -> HomographyFit | None:
-    """Fit the motion of the room: as predicted, or standing; else as all of the image moves."""
+    """Fit the motion of the room: as predicted or at rest; otherwise that of the whole image."""
     shape = pair.now.shape
     off = np.hypot(*(there - points).T)
     near = off < reach_px
@@ -193,7 +193,7 @@ def _room(
         free = _of_two(points, there, K, shape, need.cells) or free
     if free is None or free.share < need.share:
         return found
-    # What has kept its place although all is said to have moved.
+    # Points that kept their position although the whole image seems to have moved.
     parted = np.hypot(*(moved(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
     edge = _edge(points, shape)
     kept = float(((off < _STANDING_REACH_PX) & parted)[edge].mean()) if edge.any() else 0.0
@@ -201,21 +201,21 @@ def _room(
 
 
 def _outlines_kept(pair: Compared, B: Floats) -> float:
-    """Return the share of the outlines at the edge that stay where they should have moved.
+    """Return the share of the outlines at the edge that did not move although they should have.
 
-    Boards and door frames before a plain wall have no corners, and people who walk before it have
-    all the texture there is.
+    Boards and door frames on a plain wall have no corners, so people who walk in front of it have
+    all of the texture.
 
     Args:
-        pair: two images.
-        B: (3, 3) by which all of the image is said to have moved.
+        pair: Two images.
+        B: Homography (3, 3) of the assumed motion of the whole image.
     """
     height, width = pair.now.shape
     y, x = np.mgrid[:height, :width]
     points = np.column_stack((x.ravel(), y.ravel())).astype(np.float64)
     gx, gy = (g.ravel() for g in gradients(pair.now))
     moves = moved(B, points) - points
-    # Farther than a pixel away brightness no longer changes as the gradient tells.
+    # Beyond one pixel brightness no longer changes as the gradient predicts.
     change = np.abs(gx * moves[:, 0] + gy * moves[:, 1]) / np.maximum(1.0, np.hypot(*moves.T))
     should = (change > _CLEAR_CHANGE) & pair.known.ravel() & _edge(points, (height, width))
     if not should.any():
@@ -228,9 +228,10 @@ def _outlines_kept(pair: Compared, B: Floats) -> float:
 def _of_two(
     points: Floats, there: Floats, K: Floats, shape: tuple[int, ...], least_cells: int
 ) -> HomographyFit | None:
-    """Fit the room where two motions share the image: more of the edge goes along with it.
+    """Fit the room in an image with two motions: more of the edge moves with it.
 
-    Somebody close fills the middle. None where there are not two, or neither explains the image.
+    A close person fills the middle. The result is None without two motions, or if neither explains
+    the image.
     """
     flow = there - points
     flow = flow - flow.mean(axis=0)
@@ -264,16 +265,16 @@ def _fitted(
     reach_px: float,
     least_cells: int = _LEAST_CELLS,
 ) -> HomographyFit | None:
-    """Fit the homography that most points agree on: it, their share, and the noise.
+    """Fit the homography that most points agree with; return it, their share, and the noise.
 
-    None where they are too few, or all in one place: that would be a thing.
+    The result is None if they are too few, or all close together, as for a thing.
     """
     focal, centre = float(K[0, 0]), K[:2, 2]
     a, b = (points - centre) / focal, (there - centre) / focal
     rows = _rows(a, b)
     h = _PLAIN
     errors = focal * np.hypot(*(b - a).T)
-    # A third of the points is room, at worst: their error is the scale to start from.
+    # At worst a third of the points is room; their error is the initial scale.
     scale = min(1.5 * float(np.quantile(errors, 0.3)), reach_px / 3) + 2 * _LEAST_NOISE_PX
     noise = _LEAST_NOISE_PX
     for _ in range(_STEPS):
@@ -307,7 +308,7 @@ def _rows(a: Floats, b: Floats) -> Floats:
 
 
 def _solved(rows: Floats, b: Floats, weights: Floats) -> Floats:
-    """Solve for the eight numbers, with a weak belief that they are those of no motion."""
+    """Solve for the eight numbers, with a weak prior of no motion."""
     both = np.concatenate((weights, weights)) / _POINT_NOISE**2
     weighted = rows * both[:, None]
     belief = np.diag(_SPREADS**-2.0)
@@ -316,7 +317,7 @@ def _solved(rows: Floats, b: Floats, weights: Floats) -> Floats:
 
 
 def _image(h: Floats, a: Floats) -> Floats:
-    """Return where the homography takes points."""
+    """Return points after the homography."""
     x, y = a.T
     depth = np.maximum(h[6] * x + h[7] * y + 1.0, 1e-3)
     there = h[0] * x + h[1] * y + h[2], h[3] * x + h[4] * y + h[5]
@@ -325,19 +326,19 @@ def _image(h: Floats, a: Floats) -> Floats:
 
 
 def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
-    """Return the standard deviation along one axis: half of such lengths are below 1.18 of it."""
+    """Return the standard deviation along one axis: the median length is 1.18 times it."""
     return max(_LEAST_NOISE_PX, middle(errors[mask]) / 1.177)
 
 
 def _edge(points: Floats, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Return which points lie at the left, right or upper edge, where most of the room shows."""
+    """Return a mask of points at the left, right or upper edge, where the room is most visible."""
     x, y = np.floor(points / (shape[1], shape[0]) * _CELLS).T
     out: NDArray[np.bool_] = (x == 0) | (x == _CELLS[0] - 1) | (y == 0)
     return out
 
 
 def _cells(points: Floats, shape: tuple[int, ...]) -> int:
-    """Return how many cells of an image of (height, width) points lie in."""
+    """Return the number of cells of an image of (height, width) that contain points."""
     cells = np.floor(points / (shape[1], shape[0]) * _CELLS)
     return len(np.unique(cells[:, 0] * _CELLS[1] + cells[:, 1]))
 
@@ -347,12 +348,12 @@ def _inverse(H: Floats) -> Floats:
 
 
 def _way(H: Floats, points: Floats) -> float:
-    """Return how far a homography moves points, median."""
+    """Return the median motion of points by a homography."""
     return float(np.median(np.hypot(*(moved(H, points) - points).T)))
 
 
 def turn_rad(ego: Ego, grey: Grey, K: Floats) -> float:
-    """Return by how much the middle of the image turned away, as an angle."""
+    """Return the turn of the image's centre, as an angle in radians."""
     height, width = grey.shape
     middle = np.array([[0.5 * (width - 1), 0.5 * (height - 1)]])
     rays = (np.concatenate((middle, moved(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]

@@ -1,12 +1,11 @@
-"""Boxing gloves by their red: where they are and how far away, whether they move or stand still.
+"""Detection of red boxing gloves by their colour, with direction and distance, moving or still.
 
-Flow finds what moves, but a glove of one colour hardly tells how it grows, and one at rest is not
-found at all. A glove is about as round as a ball, so the largest circle within it gives its
-direction and, by its size, its distance. What is white or shines on it belongs to it; red ropes
-and posts do not. Of one glove before another both are found as long as enough of the farther one is
-seen, and one of which the image's edge, another glove or something else hides a part is taken to be
-as large as it was: it does not come nearer because more of it is seen. How far away it is is then
-known the less the longer it lasts.
+Optical flow hardly measures the growth of a glove of one colour, and does not find one at rest. A
+glove is nearly round, so the largest circle within it gives its direction and, by its size, its
+distance. White and shiny parts belong to it; red ropes and posts do not. If one glove is in front
+of another, both are found while enough of the farther one is visible. A glove that is partly hidden
+by the image's edge, another glove or something else keeps its last size: it does not come nearer
+because more of it becomes visible. The uncertainty of its distance increases meanwhile.
 """
 
 from math import hypot
@@ -21,39 +20,39 @@ from gazerig.drivers.types import ImageArray, MovingBlob
 
 KIND = "hand"
 RADIUS_M = 0.068
-"""Of the largest ball within a glove."""
+"""Radius of the largest ball within a glove."""
 
 _FARTHEST_M = 1.3
-_FIRST_ID = 2_000_000  # beyond those of what moves
+_FIRST_ID = 2_000_000  # above those of moving things
 _MOST = 4
-# Red as cameras show it in any light: half-degrees of hue, saturation and value.
+# Range of red in any light: half-degrees of hue, saturation and value.
 _LOW = ((0, 150, 50), (172, 150, 50))
 _HIGH = ((7, 255, 255), (179, 255, 255))
-# What is left of a glove around the largest circle in it is not another one.
+# Factor on the largest circle within which the rest of a glove is not another glove.
 _TAKEN = 1.35
-# How far a glove moves from frame to frame at most, in its radii; how long its number is kept.
+# Largest motion of a glove between frames, in its radii; time for which its number is kept.
 _MOVES, _KEPT_S = 2.5, 0.5
 _EDGE_PX = 0.7
-"""How well the edge of a colour is known: standard deviation of the radius."""
+"""Uncertainty of the edge of a colour: standard deviation of the radius."""
 _UNSEEN_M_S = 1.0
-"""How fast a glove comes or goes while its size is not seen: standard deviation."""
+"""Speed of a glove along the line of sight while its size is not visible: standard deviation."""
 # White and pale red: least value, greatest saturation of white, greatest half-degrees off red.
 _PALE_VALUE, _WHITE_SATURATION, _PALE_HUE = 90, 80, 10
 _THIN = 0.25
-"""What is thinner than this share of the smallest glove's width is a rope or a seam."""
+"""Share of the smallest glove's width below which a shape is a rope or a seam."""
 _ROUND = 1.55
-"""A glove that is seen whole reaches at most so many radii of that circle from its middle."""
+"""Largest extent of a completely visible glove, in radii of that circle from its centre."""
 
 
-# How much farther than the circle a glove reaches at most.
+# Largest extent of a glove in radii of the circle.
 _BEYOND = 1.2
 
 
 class Circle(NamedTuple):
     """A circle within a glove, pixels of the frame that was searched.
 
-    radius: if the glove goes on beyond the edge of the image as it does within
-    sure: radius of the largest one there that lies within the image
+    radius: radius if the glove continues beyond the edge of the image
+    sure: radius of the largest circle that is within the image
     """
 
     x: float
@@ -65,7 +64,7 @@ class Circle(NamedTuple):
 class _Glove(NamedTuple):
     """A circle in the image, pixels of the frame that was searched.
 
-    sized_s: when its radius was measured: later a part of it was hidden
+    sized_s: time of the last measurement of its radius; after that it was partly hidden
     """
 
     id: int
@@ -77,13 +76,13 @@ class _Glove(NamedTuple):
 
 
 class GloveFinder:
-    """Finds red gloves in one image after the other."""
+    """Detector of red gloves in consecutive images."""
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """Forget all gloves; numbers are not used again."""
+        """Discard all gloves; numbers are not reused."""
         self._known: list[_Glove] = []
         self._next_id = getattr(self, "_next_id", _FIRST_ID)
 
@@ -93,10 +92,10 @@ class GloveFinder:
         """Return the gloves in an image, the nearest first.
 
         Args:
-            bgr: (h, w, 3); nothing is found in an image without colours.
-            captured_s: when it was taken.
-            lens: focal lengths and centre in its pixels.
-            work_px: an image whose longer side exceeds this is scaled down to it.
+            bgr: Image (h, w, 3); nothing is found in an image without colours.
+            captured_s: Time of its capture, seconds.
+            lens: Focal lengths and centre in its pixels.
+            work_px: Longest side above which an image is scaled down to it.
         """
         if bgr.ndim != 3 or bgr.shape[2] < 3:
             return ()
@@ -125,16 +124,16 @@ class GloveFinder:
     def _numbered(
         self, circle: Circle, cut: bool, covered: bool, captured_s: float
     ) -> _Glove | None:
-        """Return a circle with the number of the glove that was nearest to it.
+        """Return a circle with the number of the nearest earlier glove.
 
-        One of which a part is hidden is as large as it was before, or as what is seen of it; None
-        if that is not known.
+        A partly hidden glove keeps its last size, or that of its visible part; None if that is not
+        known.
 
         Args:
-            circle: the largest within the glove.
-            cut: the edge of the image hides a part of it.
-            covered: something before it does.
-            captured_s: when.
+            circle: The largest circle within the glove.
+            cut: Whether the edge of the image hides a part of it.
+            covered: Whether something in front of it hides a part of it.
+            captured_s: Time of the image, seconds.
         """
         x, y, radius, sure = circle
         near = [
@@ -156,7 +155,7 @@ class GloveFinder:
 
 
 def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
-    """Return where an image shows gloves: red, and what is pale within the outline of the red."""
+    """Return a mask of gloves: red, and pale within the outline of the red."""
     hsv = cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV)
     low, high = (
         cv2.inRange(hsv, np.array(a), np.array(b)) for a, b in zip(_LOW, _HIGH, strict=True)
@@ -178,7 +177,7 @@ def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
 
 
 def _pale(hsv: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return where an image is white or pale red."""
+    """Return a mask of white and pale red."""
     hue, saturation, value = cv2.split(hsv)
     reddish = np.minimum(hue, 179 - hue) <= _PALE_HUE
     pale = (value >= _PALE_VALUE) & (reddish | (saturation <= _WHITE_SATURATION))
@@ -188,14 +187,14 @@ def _pale(hsv: NDArray[Any]) -> NDArray[np.uint8]:
 def _circles(mask: NDArray[np.uint8], least_px: float) -> list[Circle]:
     """Return the largest circles within a mask that do not overlap: x, y, radius."""
     found: list[Circle] = []
-    # What lies beyond the edge of the image is not known to be a glove.
+    # Areas beyond the edge of the image are not known to be a glove.
     within = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
     while len(found) < _MOST:
         inside = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         _, radius, _, (x, y) = cv2.minMaxLoc(inside)
         if radius < least_px:
             break
-        # The distance is to the middle of the nearest pixel outside, half a pixel beyond the edge.
+        # The distance is to the centre of the nearest pixel outside, half a pixel beyond the edge.
         reach = int(radius)
         near = np.s_[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1]
         sure = min(float(radius), float(within[near].max())) - 0.5
@@ -219,12 +218,13 @@ def _touched(circle: Circle, nearer: list[Circle]) -> bool:
 
 
 def _whole(mask: NDArray[np.uint8], row: int, circles: list[Circle]) -> bool:
-    """Return whether a glove is about round, so that nothing before it hides a part of it.
+    """Return whether a glove is nearly round, so that nothing in front hides a part of it.
 
     Args:
-        mask: where gloves are.
-        row: which of the circles it is.
-        circles: of all gloves; what is nearer to another of them, by its size, belongs to that.
+        mask: Mask of gloves.
+        row: Index of its circle.
+        circles: Circles of all gloves; pixels nearer to another one, relative to its size, belong
+            to that.
     """
     x, y, radius, _ = circles[row]
     far = 2.5 * radius
@@ -258,7 +258,7 @@ def _blob(glove: _Glove, share: float, lens: Intrinsics) -> MovingBlob:
 
 
 def beside(blobs: tuple[MovingBlob, ...], gloves: tuple[MovingBlob, ...]) -> tuple[MovingBlob, ...]:
-    """Return what moves that holds no glove: arm and trunk move with it."""
+    """Return the moving things that contain no glove, as arm and trunk move with one."""
     return tuple(blob for blob in blobs if not any(_holds(blob, glove) for glove in gloves))
 
 

@@ -1,7 +1,7 @@
-"""The small grey image in which motion is looked for, and the lens that goes with it.
+"""The small grey image that is searched for motion, and its lens.
 
-Pixels have their centres at whole numbers: a image of width w reaches from -0.5 to
-w - 0.5, so scaling by s takes u to s (u + 0.5) - 0.5.
+Pixels have their centres at whole numbers: an image of width w extends from -0.5 to w - 0.5, so
+scaling by s takes u to s (u + 0.5) - 0.5.
 """
 
 from typing import Any, NamedTuple
@@ -19,18 +19,18 @@ Plane = NDArray[np.float32]
 """(height, width)."""
 
 
-# Wider changes than this are light, not things; and how many grey levels of them count.
+# Width above which changes are light, not things, and the limit of such changes in grey levels.
 _LIGHT_PX, _LIGHT_STEP = 21, 8.0
 LEAST_SIDE_PX = 48
-"""Flow is not searched in images with a shorter side."""
+"""Shortest side of an image that is searched for flow."""
 
 
 class SmallImage(NamedTuple):
-    """A image made small and grey.
+    """A scaled grey image.
 
-    scale: (x, y) small pixels per pixel of the image given
+    scale: (x, y) small pixels per pixel of the original image
     K: (3, 3) camera matrix of the small image
-    fine: the image before it was halved for the search; ``grey`` itself where it was not
+    fine: the image before it was halved for the search; ``grey`` itself if it was not
     """
 
     grey: Grey
@@ -43,11 +43,11 @@ class SmallImage(NamedTuple):
 def made_small(
     image: NDArray[Any], work_px: int, lens: Intrinsics, captured_s: float, level: int = 0
 ) -> SmallImage:
-    """Scale a image so that its longer side is at most ``work_px``, and take its brightness.
+    """Scale an image so that its longer side is at most ``work_px``, and convert it to grey.
 
-    It is made small before it is made grey: less work on a large image.
+    It is scaled before it is converted, which is less work on a large image.
 
-    level: how often it is halved then for the search, unless it becomes too small for that
+    level: how often it is then halved for the search, unless it becomes too small
 
     Raises:
         ValueError: it is no 8-bit image: grey, BGR or BGR with alpha.
@@ -70,7 +70,7 @@ def made_small(
 
 
 def grey_of(image: NDArray[Any]) -> Grey:
-    """Return a image's brightness, (h, w), whether it is BGR, BGR with alpha, or grey."""
+    """Return the brightness (h, w) of an image in BGR, BGR with alpha, or grey."""
     channels = image.shape[2] if image.ndim == 3 else 1
     if channels == 3:
         return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
@@ -90,18 +90,18 @@ def _check(image: NDArray[Any]) -> None:
 
 
 def light_apart(change: Plane) -> Plane:
-    """Return a change of brightness without that of the light, which is wider."""
-    # Clipped, or a dark coat would darken all around it.
+    """Return a change of brightness without that of the light, which covers wider areas."""
+    # Clipped, as otherwise a dark coat would darken its surroundings.
     light = cv2.blur(np.clip(change, -_LIGHT_STEP, _LIGHT_STEP), (_LIGHT_PX, _LIGHT_PX))
     return np.asarray(change - light, np.float32)
 
 
 def to_given(point_px: tuple[float, float], scale: tuple[float, float]) -> tuple[float, float]:
-    """Return where a point of the small image lies in the image given."""
+    """Return the position of a point of the small image in the original image."""
     return (point_px[0] + 0.5) / scale[0] - 0.5, (point_px[1] + 0.5) / scale[1] - 0.5
 
 
 def middle(values: Floats) -> float:
-    """Return the upper median of (n,) values, n > 0: five times the speed of numpy's own."""
+    """Return the upper median of (n,) values, n > 0; five times faster than NumPy's."""
     half = len(values) // 2
     return float(np.partition(values, half)[half])

@@ -1,9 +1,9 @@
-"""The affine motion of a patch, refined on the brightness of its own pixels.
+"""Affine motion of a patch, refined on the brightness of its own pixels.
 
-Flow is found from patches that reach over a thing's edge, where they mix its motion with
-the ground's; of a small thing that is most of it. Here one affine map is fitted to all its
-pixels at once (inverse compositional alignment, Baker and Matthews 2004), with Tukey's
-weights, so that pixels of the ground drop out, first on blurred and then on sharp images.
+Flow is computed on patches that extend over a thing's edge, where its motion mixes with that of the
+background; for a small thing that is most of it. So one affine map is fitted to all its pixels
+(inverse compositional alignment, Baker and Matthews 2004), with Tukey's weights, which exclude
+pixels of the background, first on blurred and then on sharp images.
 """
 
 from typing import NamedTuple
@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, middle
 from gazerig.drivers.vision.motion.optical_flow import Compared, moved
 
-# (blur in pixels, most steps) at the level of each image: what is off by more is not found.
+# (blur in pixels, most steps) at the level of each image; larger errors are not corrected.
 _LEVELS = ((1.25, 8), (1.0, 6))
 _TUKEY = 4.685
 _LEAST_POINTS = 24
-# Grey levels: what pixels are off by at best.
+# Smallest noise of pixels, grey levels.
 _LEAST_NOISE = 1.0
-# A step that moves no pixel by more is the last.
+# The iteration ends at a step that moves no pixel by more than this.
 _SMALL_PX = 0.02
-# Spread of what flow is off by: its slide (pixels) and, a patch's radius away, its slopes.
+# Standard deviations of the error of flow: its slide (pixels) and its slopes at a patch's radius.
 _SLIDE_SD_PX, _SLOPE_SD_PX = 2.0, 3.0
-# Neighbouring pixels of blurred images say the same: so many are one measurement.
+# Neighbouring pixels of blurred images are correlated: this number is one measurement.
 _ALIKE = 12.0
-# Weak beliefs in the start; brightness may differ as it likes.
+# Weak prior on the start; none on brightness.
 _BELIEF = np.diag([_SLOPE_SD_PX**-2.0] * 4 + [_SLIDE_SD_PX**-2.0] * 2 + [1e-9])
-# A homography is taken to be affine within a patch; its slopes are found so far apart.
+# A homography counts as affine within a patch; distance at which its slopes are computed.
 _STEP_PX = 8.0
 _AROUND = np.array([(0.0, 0.0), (_STEP_PX, 0.0), (0.0, _STEP_PX)])
 _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
@@ -37,7 +37,7 @@ _EDGE = cv2.BORDER_REPLICATE
 
 
 class Back(NamedTuple):
-    """An affine map of places now to places in the older image, the camera's motion taken out.
+    """An affine map from present positions to earlier ones, without the camera's motion.
 
     matrix: (2, 2); shift: (2,): x -> centre + matrix (x - centre) + shift
     slope_sd: standard deviation of the matrix's numbers, root mean square
@@ -49,7 +49,7 @@ class Back(NamedTuple):
 
 
 class Level(NamedTuple):
-    """Two blurred images, and how many of their pixels are one of those searched for flow."""
+    """Two blurred images, and their scale relative to the images searched for flow."""
 
     now: Plane
     before: Plane
@@ -58,7 +58,7 @@ class Level(NamedTuple):
 
 
 def levels(pair: Compared) -> tuple[Level, ...]:
-    """Blur the images once for all patches: as they were searched, then as fine as they are."""
+    """Blur the images once for all patches: at the searched size, then at the fine size."""
     (coarse_px, coarse_steps), (fine_px, fine_steps) = _LEVELS
     fine, scale = pair.fine, pair.fine[0].shape[0] / pair.now.shape[0]
     return (
@@ -68,16 +68,16 @@ def levels(pair: Compared) -> tuple[Level, ...]:
 
 
 class Room(NamedTuple):
-    """Where still things are in the older image.
+    """Map of still things to the older image.
 
-    B: (3, 3) pixels now to pixels there; shift: (2,) besides, at the distance of the patch
+    B: (3, 3) present pixels to older ones; shift: (2,) additional, at the distance of the patch
     """
 
     B: Floats
     shift: Floats
 
     def near(self, centre: Floats) -> tuple[Floats, Floats]:
-        """Return (2, 2) and (2,): the map around a place, x -> there + slope (x - centre)."""
+        """Return (2, 2) and (2,): the map around a position, x -> there + slope (x - centre)."""
         at = moved(self.B, centre + _AROUND)
         return ((at[1:] - at[0]) / _STEP_PX).T, at[0] + self.shift
 
@@ -85,7 +85,7 @@ class Room(NamedTuple):
 def refined(
     start: Back, places: Floats, centre: Floats, frames: tuple[Level, ...], room: Room
 ) -> Back:
-    """Refine a map on the pixels at ``places``, (n, 2); the start itself where that fails."""
+    """Refine a map on the pixels at ``places``, (n, 2); return the start itself if that fails."""
     arms = places - centre
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))
     if len(places) < _LEAST_POINTS:
@@ -109,10 +109,10 @@ def _aligned(
     slope: Floats,
     there: Floats,
 ) -> Back | None:
-    """Refine at one level; None where it leads away or to nothing better."""
+    """Refine at one level; return None if it diverges or does not improve."""
     scale = level.scale
     at = _at(arms + centre, scale).astype(np.intp)
-    # Whole pixels: where they are exactly.
+    # Exact positions of the whole pixels.
     arms = (at + 0.5) / scale - 0.5 - centre
     wanted, slopes = _template(level.now, at, arms / size)
     matrix, shift = start.matrix, start.shift
@@ -147,12 +147,12 @@ def _aligned(
 
 
 def _at(places: Floats, scale: float) -> Floats:
-    """Return places of the image that was searched in a level's pixels."""
+    """Return positions of the searched image in a level's pixels."""
     return places if scale == 1.0 else (places + 0.5) * scale - 0.5
 
 
 def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, Floats]:
-    """Return brightness (n,), and (n, 7) how it changes with the map's numbers and with light."""
+    """Return brightness (n,), and its derivatives (n, 7) by the map's numbers and by light."""
     height, width = now.shape
     x, y = at.T
     right, left = np.minimum(x + 1, width - 1), np.maximum(x - 1, 0)
@@ -165,7 +165,7 @@ def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, F
 
 
 def _weighed(errors: Floats) -> tuple[float, Floats]:
-    """Return the noise of errors, the mean apart, and Tukey's weights."""
+    """Return the noise of errors without their mean, and Tukey's weights."""
     apart = np.abs(errors - middle(errors))
     noise = max(_LEAST_NOISE, 1.4826 * middle(apart))
     return noise, np.maximum(1.0 - (apart / (_TUKEY * noise)) ** 2, 0.0) ** 2

@@ -1,9 +1,8 @@
-"""Optical flow between two images, of which the older is first turned as the camera was.
+"""Optical flow between two images, of which the older is first turned like the camera.
 
-Dense inverse search (Kroeger et al. 2016) finds motions of some 20 px; a head turns by
-more between two images. What is known of the turn is taken out before the search, so
-that only what the joints do not know is left to it. The flow stands at the pixels of the
-newer image: where a thing is counts now, not where it was.
+Dense inverse search (Kroeger et al. 2016) finds motions of some 20 px; a head turns by more between
+two images. The known turn is removed before the search, so that it only has to find the rest. The
+flow is defined at the pixels of the newer image, as the present position of a thing matters.
 """
 
 from typing import NamedTuple
@@ -18,18 +17,18 @@ Mask = NDArray[np.bool_]
 Flow = NDArray[np.float32]
 """(height, width, 2): x right, y down, pixels."""
 
-# Below 8 px at the finest level of its pyramid, a quarter of the image, DIS reads
-# outside its memory; how it counts its levels has changed with the versions of OpenCV.
+# Below 8 px at the finest level of its pyramid, a quarter of the image, DIS reads outside its
+# memory; its count of levels depends on the version of OpenCV.
 _LARGEST_ASPECT = 4.0
 _PRESETS = {
     "ultrafast": cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST,
     "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,
     "medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM,
 }
-# So far around what has changed flow is searched, unless that is so much of the image.
+# Margin around changes in which flow is computed, and share of the image above which all of it is.
 _AROUND_PX, _MOST_SHARE = 8, 0.7
 _STILL_PX = 0.02
-"""A turn that moves no corner by more is none."""
+"""Largest motion of the corners that does not count as a turn."""
 
 
 Window = tuple[slice, slice]
@@ -37,16 +36,16 @@ Window = tuple[slice, slice]
 
 
 class Compared(NamedTuple):
-    """Two images, laid over each other as far as the joints know how.
+    """Two images, aligned by the turn that the joints measured.
 
     now: the newer image
     before: the older one, turned as predicted
-    known: where it shows anything, and the flow does not lead out of it
-    flow: what is at x in ``now`` is at x + flow in ``before``
+    known: mask of its valid pixels whose flow stays inside
+    flow: a point at x in ``now`` is at x + flow in ``before``
     H: (3, 3) pixels of the older image to those of ``before``
-    fine: the same two images before they were made small for the search
-    windows: where flow was searched; elsewhere it is 0
-    shift: (h, w, 2) part of the flow that still things have by their distance; None for none
+    fine: the same two images before they were scaled for the search
+    windows: parts in which flow was computed; elsewhere it is 0
+    shift: (h, w, 2) flow of still things by parallax; None for none
     """
 
     now: Grey
@@ -70,21 +69,21 @@ class Compared(NamedTuple):
 
 
 class FlowSearch:
-    """DIS with its memory, for images of any size that it can bear."""
+    """DIS with its buffers, for images of any supported size."""
 
     def __init__(self, preset: str) -> None:
         self._dis = cv2.DISOpticalFlow.create(_PRESETS[preset])
         self._dis.setFinestScale(0)
 
     def search(self, pair: Compared, windows: tuple[Window, ...] | None = None) -> Compared:
-        """Find what moved within parts of the images; None: everywhere."""
+        """Compute the flow in parts of the images; None: everywhere."""
         if windows is None:
             windows = ((slice(0, pair.now.shape[0]), slice(0, pair.now.shape[1])),)
         flow: Flow = np.zeros((*pair.now.shape, 2), dtype=np.float32)
         known = pair.known.copy()
         for window in windows:
             now, before = (np.ascontiguousarray(grey[window]) for grey in (pair.now, pair.before))
-            found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # the guess, then the answer
+            found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # initial guess, then result
             self._dis.calc(now, before, found)
             flow[window] = found
             known[window] &= _inside(flow[window])
@@ -92,7 +91,7 @@ class FlowSearch:
 
 
 def laid(now: SmallImage, before: SmallImage, H: Floats) -> Compared:
-    """Lay two images over each other, the older being turned by ``H``; their flow is 0 as yet."""
+    """Align two images by turning the older one by ``H``; their flow is still 0."""
     grey, known = _turned(before.grey, H)
     fine = grey
     if before.fine is not before.grey:
@@ -102,10 +101,10 @@ def laid(now: SmallImage, before: SmallImage, H: Floats) -> Compared:
 
 
 def windows_of(changed: Mask) -> tuple[Window, ...] | None:
-    """Return the parts of an image in which something changed, None for all of it.
+    """Return the parts of an image that changed, None for all of it.
 
     Args:
-        changed: (h, w).
+        changed: Mask (h, w).
     """
     height, width = changed.shape
     cells = cv2.resize(
@@ -123,23 +122,23 @@ def windows_of(changed: Mask) -> tuple[Window, ...] | None:
 
 
 def _widened(start: int, length: int, most: int) -> slice:
-    """Return a stretch of an image, at least as long as flow can be searched in."""
+    """Return a range of an image, at least as long as the flow search needs."""
     more = max(0, LEAST_SIDE_PX - length)
     start = max(0, min(start - more // 2, most - length - more))
     return slice(start, min(most, start + length + more))
 
 
 def searchable(grey: Grey) -> bool:
-    """Return whether a image is large enough, and shaped so, that flow can be found in it."""
+    """Return whether an image has a size and shape in which flow can be computed."""
     short, long = sorted(grey.shape)
     return bool(short >= LEAST_SIDE_PX and long <= _LARGEST_ASPECT * short)
 
 
 def turn_homography(R_now_before: Floats | None, now: SmallImage, before: SmallImage) -> Floats:
-    """Return how pixels move when the camera turns about its lens: K R K^-1.
+    """Return the homography of a turn of the camera about its lens: K R K^-1.
 
-    R_now_before: (3, 3) turns directions from the older camera's axes into the newer's;
-        None, or what is no number, counts as no turn
+    R_now_before: (3, 3) turns directions from the older camera's axes into the newer's; None or not
+        a number counts as no turn
     """
     if R_now_before is None or not np.isfinite(R_now_before).all():
         return np.eye(3)
@@ -148,7 +147,7 @@ def turn_homography(R_now_before: Floats | None, now: SmallImage, before: SmallI
 
 
 def moved(H: Floats, points_px: Floats) -> Floats:
-    """Return where a homography takes (n, 2) points; infinite where it takes them behind us."""
+    """Return points (n, 2) after a homography; infinite if they are behind the camera."""
     homogeneous = points_px @ H[:, :2].T + H[:, 2]
     depth = homogeneous[:, 2:]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -157,13 +156,13 @@ def moved(H: Floats, points_px: Floats) -> Floats:
 
 
 def corners(shape: tuple[int, ...]) -> Floats:
-    """Return the middles of a image's four corner pixels, (4, 2)."""
+    """Return the centres of an image's four corner pixels, (4, 2)."""
     height, width = shape[:2]
     return np.array([(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)], float)
 
 
 def gradients(grey: Grey) -> tuple[Plane, Plane]:
-    """Return how brightness changes with x and y, grey levels a pixel, (h, w) each."""
+    """Return the gradients of brightness by x and y, grey levels per pixel, (h, w) each."""
     gx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, scale=0.125)
     return np.asarray(gx, np.float32), np.asarray(
         cv2.Sobel(grey, cv2.CV_32F, 0, 1, scale=0.125), np.float32
@@ -171,12 +170,12 @@ def gradients(grey: Grey) -> tuple[Plane, Plane]:
 
 
 def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
-    """Turn a image, and tell which of its pixels are known afterwards."""
+    """Turn an image; return it with a mask of its known pixels."""
     at = corners(grey.shape)
     height, width = grey.shape
     if np.abs(moved(H, at) - at).max() < _STILL_PX:
         return grey, np.ones(grey.shape, dtype=np.bool_)
-    # The edge is continued: what is not known must not look like an edge to the search.
+    # The edge is replicated, as unknown pixels must not look like an edge to the search.
     turned = cv2.warpPerspective(grey, H, (width, height), borderMode=cv2.BORDER_REPLICATE)
     white = np.full(grey.shape, 255, dtype=np.uint8)
     known = cv2.warpPerspective(white, H, (width, height)) == 255
@@ -184,7 +183,7 @@ def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
 
 
 def _finer(H: Floats, scale: float) -> Floats:
-    """Return a homography of pixels in those of an image with so many more of them."""
+    """Return a homography in pixels of an image that is larger by a factor."""
     S = np.array(
         [[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5], [0.0, 0.0, 1.0]]
     )
@@ -193,7 +192,7 @@ def _finer(H: Floats, scale: float) -> Floats:
 
 
 def _inside(flow: Flow) -> Mask:
-    """Return which pixels the flow leads to a pixel of the other image."""
+    """Return a mask of the pixels whose flow ends inside the other image."""
     height, width = flow.shape[:2]
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
     at_x: Plane = flow[..., 0] + x

@@ -1,8 +1,8 @@
-"""How still things move in the image when the lens itself moves, by their distance.
+"""Parallax: motion of still things in the image when the lens itself moves, by their distance.
 
-A neck turns about an axis some centimetres behind the lens: what is near then passes what
-is far. With the older image turned as predicted, a point that is at X now, in the axes
-of now, was seen at X - t, whatever it is part of; its depth says by how much that differs.
+A neck turns about an axis some centimetres behind the lens, so near things move relative to far
+ones. With the older image turned as predicted, a point that is now at X, in the present axes, was
+seen at X - t; the effect depends on its depth.
 """
 
 import numpy as np
@@ -10,19 +10,19 @@ import numpy as np
 from gazerig.drivers.vision.motion.image import Floats, Plane
 from gazerig.drivers.vision.motion.optical_flow import Flow
 
-# Nearer than this no lens is sharp, and depth cameras invent.
+# At shorter distances no lens is sharp, and depth cameras return invalid values.
 _NEAREST_M = 0.1
-# A lens that moves less than this between two images stands.
+# A lens that moves less than this between two images is at rest.
 _STILL_M = 1e-4
 
 
 def parallax(depth_m: Plane | None, K: Floats, t_now_before_m: Floats | None) -> Flow | None:
-    """Return how far still things are from their place now in the older image, (h, w, 2).
+    """Return the displacement of still things in the older image, (h, w, 2), pixels.
 
-    depth_m: (h, w), NaN where unknown: there the image's middle distance is taken
-    t_now_before_m: (3,) where the lens was, seen from where it is, in its axes of now
+    depth_m: (h, w), NaN if unknown: the image's median distance is used there
+    t_now_before_m: (3,) earlier position of the lens relative to the present one, in present axes
 
-    None where the lens stands, or nothing is known of depth or motion.
+    The result is None if the lens is at rest, or depth or motion are unknown.
     """
     if depth_m is None or t_now_before_m is None or not np.isfinite(t_now_before_m).all():
         return None

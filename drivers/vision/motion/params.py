@@ -11,11 +11,11 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class MotionParams:
-    """How finely, how carefully and how much of what moves is looked for."""
+    """Resolution, thresholds and limits of motion detection."""
 
     # fmt: off
     enabled: Annotated[bool, "detect moving things besides faces"] = True
-    gloves: Annotated[bool, "red boxing gloves are found by their colour, also while they stand still"] = False
+    gloves: Annotated[bool, "red boxing gloves are found by their colour, also while they do not move"] = False
     work_px: Annotated[int, Bounds(64, 2048), "frames whose longer side exceeds this are scaled down to it"] = 320
     preset: Annotated[Literal["ultrafast", "fast", "medium"],
         "preset of the optical flow (DIS); the slower presets smooth the flow more, which loses small things"] = "ultrafast"

@@ -1,9 +1,9 @@
-"""Which pixels move on their own: what is left of the flow, where the images bear it out.
+"""Segmentation of independently moving pixels: residual flow that the images confirm.
 
-Flow is found everywhere, in plain walls too, where it means nothing. A pixel counts when
-its flow differs from the camera's, when the camera's own motion does not explain the newer
-image there, and when the flow does. Light that flickers, shadows' edges apart, changes the
-image and is no better explained by any flow.
+Flow is computed everywhere, even on plain walls, where it has no meaning. A pixel counts if its
+flow differs from the camera's, if the camera's own motion does not explain the newer image there,
+and if the flow does. Flickering light, except for edges of shadows, changes the image and is not
+explained by any flow.
 """
 
 from typing import NamedTuple
@@ -16,35 +16,35 @@ from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, light_apart
 from gazerig.drivers.vision.motion.optical_flow import Compared, Flow, Mask, gradients
 from gazerig.drivers.vision.motion.params import MotionParams
 
-# Where brightness is compared: wide enough to average noise, narrow enough for a hand.
+# Window in which brightness is compared: wide enough to average noise, narrow enough for a hand.
 _WINDOW_PX = 3
-# Where edges and light are.
+# Window for edges and light.
 _NEAR_PX = 5
-# Of the change that the camera does not explain, what the flow may leave.
+# Largest residual of the flow, as a share of the change that the camera does not explain.
 _LEFT_SHARE = 0.5
-# How far above the noise a change must be (variances), and a grey level for rounding.
+# Smallest ratio of a change to the noise (variances), and a grey level for rounding.
 _NOISE_RATIO, _ROUNDING = 3.0, 1.0
-# How much less far than the room a still thing moves that is behind most of it, as a share.
+# Share by which a still thing behind most of the room moves less than the room.
 _BEHIND = 0.03
-# Of a motion, the share that must lead across the edges there.
+# Share of a motion that must be across the edges there.
 _ACROSS = 0.15
-# How far flow smears over an edge.
+# Distance by which flow smears over an edge.
 _SMEAR_PX = 9
-# Grey levels: darker than this, relative changes are noise.
+# Grey level below which relative changes are noise.
 _DARK = np.float32(8.0)
-# A camera that moved the image by less stands.
+# A camera that moved the image by less is at rest.
 _STANDS_PX = 0.01
 _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
 _EDGE = cv2.BORDER_REPLICATE
 
 
 class Things(NamedTuple):
-    """What moves on its own.
+    """Independent motion in an image.
 
-    flow: (h, w, 2) motion from the older image to the newer, the camera's taken out, pixels
-    mask: (h, w) where that is believed
-    threshold_px: least motion that was believed
-    change: (h, w) square of the relative change of brightness, light apart; None: not asked
+    flow: (h, w, 2) motion from the older image to the newer, without the camera's, pixels
+    mask: (h, w) pixels with confirmed motion
+    threshold_px: smallest detectable motion
+    change: (h, w) square of the relative change of brightness, without light; None: not computed
     """
 
     flow: Flow
@@ -54,10 +54,10 @@ class Things(NamedTuple):
 
 
 class Unlike(NamedTuple):
-    """How unlike the older image is where the room stands still.
+    """Difference between the images, with the room at rest.
 
     squares: (h, w) local mean of squares, grey levels
-    noise: what is usual of them
+    noise: their usual value
     """
 
     squares: Plane
@@ -65,7 +65,7 @@ class Unlike(NamedTuple):
 
     @property
     def changed(self) -> Mask:
-        """Return where more has changed than by noise."""
+        """Return a mask of changes above the noise."""
         return self.squares > _NOISE_RATIO * self.noise
 
 
@@ -73,8 +73,8 @@ def unlike(pair: Compared, there: Flow | None = None) -> Unlike:
     """Compare two images.
 
     Args:
-        pair: the images.
-        there: (h, w, 2) where still things are in the older one; None: at their place.
+        pair: The images.
+        there: Positions (h, w, 2) of still things in the older one; None: unchanged.
     """
     squares = _squares(pair.now, pair.before, there)
     return Unlike(squares, _ROUNDING + float(np.quantile(squares[::4, ::4], 0.3)))
@@ -87,16 +87,15 @@ def what_moves(
     by_image: bool = False,
     still: Unlike | None = None,
 ) -> Things:
-    """Return the flow without ego-motion, where both frames confirm it.
+    """Return the flow without ego-motion, masked by confirmation from both frames.
 
     Args:
-        pair: the two images and their flow.
-        ego: the camera's own motion.
-        params: thresholds.
-        by_image: the image alone told that motion. What moves otherwise than a still thing nearer
-            than the room would, against the room or across its motion, then counts from the
-            least motion on.
-        still: how unlike they are, where the room keeps its place in the older image.
+        pair: The two images and their flow.
+        ego: The camera's own motion.
+        params: Thresholds.
+        by_image: Whether only the image shows that motion. In that case any motion that a still,
+            nearer thing cannot have (against the room or across its motion) counts.
+        still: Their difference, if the room keeps its position in the older image.
     """
     there = None if still is not None and pair.shift is None else _there(pair, ego)
     if still is None or pair.shift is not None:
@@ -130,7 +129,7 @@ def what_moves(
 
 
 def _there(pair: Compared, ego: Ego) -> Flow:
-    """Return where still things are in the older image, (h, w, 2)."""
+    """Return the positions of still things in the older image, (h, w, 2)."""
     there = _background(ego.B, pair.now.shape)
     if pair.shift is not None:
         there += pair.shift
@@ -138,9 +137,9 @@ def _there(pair: Compared, ego: Ego) -> Flow:
 
 
 def _solid(pair: Compared, there: Flow | None) -> Plane:
-    """Return the square of the relative change of brightness, light apart, (h, w).
+    """Return the square of the relative change of brightness, without light, (h, w).
 
-    A shadow darkens alike all that lies near each other; a thing brings its own edges.
+    A shadow darkens neighbouring pixels alike; a thing has its own edges.
     """
     seen = _through(pair.before, there)
     change: Plane = np.log((pair.now + _DARK) / (seen + _DARK)).astype(np.float32)
@@ -149,9 +148,9 @@ def _solid(pair: Compared, there: Flow | None) -> Plane:
 
 
 def _across(now: Grey, moves: Flow, threshold_px: float) -> Mask:
-    """Return where things move across their edges: along a straight edge no motion shows.
+    """Return a mask of motion across edges: along a straight edge no motion is visible.
 
-    Compression shifts what little texture there is along an edge to and fro.
+    Compression shifts the weak texture along an edge back and forth.
     """
     gx, gy = gradients(now)
     window = _NEAR_PX, _NEAR_PX
@@ -165,7 +164,7 @@ def _across(now: Grey, moves: Flow, threshold_px: float) -> Mask:
 
 
 def _jumps(shift: Flow | None) -> Plane | float:
-    """Return by how much still neighbours part, (h, w): flow there may be the other's."""
+    """Return the relative motion of still neighbours, (h, w): flow there may be the neighbour's."""
     if shift is None:
         return 0.0
     ends = cv2.morphologyEx(shift, cv2.MORPH_GRADIENT, np.ones((_SMEAR_PX, _SMEAR_PX), np.uint8))
@@ -173,15 +172,15 @@ def _jumps(shift: Flow | None) -> Plane | float:
 
 
 def _nearer(rest: Flow, ego: Ego, most: float) -> Flow:
-    """Return how much of a motion could be that of a still thing nearer than the room, (h, w, 2).
+    """Return the part of a motion that a still thing nearer than the room could have, (h, w, 2).
 
-    A lens that turns also moves aside, so that what is near moves along with the room and farther,
-    and what is behind it a little less far.
+    A lens that turns also moves sideways, so near things move like the room but farther, and things
+    behind it a little less.
 
     Args:
-        rest: (h, w, 2) motion besides the room's.
-        ego: the camera's own motion.
-        most: how much farther a thing may move, as a share of the room's motion.
+        rest: Motion (h, w, 2) in addition to the room's.
+        ego: The camera's own motion.
+        most: Largest additional motion of a thing, as a share of the room's motion.
     """
     room = -_background(np.asarray(np.linalg.inv(ego.total)), rest.shape[:2])
     room = _added(room, 1.0)
@@ -194,18 +193,18 @@ def _nearer(rest: Flow, ego: Ego, most: float) -> Flow:
 def _dot(a: Flow, b: Flow) -> Plane:
     """Return the scalar products of two flows, (h, w).
 
-    Over an axis of two, ``sum`` takes several times as long as one addition.
+    Over an axis of length two, ``sum`` takes several times as long as one addition.
     """
     out: Plane = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
     return out
 
 
 def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
-    """Return where the still room's pixels lie in the older image, (h, w, 2).
+    """Return the positions of the still room's pixels in the older image, (h, w, 2).
 
     Args:
-        B: (3, 3) pixels of the newer image to those of the older.
-        shape: of the images.
+        B: Homography (3, 3) from pixels of the newer image to those of the older.
+        shape: Shape of the images.
     """
     height, width = shape
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
@@ -215,10 +214,11 @@ def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
 
 
 def _borne_out(pair: Compared, still: Plane, noise: float, rest: Flow) -> Mask:
-    """Return where the flow explains the newer image and the camera's motion does not.
+    """Return a mask of pixels that the flow explains and the camera's motion does not.
 
-    Ground that a thing has left changed too, and plain ground is explained by any flow; but
-    it "came" from where nothing has changed, while a thing has left where it came from.
+    Background that a thing has uncovered changed too, and any flow explains plain background. But
+    its flow begins at unchanged pixels, while the flow of a thing begins at pixels that it has
+    left.
     """
     moving = _squares(pair.now, pair.before, _added(pair.flow, 1.0))
     left = cv2.remap(still, _added(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
@@ -228,7 +228,7 @@ def _borne_out(pair: Compared, still: Plane, noise: float, rest: Flow) -> Mask:
 
 
 def _added(flow: Flow, sign: float) -> Flow:
-    """Return each pixel's own place with its flow added, or taken away."""
+    """Return each pixel's position plus or minus its flow."""
     out: Flow = np.float32(sign) * flow
     out[..., 0] += np.arange(out.shape[1], dtype=np.float32)
     out[..., 1] += np.arange(out.shape[0], dtype=np.float32)[:, None]
@@ -236,13 +236,13 @@ def _added(flow: Flow, sign: float) -> Flow:
 
 
 def _squares(now: Grey, before: Grey, there: Flow | None) -> Plane:
-    """Return how unlike the older image is, seen through a map: a local mean of squares."""
+    """Return the local mean square difference from the older image, seen through a map."""
     off = light_apart(now.astype(np.float32) - _through(before, there))
     return np.asarray(cv2.blur(off * off, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 
 def _through(before: Grey, there: Flow | None) -> Plane:
-    """Return the older image seen through a map; None: as it is."""
+    """Return the older image seen through a map; unchanged for None."""
     grey = before.astype(np.float32)
     if there is None:
         return grey

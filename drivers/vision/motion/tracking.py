@@ -1,7 +1,7 @@
-"""Which moving patch is which from image to image, in the image alone.
+"""Tracking of moving patches from image to image, in image coordinates.
 
-Each is looked for where its last motion, and the camera's, should have taken it. Nearest
-pairs are joined first; a thing must be seen in a few images in a row before it is reported.
+Each is expected where its last motion, and the camera's, should have moved it. Nearest pairs are
+matched first; a thing must be detected in a few consecutive images before it is reported.
 """
 
 from dataclasses import dataclass
@@ -12,22 +12,22 @@ from gazerig.drivers.vision.motion.image import Floats
 from gazerig.drivers.vision.motion.optical_flow import moved
 from gazerig.drivers.vision.motion.params import MotionParams
 
-# Farthest from its expected place, in sizes (the root of box width by height).
+# Largest distance from the expected position, in sizes (root of box width times height).
 _GATE_SIZES = 0.75
 _LEAST_GATE_PX = 5.0
-# Two that are joined may differ so much in the root of their area: a thing shows more or
-# less of itself, a person does not become a hand.
+# Largest ratio of the sizes of a matched pair: the visible part of a thing varies, but a person
+# does not become a hand.
 _LARGEST_GROWTH = 3.0
 
 
 @dataclass(slots=True)
 class PatchTrack:
-    """One patch through time, in pixels of the small image.
+    """Track of one patch, in pixels of the small image.
 
     centre: (2,); velocity_px_s: (2,)
-    offset: (2,) from there to the point of it that was reported last
+    offset: (2,) from the centre to its last reported point
     size_px: root of the box's area
-    seen: images in a row
+    seen: number of consecutive images
     """
 
     id: int
@@ -40,7 +40,7 @@ class PatchTrack:
 
 
 class MotionTracks:
-    """Numbers for moving patches that last from image to image."""
+    """Tracks of moving patches with persistent ids."""
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
@@ -60,7 +60,7 @@ class MotionTracks:
         t_s: float,
         dt_s: float,
     ) -> list[PatchTrack]:
-        """Join one image's patches to those followed: one for each, in their order.
+        """Match one image's patches to the tracks; return one track for each, in their order.
 
         total: (3, 3) homography of the camera's own motion, older image to newer
         """
@@ -83,7 +83,7 @@ class MotionTracks:
         seen_now = {follow.id for follow in found.values()}
         for follow in self._follows:
             if follow.id not in seen_now and follow.seen < self._params.confirm_frames:
-                follow.seen = 0  # a flicker, not a thing: it starts again
+                follow.seen = 0  # a flicker, not a thing: count again
         return [found[j] for j in range(len(centres))]
 
     def predict(self, total: Floats, t_s: float, dt_s: float) -> None:
@@ -96,22 +96,22 @@ class MotionTracks:
                 follow.centre = at
 
     def forget(self) -> None:
-        """Forget everything; numbers are not used again."""
+        """Discard all tracks; ids are not reused."""
         self._follows = []
 
     def confirmed(self, follow: PatchTrack) -> bool:
-        """Return whether a patch has been seen often enough."""
+        """Return whether a patch has been detected often enough."""
         return follow.seen >= self._params.confirm_frames
 
     def _begun(self, centre: Floats, t_s: float) -> PatchTrack:
-        """Begin to follow something new."""
+        """Begin a new track."""
         follow = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
         self._next_id += 1
         self._follows.append(follow)
         return follow
 
     def _pairs(self, centres: list[Floats], sizes_px: list[float]) -> list[tuple[float, int, int]]:
-        """List who may be who, with their distance as a share of the gate."""
+        """Return possible pairs of tracks and patches; their distance is a share of the gate."""
         pairs = []
         for i, follow in enumerate(self._follows):
             for j, centre in enumerate(centres):
