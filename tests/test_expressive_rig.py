@@ -96,7 +96,7 @@ def test_it_is_exported_and_reported(
     ("words", "code", "said"),
     [
         (("check", "expressive"), 0, "good: rig 'expressive', 9 joints"),
-        (("scan", "--mock", "--rig", "expressive", "--kind", "feetech"), 0, "9 servos on"),
+        (("scan", "expressive", "--mock", "--kind", "feetech"), 0, "9 servos on"),
         (("setup", "expressive", "--mock", "--joint", "jaw", "--yes"), 0, "jaw (servo 7): id 1 -> 7"),
         (("monitor", "expressive", "--mock", "--seconds", "0.3"), 0, "right_brow"),
         (("jog", "expressive", "jaw", "40", "--mock"), 2, "jaw"),
