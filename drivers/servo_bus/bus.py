@@ -82,6 +82,7 @@ class SmartServoBus(PortBus):
             {setup.id: setup.label() for setup in setups},
         )
         self._damaged = 0
+        self._unconfirmed: set[int] = set()
         self._assemble(None)
 
     def _assemble(self, firmware: Mapping[int, int] | None) -> None:
@@ -130,6 +131,7 @@ class SmartServoBus(PortBus):
         if replies and self._health.silent_for_s(now_s) >= RESTART_S:
             # All were silent together: their power may have been cut.
             supervisor.mark_all_for_recovery()
+        answered = bool(replies)
         if self._family.weak_check:
             replies = self._confirm_doubtful(replies, now_s)
         believed, dark = feedback.all_plausible(replies), not self._poll_list.group
@@ -156,7 +158,11 @@ class SmartServoBus(PortBus):
                 self._line.errors["implausible"] += 1
         supervisor.record_out(self._poll_list.out, now_s)
         self._health.record_silent(
-            self._poll_list.out, now_s, self._poll_list.garbling, self._line.lateness, bool(replies)
+            {*self._poll_list.out, *self._unconfirmed},
+            now_s,
+            self._poll_list.garbling | self._unconfirmed,
+            self._line.lateness,
+            answered,
         )
 
     def _disturbed(self, now_s: float) -> bool:
@@ -189,6 +195,8 @@ class SmartServoBus(PortBus):
                 kept[servo_id] = both
             else:
                 self._line.errors["unconfirmed"] += 1
+                self._unconfirmed.add(servo_id)
+        self._unconfirmed -= {*kept, *self._poll_list.out}
         return kept
 
     def _send_to_others(self, withheld: Collection[int], goals: Sequence[int]) -> None:
