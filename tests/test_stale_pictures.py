@@ -12,7 +12,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.types import Camera, Detections
 from gazerig.gaze.angles import angle_between, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app import run_scene
+from gazerig.robot.app import run_rig
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
@@ -83,7 +83,7 @@ class Unplugged:
 
 def watched(scene: Passer, patch: pytest.MonkeyPatch) -> tuple[Rig, list[Tick]]:
     """Run the rig before a scene, its camera unplugged for a while."""
-    patch.setattr(run_scene, "scenes", lambda: {scene.name: scene})
+    patch.setattr(run_rig, "scenes", lambda: {scene.name: scene})
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     options = RunOptions(mock=True, fast=True, seed=3, scene=scene.name)

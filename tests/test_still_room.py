@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app import run_scene
+from gazerig.robot.app import run_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
@@ -41,7 +41,7 @@ class Room:
 
 def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]:
     """Run a rig that hardly rests between glances around, with all of the head in each."""
-    patch.setattr(run_scene, "scenes", lambda: {room.name: room})
+    patch.setattr(run_rig, "scenes", lambda: {room.name: room})
     rig = load_rig("desk")
     idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_salience=1.0)
     head = replace(rig.gaze.head, eye_only_range_deg=6.0, head_slope=1.0)

@@ -17,7 +17,7 @@ import pytest
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
-from gazerig.robot.app import run_scene
+from gazerig.robot.app import run_rig
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.control.tick import Tick
@@ -169,13 +169,13 @@ def half_rate_run(
 @contextmanager
 def _scenes(scene: str | Scene) -> Any:
     """Have a scene of a test's own among those that a run can be put into."""
-    shipped = run_scene.scenes
+    shipped = run_rig.scenes
     if not isinstance(scene, str):
-        run_scene.scenes = lambda: {**shipped(), scene.name: scene}
+        run_rig.scenes = lambda: {**shipped(), scene.name: scene}
     try:
         yield
     finally:
-        run_scene.scenes = shipped
+        run_rig.scenes = shipped
 
 
 def _run(
@@ -193,7 +193,7 @@ def _run(
     rig = changed(
         with_options(load_rig(options.rig, options.character, options.profile), options), overrides
     )
-    columns, held = _Columns(), run_scene.scenes()[scene]
+    columns, held = _Columns(), run_rig.scenes()[scene]
     made = simulate(rig, options, watch=columns.update)
     return columns.gathered(held, made.trace, made.figures)
 

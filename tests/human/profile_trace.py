@@ -14,7 +14,7 @@ import pytest
 
 from gazerig.config.parameters import changed, value_of
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app import run_scene
+from gazerig.robot.app import run_rig
 from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
@@ -94,18 +94,18 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     """Return what runs in a profile, and what it looks at."""
     calls, kinds = Profile(subcalls=False, builtins=False), set[str]()
     scene = EverythingOnce()
-    shipped = run_scene.scenes
+    shipped = run_rig.scenes
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
     rig = changed(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
-    run_scene.scenes = lambda: {**shipped(), scene.name: scene}
+    run_rig.scenes = lambda: {**shipped(), scene.name: scene}
     calls.enable()
     try:
         simulate(rig, options, watch=lambda tick: kinds.add(tick.target.kind))
     finally:
         calls.disable()
-        run_scene.scenes = shipped
+        run_rig.scenes = shipped
     named: Counter[str] = Counter()
     for code, times, *_ in calls.getstats():
         if isinstance(code, CodeType) and "gaze" in Path(code.co_filename).parts:
