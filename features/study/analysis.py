@@ -1,4 +1,4 @@
-"""A study as a whole: who took part, what was measured in each condition, and what was decided."""
+"""Analysis of a whole study: participants, measures of each condition, and decisions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -39,9 +39,9 @@ class ConditionSummary:
 
 @dataclass(frozen=True)
 class MeasureSummary:
-    """A rating, the mean of a scale, or an objective measure.
+    """Summary of a rating, the mean of a scale, or an objective measure.
 
-    counts: (conditions, points) how often each point was answered; None of other measures
+    counts: (conditions, points) number of answers at each point; None for other measures
     alpha: Cronbach's, of a scale
     """
 
@@ -54,11 +54,11 @@ class MeasureSummary:
 
 @dataclass(frozen=True)
 class ChoiceSummary:
-    """Choices between pairs.
+    """Summary of choices between pairs.
 
     wins: (conditions, conditions) how often the row was chosen over the column
-    circles: triples of conditions that go in a circle by majority, and all triples
-    first: how often the first presentation was chosen, among how many
+    circles: number of circular triads by majority, and of all triples of conditions
+    first: how often the first presentation was chosen, and the number of choices
     """
 
     measure: Measure
@@ -69,10 +69,11 @@ class ChoiceSummary:
 
 @dataclass(frozen=True)
 class StudyAnalysis:
-    """All that a report tells.
+    """The data of a report.
 
-    name: of the study's file; design_sha256: which all data carry
-    deleted: how many had their data deleted; looks: analyses before the planned sample was complete
+    name: of the study's file; design_sha256: the hash in all data
+    deleted: participants whose data were deleted; looks: analyses before the planned sample was
+        complete
     """
 
     name: str
@@ -88,7 +89,7 @@ class StudyAnalysis:
 
     @property
     def counted(self) -> tuple[Participation, ...]:
-        """Return the participants who count."""
+        """Return the participants who are not excluded."""
         return tuple(one for one in self.people if not one.left_out)
 
     @property
@@ -102,7 +103,7 @@ class StudyAnalysis:
         )
 
     def label(self, name: str) -> str:
-        """Return what a condition, or a level of a factor, is called in the report."""
+        """Return the label of a condition, or of a factor's level, in the report."""
         if name in self.design.conditions:
             return self.design.conditions[name].label or name
         return name.replace("=", " = ")
@@ -125,9 +126,9 @@ def analysed(
         name: of the study's file.
         design: with its hypotheses.
         questionnaires: by the keys in the design.
-        design_sha256: hash of the design that all data carry.
-        people: with what is left out marked.
-        deleted: how many had their data deleted.
+        design_sha256: hash of the design in all data.
+        people: participants, with exclusions marked.
+        deleted: number of participants whose data were deleted.
     """
     people = without_simulated(people)
     known = [one for one in measures(design, questionnaires).values() if not one.once]
@@ -145,7 +146,7 @@ def analysed(
 
 
 def without_simulated(people: Sequence[Participation]) -> tuple[Participation, ...]:
-    """Leave simulated participants out where anybody else took part."""
+    """Leave out simulated participants if there are real ones."""
     if all(one.simulated for one in people):
         return tuple(people)
     return tuple(
@@ -189,11 +190,11 @@ def _conditions(found: Scores) -> tuple[ConditionSummary, ...]:
 def within_halves(means: Floats) -> Floats:
     """Return half the 95 % intervals of means within participants, (conditions,).
 
-    Each participant's own level is taken off (Cousineau 2005), which is made good for by the
-    factor k / (k - 1) of Morey (2008).
+    Each participant's own level is subtracted (Cousineau 2005); the factor k / (k - 1) of Morey
+    (2008) corrects the bias.
 
     Args:
-        means: (participants, conditions); participants without all of them take no part.
+        means: (participants, conditions); incomplete rows are ignored.
     """
     whole = means[np.isfinite(means).all(axis=1)]
     n, k = len(whole), means.shape[1]
@@ -219,7 +220,7 @@ def _choices(
 
 
 def circular_triples(wins: NDArray[np.int64]) -> tuple[int, int]:
-    """Return how many triples of conditions go in a circle by majority, and how many there are."""
+    """Return the number of circular triads by majority, and of all triples of conditions."""
     majority = (wins > wins.T).astype(np.int64)
     circles = int(np.trace(np.linalg.matrix_power(majority, 3))) // 3
     return circles, comb(len(wins), 3)

@@ -1,28 +1,28 @@
-"""Answers as they are kept: whole numbers of the scale, a side of a pair, text, or none."""
+"""Stored answers: an integer of the scale, a side of a pair, text, or None."""
 
 from gazerig.features.study.questionnaire import Item
 from gazerig.features.study.records import AnswerValue
 
 LONGEST_TEXT = 5000
-"""Characters of a free text."""
+"""Longest free text, characters."""
 _SIDES = ("first", "second")
 
 
 class WrongAnswer(ValueError):
-    """What a browser sent does not fit the page that is shown."""
+    """A browser sent an answer that does not fit the present page."""
 
 
 def checked(number: int, item: Item, value: object, may_skip: bool) -> AnswerValue:
-    """Return an answer as it is kept.
+    """Return an answer in its stored form.
 
     Args:
-        number: of the question on its page, for messages.
-        item: that was asked.
-        value: what was answered, None for nothing.
+        number: number of the question on its page, for messages.
+        item: the item.
+        value: the answer, None without one.
         may_skip: the study permits unanswered questions.
 
     Raises:
-        WrongAnswer: it is missing, or not as the item can be answered.
+        WrongAnswer: it is missing, or does not fit the item.
     """
     if item.kind == "text":
         text = "" if value is None else value

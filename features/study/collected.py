@@ -1,4 +1,4 @@
-"""The data of a study as they lie in its folder: the design, and every participant's journal."""
+"""The data in a study's folder: the design, and every participant's journal."""
 
 import json
 from collections.abc import Mapping
@@ -25,12 +25,12 @@ class CollectedStudy:
     """A study's data.
 
     Attributes:
-        name: Of the study's file.
-        design: As it was at the first participant.
+        name: Name of the study's file.
+        design: The design at the first participant.
         questionnaires: By the keys in the design.
-        design_sha256: Hash of the design, which all data carry.
-        people: With what is left out marked.
-        folders: Of the participants, in the order of ``people``.
+        design_sha256: Hash of the design, which is in all data.
+        people: Participants, with exclusions marked.
+        folders: Folders of the participants, in the order of ``people``.
         deleted: Codes of participants whose data were deleted.
     """
 
@@ -60,7 +60,7 @@ def collected(folder: Path) -> CollectedStudy:
         each = data.participant(number)
         records = journal.read(each)
         _require_design(records, sha256, each, path)
-        if records:  # else nothing was kept of it
+        if records:  # else it has no data
             require_fit(records, design, questionnaires, each)
             people.append(participation(records, design, questionnaires))
             folders.append(each)
@@ -78,15 +78,15 @@ def collected(folder: Path) -> CollectedStudy:
 def stated(text: Mapping[str, Any], path: Path) -> tuple[StudyDesign, dict[str, Questionnaire]]:
     """Return design and questionnaires from a study's canonical text.
 
-    What the text has replaced by values, as the names of rigs and films, stays at its default: the
-    analysis needs none of it.
+    Entries that the text replaces by values, such as the names of rigs and films, keep their
+    defaults, because the analysis does not need them.
 
     Args:
         text: of gazerig.features.study.preregistration.canonical, decoded; it is not changed.
-        path: of the file that holds it, for messages.
+        path: path of its file, for messages.
 
     Raises:
-        SetupError: it is no canonical text.
+        SetupError: it is not a canonical text.
     """
     try:
         design, asked = dict(text["design"]), text["questionnaires"]
@@ -108,7 +108,7 @@ def stated(text: Mapping[str, Any], path: Path) -> tuple[StudyDesign, dict[str, 
 
 
 def _in_order(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a questionnaire with its items in the order in which they are asked."""
+    """Return a questionnaire with its items in the order of presentation."""
     rest = {key: value for key, value in asked.items() if key != "order"}
     return {**rest, "items": {key: asked["items"][key] for key in asked["order"]}}
 
@@ -116,10 +116,10 @@ def _in_order(asked: Mapping[str, Any]) -> dict[str, Any]:
 def _require_design(
     records: tuple[Record, ...], sha256: str, participant: Path, path: Path
 ) -> None:
-    """Refuse data that another design's session has taken.
+    """Refuse data from a session of another design.
 
     Raises:
-        SetupError: they are such data.
+        SetupError: the data are such data.
     """
     for one in records:
         if isinstance(one, Opened) and one.participant != participant.name:

@@ -1,4 +1,4 @@
-"""The study's entry in the list of commands; light, as every command imports it."""
+"""The study's entry in the list of commands; light, because every command imports it."""
 
 from gazerig.robot.cli.command_list import CommandEntry
 

@@ -1,11 +1,11 @@
-"""Where a study's data are: the design they belong to, and a folder for each participant.
+"""A study's data folder: the design, and a folder for each participant.
 
-DATA/design.json                    the design as it was at the first participant, with its hash
-DATA/secret                         makes names of pages and films that cannot be guessed
+DATA/design.json                    the design at the first participant, with its hash
+DATA/secret                         key for unguessable names of pages and films
 DATA/films/                         one film for each condition
-DATA/participants/P007/journal.jsonl  what happened (gazerig.features.study.journal)
+DATA/participants/P007/journal.jsonl  the records (gazerig.features.study.journal)
 DATA/participants/P007/run-01.mcap    recordings of the head
-DATA/deleted.txt                    codes whose data were deleted
+DATA/deleted.txt                    codes of participants whose data were deleted
 DATA/interim-looks.jsonl            analyses before the planned sample was complete
 """
 
@@ -33,7 +33,7 @@ _SECRET_BYTES = 32
 class InterimLook(NamedTuple):
     """An analysis before the planned sample was complete.
 
-    utc: when; came, counted: participants then; planned: by the design
+    utc: its time; came, counted: participants at that time; planned: by the design
     """
 
     utc: str
@@ -46,7 +46,7 @@ class StudyData:
     """The folder of a study's data.
 
     Args:
-        folder: it need not be there yet.
+        folder: it need not exist.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -58,11 +58,11 @@ class StudyData:
         return self.folder / "films"
 
     def claim(self, name: str, canonical: bytes) -> str:
-        """Have the folder belong to a design; return the design's hash.
+        """Assign the folder to a design; return the design's hash.
 
         Args:
-            name: of the study.
-            canonical: the design, as gazerig.features.study.preregistration.canonical gives it.
+            name: name of the study.
+            canonical: the design, from gazerig.features.study.preregistration.canonical.
 
         Raises:
             SetupError: it belongs to another design, or cannot be written.
@@ -76,7 +76,7 @@ class StudyData:
         return sha256
 
     def check(self, canonical: bytes) -> str:
-        """Return a design's hash, if the folder can have its data; nothing is written.
+        """Return a design's hash if the folder may hold its data; nothing is written.
 
         Raises:
             SetupError: it belongs to another design.
@@ -92,10 +92,10 @@ class StudyData:
         return sha256
 
     def sha256(self) -> str:
-        """Return the hash of the design that the data belong to.
+        """Return the hash of the data's design.
 
         Raises:
-            SetupError: there are no data, or what is said of their design was changed.
+            SetupError: the folder has no data, or the file of the design was changed.
         """
         path = self.folder / _DESIGN
         if not path.exists():
@@ -111,7 +111,7 @@ class StudyData:
         return said
 
     def secret(self) -> bytes:
-        """Return the study's secret, which is made at the first call.
+        """Return the study's secret key; the first call creates it.
 
         Raises:
             SetupError: it cannot be read or written.
@@ -131,7 +131,7 @@ class StudyData:
         return self.folder / "participants" / code_of(number)
 
     def numbers(self) -> tuple[int, ...]:
-        """Return the participants that there are data of, in order."""
+        """Return the numbers of the participants with data, in order."""
         folder = self.folder / "participants"
         if not folder.is_dir():
             return ()
@@ -172,19 +172,19 @@ class StudyData:
             write_file(self.folder / _LOOKS, "".join(lines), force=True)
 
     def delete(self, number: int) -> int:
-        """Delete all of a participant; return how many files that were.
+        """Delete all data of a participant; return the number of files.
 
-        What was made of all participants' data, such as reports, is deleted with it.
+        Results from all participants' data, such as reports, are deleted, too.
 
         Raises:
-            SetupError: there are no data of this participant, or a session is under way.
+            SetupError: the participant has no data, or a session is open.
         """
         folder = self.participant(number)
         if not folder.is_dir():
             there = ", ".join(map(code_of, self.numbers())) or "nobody"
             raise SetupError(f"{self.folder} has nothing of {code_of(number)}; there is {there}")
         with session_lock(folder):
-            pass  # a damaged journal can be deleted too
+            pass  # a damaged journal can be deleted, too
         made = [self.folder / name for name in ("report", "bids")]
         gone = [one for place in (folder, *made) for one in place.rglob("*") if one.is_file()]
         try:
@@ -202,7 +202,7 @@ def code_of(number: int) -> str:
     """Return the code of a participant, e.g. P007.
 
     Raises:
-        SetupError: participants are counted from 1.
+        SetupError: the number is not from 1 to 999999.
     """
     if not 1 <= number <= 999_999:
         raise SetupError(f"participant {number}: a whole number from 1 to 999999; no names")

@@ -1,4 +1,4 @@
-"""The hypotheses of a study, decided by the tests that were planned for them."""
+"""Decisions on the hypotheses of a study, by their planned tests."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,21 +26,21 @@ from gazerig.features.study.statistics.results import EffectSize, StatisticalTes
 from gazerig.gaze.types import Floats
 
 Verdict = Literal["supported", "not supported", "against", "too few"]
-"""against: a difference beyond chance, but the test's effect has the other sign."""
+"""against: a significant difference, but the test's effect has the other sign."""
 
 _LEAST_PEOPLE = 2
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What became of one hypothesis.
+    """The decision on one hypothesis.
 
-    test: the one that was planned, None where nothing could be tested; also: further ones
-    corrected_p: of the planned test, over all hypotheses
+    test: the planned test, None without data; also: further tests
+    corrected_p: p value of the planned test, corrected over all hypotheses
     n: participants with all conditions of both sides; standardised: d_z of their differences
-    medians, means: of the better and of the other condition; of choices the shares in all direct
+    medians, means: of the better and of the other condition; for choices the shares in all direct
         choices, and no medians
-    too_few: why no result could have been significant, "" where one could
+    too_few: why no result could have been significant, "" if one could
     """
 
     hypothesis: Hypothesis
@@ -67,7 +67,7 @@ def decisions(
     Args:
         design: with its hypotheses.
         questionnaires: by the keys in the design.
-        people: with what is left out marked.
+        people: participants, with exclusions marked.
     """
     known = measures(design, questionnaires)
     found = [
@@ -89,7 +89,7 @@ def _verdict(one: Decision, alpha: float) -> Verdict:
         return "too few"
     if one.corrected_p > alpha:
         return "not supported"
-    # Means may have another sign than the ranks that the test compares.
+    # The difference of means may have another sign than the ranks that the test compares.
     return "supported" if one.test.effect.value > 0.0 else "against"
 
 
@@ -122,7 +122,7 @@ def _tested(
 
 @dataclass(frozen=True)
 class _Sides:
-    """What a hypothesis compares: a condition, or all conditions of a factor's level, each."""
+    """Both sides of a hypothesis: a condition each, or all conditions of a factor's level."""
 
     found: Scores
     better: tuple[str, ...]
@@ -130,7 +130,7 @@ class _Sides:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Return who has a mean of every condition on both sides, (participants,)."""
+        """Return which participants have all conditions of both sides, (participants,)."""
         found: NDArray[np.bool_] = np.isfinite(self.found.column(*self.better, *self.than))
         return found
 
@@ -143,7 +143,7 @@ class _Sides:
 
     @property
     def better_first(self) -> NDArray[np.bool_]:
-        """Return who saw the better side first, (known,)."""
+        """Return which of them saw the better side first, (known,)."""
         first, second = self.found.first_seen(*self.better), self.found.first_seen(*self.than)
         found: NDArray[np.bool_] = (first < second)[self.known]
         return found
@@ -175,7 +175,7 @@ def _checks(measure: Measure, sides: _Sides) -> tuple[AssumptionCheck, ...]:
 def _chosen(
     design: StudyDesign, one: Hypothesis, measure: Measure, people: Sequence[Participation]
 ) -> Decision:
-    """Decide on a choice between two."""
+    """Decide on a hypothesis about choices between two conditions."""
     conditions = tuple(design.conditions)
     table = wins(measure, people, conditions)
     better, than = (
@@ -196,7 +196,7 @@ def _chosen(
 
 
 def _too_few(test: StatisticalTest, alpha: float) -> str:
-    """Return why no result could have reached alpha, "" where one could."""
+    """Return why no result could have reached alpha, "" if one could."""
     if test.least_p <= alpha:
         return ""
     return (

@@ -1,4 +1,4 @@
-"""The design of a study: which gazes are compared, by whom, in which order, and by which questions.
+"""The design of a study: conditions, participants, order, questions, hypotheses and plan.
 
 Read from YAML by the configuration's loader (features/study/studies/*.yaml are shipped).
 """
@@ -11,7 +11,7 @@ from gazerig.params import Bounds, Choices
 
 Language = Literal["en", "ja", "de"]
 Task = Literal["rating", "pairwise"]
-"""rating: each condition is rated after it was seen; pairwise: two are seen, one is chosen."""
+"""rating: each presentation is rated; pairwise: one of two presentations is chosen."""
 Test = Literal["signed_rank", "rank_sum", "sign", "chi_square", "friedman"]
 """Tests of one hypothesis (gazerig.features.study.statistics)."""
 DECIDING: tuple[Test, ...] = ("signed_rank", "rank_sum", "sign")
@@ -21,7 +21,7 @@ DECIDING: tuple[Test, ...] = ("signed_rank", "rank_sum", "sign")
 # fmt: off
 @dataclass(frozen=True)
 class Condition:
-    """One gaze of the study; what is not said is the rig's own."""
+    """One gaze of the study; missing entries are the rig's."""
 
     label: Annotated[str, "what the experimenter calls it; participants never see it"] = ""
     rig: Annotated[str | None, "shipped name or path; null: the study's"] = None
@@ -37,7 +37,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class StudyTexts:
-    """What participants read of the study itself, in one language."""
+    """The study's own texts for participants, in one language."""
 
     welcome: Annotated[tuple[str, ...], "paragraphs before they consent; they must not name the difference"] = ()
     debriefing: Annotated[tuple[str, ...], "paragraphs at the end"] = ()
@@ -45,7 +45,7 @@ class StudyTexts:
 
 @dataclass(frozen=True)
 class Presentation:
-    """How participants see the conditions."""
+    """Presentation of the conditions."""
 
     on: Annotated[Literal["head", "film"], "the head in the room, or a film of it in the browser"] = "film"
     rig: Annotated[str, "shipped name or path"] = "expressive"
@@ -56,7 +56,7 @@ class Presentation:
 
 @dataclass(frozen=True)
 class Trials:
-    """The trials of one participant, and the time they take."""
+    """Trials of one participant, and their times."""
 
     seconds: Annotated[float, Bounds(2, 900), "length of one presentation"] = 30.0
     repetitions: Annotated[int, Bounds(1, 20), "how often each condition (pair) is shown"] = 1
@@ -69,7 +69,7 @@ class Trials:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """What is expected, and the test that decides on it."""
+    """An expectation, and the test that decides on it."""
 
     measure: Annotated[str, "questionnaire.item, questionnaire.scale or an objective measure"]
     better: Annotated[str, "condition, or level of a factor (gaze=moving), for which more is expected"]
@@ -81,7 +81,7 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class StatisticalPlan:
-    """What a pre-registration states of the numbers."""
+    """The numbers of a pre-registration."""
 
     participants: Annotated[int, Bounds(2, 1000), "how many are invited"] = 24
     alpha: Annotated[float, Bounds(0.0001, 0.2), "probability of a false alarm, over all hypotheses"] = 0.05
@@ -92,7 +92,7 @@ class StatisticalPlan:
 
 @dataclass(frozen=True)
 class Exclusion:
-    """Which trials and participants are left out, decided before the first one comes."""
+    """Exclusion of trials and participants, decided before the first participant."""
 
     lost_head: Annotated[Literal["repeat", "exclude"], "a trial in which the head was lost"] = "repeat"
     repeats: Annotated[int, Bounds(0, 10), "times that a trial is repeated at most"] = 2
@@ -103,7 +103,7 @@ class Exclusion:
 
 @dataclass(frozen=True)
 class Privacy:
-    """What is kept of a participant beside the answers; the consent page says it."""
+    """Further data of a participant besides the answers; the consent page names them."""
 
     pictures: Annotated[bool, "keep camera pictures of the participant"] = False
     gaze: Annotated[bool, "keep where the participant looked (angles, no pictures)"] = True
@@ -113,7 +113,7 @@ class Privacy:
 
 @dataclass(frozen=True)
 class StudyDesign:
-    """A study as its YAML says."""
+    """A study as in its YAML file."""
 
     title: Annotated[str, "title of the pre-registration and the report"]
     conditions: Annotated[Mapping[str, Condition], "two to six gazes"]
@@ -136,13 +136,13 @@ class StudyDesign:
 
     @property
     def texts(self) -> StudyTexts:
-        """Return what participants read: in the study's language where there is a translation."""
+        """Return the texts for participants, in the study's language if there is a translation."""
         return self.translations.get(self.language, StudyTexts(self.welcome, self.debriefing))
 
     def side(self, name: str) -> tuple[str, ...]:
-        """Return the conditions of one side of a hypothesis, none where the name is unknown.
+        """Return the conditions of one side of a hypothesis, none for an unknown name.
 
-        name: of a condition, which it is then alone, or of a level of a factor: "gaze=moving".
+        name: a condition, which is then the only one, or a level of a factor: "gaze=moving".
         """
         if name in self.conditions:
             return (name,)
@@ -152,7 +152,7 @@ class StudyDesign:
     def matched(self, one: Hypothesis) -> tuple[tuple[str, str], ...]:
         """Return the pairs (better, than) of conditions that a hypothesis compares.
 
-        Those of two levels of a factor are alike in all other factors.
+        Pairs of two levels of a factor agree in all other factors.
         """
         better, than = self.side(one.better), self.side(one.than)
         if one.better in self.conditions:

@@ -1,7 +1,7 @@
-"""The journal of one participant: what happened, on disk before anybody goes on.
+"""The journal of one participant: every step is on disk before the next one.
 
-A text file to which lines are added and never changed. A line is a JSON list of the records of one
-step, such as all answers of a page: after a crash it is there as a whole or not at all.
+A text file whose lines are never changed. A line is a JSON list of the records of one step, such
+as all answers of a page: after a crash it is complete or missing.
 """
 
 import contextlib
@@ -38,21 +38,21 @@ _KINDS: Mapping[str, type[Record]] = {
 
 
 class NotKept(SetupError):
-    """Records could not be written; the journal is as it was before."""
+    """Records could not be written; the journal has not changed."""
 
 
 class Journal:
-    """The journal of a participant, open for one session alone.
+    """The journal of a participant, open in one session only.
 
     Attributes:
-        records: All that are on disk.
-        torn: Where the part of a line was put that a crash had left, None where there was none.
+        records: All records on disk.
+        torn: Path of an incomplete last line after a crash, None without one.
 
     Args:
-        folder: of the participant; it is made.
+        folder: folder of the participant; it is created.
 
     Raises:
-        SetupError: another session has it open, or it cannot be read or written.
+        SetupError: another session has opened it, or it cannot be read or written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -87,14 +87,14 @@ class Journal:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Close it."""
+        """Close the journal."""
         self.close()
 
     def write(self, records: Sequence[Record]) -> None:
-        """Add the records of one step; when this returns, they are on disk.
+        """Add the records of one step; on return they are on disk.
 
         Raises:
-            NotKept: they are not, and nothing of them is; it may be tried again.
+            NotKept: nothing was written; the call may be repeated.
         """
         if not records:
             return
@@ -113,12 +113,12 @@ class Journal:
         self.records = (*self.records, *records)
 
     def close(self) -> None:
-        """Close it, and let another session have it."""
+        """Close it, and release its lock."""
         os.close(self._fd)
         os.close(self._lock)
 
     def _set_aside(self, torn: bytes) -> Path:
-        """Write the part of a line that a crash left to a file of its own; return its path."""
+        """Move an incomplete last line to its own file; return its path."""
         number = 1
         while (path := self._folder / f"journal-torn-{number}.txt").exists():
             number += 1
@@ -127,10 +127,10 @@ class Journal:
 
 
 def read(folder: Path) -> tuple[Record, ...]:
-    """Return all records of a participant; what a crash left of a last line is no record.
+    """Return all records of a participant, without an incomplete last line.
 
     Raises:
-        SetupError: there is no journal, or it is damaged.
+        SetupError: the journal is missing or damaged.
     """
     path = folder / FILE
     try:
@@ -141,16 +141,16 @@ def read(folder: Path) -> tuple[Record, ...]:
 
 
 def encoded(records: Sequence[Record]) -> bytes:
-    """Return the line of some records; what is not a number is null."""
+    """Return records as one line; a value that is not a number is null."""
     said = [{"kind": type(one).__name__, **asdict(one)} for one in records]
     return msgspec.json.encode(said) + b"\n"
 
 
 def decoded(data: bytes, path: Path) -> tuple[Record, ...]:
-    """Return the records of whole lines.
+    """Return the records of complete lines.
 
     Raises:
-        SetupError: a line is none; with file, line and what is wrong.
+        SetupError: a line is invalid; the message has file, line and reason.
     """
     records: list[Record] = []
     for number, line in enumerate(data.splitlines(), start=1):
@@ -172,7 +172,7 @@ def session_lock(folder: Path) -> Iterator[None]:
     """Hold the lock of a participant's folder.
 
     Raises:
-        SetupError: a session has it.
+        SetupError: a session holds it.
     """
     lock = _locked(folder)
     try:
@@ -192,7 +192,7 @@ def _record(said: dict[str, Any]) -> Record:
 
 
 def _locked(folder: Path) -> int:
-    """Return the open lock of a folder; it is held until that is closed or the process ends.
+    """Return the open lock of a folder; it is held until it is closed or the process ends.
 
     Raises:
         SetupError: another process holds it.
@@ -210,7 +210,7 @@ def _locked(folder: Path) -> int:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Have the names of new files on disk as well."""
+    """Write the names of new files to disk as well."""
     fd = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(fd)

@@ -1,4 +1,4 @@
-"""What a study measures, by name: answers to items, means of scales, and objective measures."""
+"""Measures of a study by name: answers to items, means of scales, and objective measures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ GAZE_MEASURES: Mapping[str, str] = {
     "participant_gaze_share": "share of the time in which the participant looks at the head",
     "first_look_s": "time from the trial's start to the participant's first look at the head",
 }
-"""Objective measures of the participant's own gaze, where the camera sees it."""
+"""Objective measures of the participant's gaze, if the camera sees it."""
 
 
 @dataclass(frozen=True)
@@ -20,12 +20,12 @@ class Measure:
     """One dependent variable.
 
     Attributes:
-        name: "questionnaire.item", "questionnaire.scale", or that of an objective measure.
+        name: "questionnaire.item", "questionnaire.scale", or the name of an objective measure.
         kind: One rating, the mean of a scale's ratings, a choice between two, or objective.
         questionnaire: Key in the design, "" for an objective measure.
-        items: Keys of the items; of a scale all that belong to it.
-        points: Steps of a rating, 0 where there are none.
-        once: It is asked once at the end and not after each trial.
+        items: Keys of the items, for a scale all of its items.
+        points: Steps of a rating, 0 for other kinds.
+        once: Whether it is asked once at the end instead of after each trial.
     """
 
     name: str
@@ -39,11 +39,11 @@ class Measure:
 def measures(
     design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 ) -> dict[str, Measure]:
-    """Return what a study measures, by name; free text is none.
+    """Return the measures of a study by name, without free text.
 
     Args:
-        design: whose questionnaires and objective measures they are.
-        questionnaires: by the keys in the design; one that is not there is left out.
+        design: the design with questionnaires and objective measures.
+        questionnaires: by the keys in the design; missing ones are skipped.
     """
     found: dict[str, Measure] = {}
     for key in (*design.questionnaires, *design.after):

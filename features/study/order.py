@@ -1,8 +1,8 @@
-"""The order in which each participant sees the conditions, balanced over the participants.
+"""The order of conditions for each participant, balanced over the participants.
 
 Williams' squares (E. J. Williams, "Experimental designs balanced for the estimation of residual
 effects of treatments", Australian Journal of Scientific Research A 2, 1949, 149-168): with an even
-number n of conditions, n orders in which each condition stands in each place once and follows each
+number n of conditions, n orders in which each condition is at each position once and follows each
 other condition once; with an odd number, 2n orders in which it does so twice.
 """
 
@@ -14,16 +14,16 @@ import numpy as np
 from gazerig.features.study.design import StudyDesign
 
 PAIR = "|"
-"""Stands between the first and the second presentation of a pair."""
+"""Separator of the first and the second presentation of a pair."""
 _ORDERS, _PRACTICE = 0, 1
-"""Streams of random numbers of one seed."""
+"""Random streams of one seed."""
 
 
 def williams(n: int) -> tuple[tuple[int, ...], ...]:
     """Return Williams' orders of ``n`` conditions 0..n-1: n of them if n is even, else 2n.
 
     Raises:
-        ValueError: there is no condition.
+        ValueError: ``n`` is below 1.
     """
     if n < 1:
         raise ValueError(f"{n} conditions; at least one is needed")
@@ -35,15 +35,15 @@ def williams(n: int) -> tuple[tuple[int, ...], ...]:
 
 
 def rows(design: StudyDesign) -> int:
-    """Return how many participants see every order once; 1 where orders are random.
+    """Return the number of participants that use every order once; 1 for random orders.
 
-    Numbers of participants that are multiples of it are balanced to the last cell.
+    Multiples of this number of participants are fully balanced.
     """
     return len(_table(design)) if design.trials.order == "williams" else 1
 
 
 def shown(design: StudyDesign) -> tuple[str, ...]:
-    """Return what one block of trials holds: the conditions, or the pairs of them as "a|b"."""
+    """Return the trials of one block: the conditions, or their pairs as "a|b"."""
     keys = tuple(design.conditions)
     if design.task == "rating":
         return keys
@@ -53,12 +53,12 @@ def shown(design: StudyDesign) -> tuple[str, ...]:
 def orders(design: StudyDesign, participant: int) -> tuple[str, ...]:
     """Return the trials of a participant in order, each a condition key or a pair "a|b".
 
-    Each repetition is a block of its own, with another order of the same balanced set; the last
-    condition of a block is not the first of the next one if that can be helped.
+    Each repetition is a separate block with another order of the same balanced set. The last
+    condition of a block differs from the first of the next one if possible.
 
     Args:
-        design: a checked one.
-        participant: from 1; it chooses the row of the table, or the random order.
+        design: a checked design.
+        participant: from 1; it selects the row of the table, or the random order.
 
     Raises:
         ValueError: the number is below 1.
@@ -75,7 +75,7 @@ def orders(design: StudyDesign, participant: int) -> tuple[str, ...]:
 
 
 def practice(design: StudyDesign, participant: int) -> tuple[str, ...]:
-    """Return the practice trials of a participant, drawn at random; none of them counts."""
+    """Return the practice trials of a participant, drawn at random; they do not count."""
     rng = np.random.default_rng((design.trials.seed, participant, _PRACTICE))
     drawn = rng.permutation(len(shown(design)))
     return tuple(
@@ -85,7 +85,7 @@ def practice(design: StudyDesign, participant: int) -> tuple[str, ...]:
 
 
 def _random(design: StudyDesign, participant: int, repetitions: int) -> tuple[str, ...]:
-    """Return blocks in random order; no trial is that before it if there are two."""
+    """Return blocks in random order; consecutive trials differ if there are two."""
     rng = np.random.default_rng((design.trials.seed, participant, _ORDERS))
     there, out = shown(design), list[str]()
     for _ in range(repetitions):
@@ -98,17 +98,17 @@ def _random(design: StudyDesign, participant: int, repetitions: int) -> tuple[st
 
 
 def _table(design: StudyDesign) -> tuple[tuple[str, ...], ...]:
-    """Return the orders that participants get in turn, as trials.
+    """Return the orders that are assigned to participants cyclically, as trials.
 
-    Which condition takes which part in the squares is drawn by the seed. Pairs are ordered as
-    conditions are; over the table each is seen both ways round equally often, in every place.
+    The seed assigns conditions to the squares. Pairs are ordered as conditions are; over the table
+    each is seen in both orders equally often, at every position.
     """
     there = shown(design)
     letters = np.random.default_rng((design.trials.seed, 0, _ORDERS)).permutation(len(there))
     squares = [tuple(int(letters[one]) for one in row) for row in williams(len(there))]
     if design.task == "rating":
         return tuple(tuple(there[one] for one in row) for row in squares)
-    if len(squares) == len(there):  # of an even number, or one pair: the square again, turned
+    if len(squares) == len(there):  # of an even number, or one pair: the square again, reversed
         squares = 2 * squares
     return tuple(
         tuple(_either_way(there[one], bool((number // len(there) + one) % 2)) for one in row)
@@ -118,9 +118,9 @@ def _table(design: StudyDesign) -> tuple[tuple[str, ...], ...]:
 
 @cache
 def _step(table: tuple[tuple[str, ...], ...]) -> int:
-    """Return how many rows further a participant's next block is taken from."""
+    """Return the offset of rows between a participant's blocks."""
     n = len(table)
-    if len(table[0]) == 1:  # one pair: the other way round
+    if len(table[0]) == 1:  # one pair: the other order
         return 1
     for step in range(1, n):
         if all(not _same(table[i][-1], table[(i + step) % n][0]) for i in range(n)):
@@ -129,10 +129,10 @@ def _step(table: tuple[tuple[str, ...], ...]) -> int:
 
 
 def _same(one: str, other: str) -> bool:
-    """Whether two trials show the same, whichever way round."""
+    """Return whether two trials show the same, in either order."""
     return set(one.split(PAIR)) == set(other.split(PAIR))
 
 
 def _either_way(trial: str, turned: bool) -> str:
-    """Return a pair the other way round if wanted; a condition stays itself."""
+    """Return a pair in the other order if ``turned``; a condition is returned unchanged."""
     return PAIR.join(reversed(trial.split(PAIR))) if turned else trial

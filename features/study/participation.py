@@ -1,4 +1,4 @@
-"""From records to rows: what each participant answered, and what the design's rules leave out."""
+"""From records to rows: the answers of each participant, and the design's exclusions."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,15 +24,15 @@ from gazerig.features.study.records import (
 )
 
 LEAST_SAME = 8
-"""Ratings from which on one answer to all of them tells something: fewer may well be honest."""
+"""Least number of ratings for the rule of equal answers: fewer may well be honest."""
 
 
 @dataclass(frozen=True)
 class AnswerRow:
-    """One answer, as the tidy table has it.
+    """One answer, a row of the tidy table.
 
-    trial: None for what is asked once at the end, below 0 in practice
-    left_out: why the analysis does without it, "" where it counts
+    trial: None for questions at the end, below 0 in practice
+    left_out: reason of its exclusion, "" if it counts
     """
 
     participant: str
@@ -48,10 +48,10 @@ class AnswerRow:
 
 @dataclass(frozen=True)
 class TrialRow:
-    """One trial in its last attempt: outcome and what it was measured by.
+    """One trial in its last attempt: outcome and measures.
 
     side: 1 for the second presentation of a pair
-    from_s, to_s: when it began and ended in the recording's time, nan without one
+    from_s, to_s: its start and end in the recording's time, nan without a recording
     """
 
     trial: int
@@ -70,10 +70,10 @@ class TrialRow:
 
 @dataclass(frozen=True)
 class Participation:
-    """All that is known of one participant.
+    """All data of one participant.
 
     how: "finished", "withdrawn", "excluded", or "unfinished"
-    left_out: why the analysis does without the participant, "" where it does not
+    left_out: reason of the participant's exclusion, "" without one
     """
 
     participant: str
@@ -89,12 +89,12 @@ class Participation:
 
     @property
     def counted(self) -> tuple[AnswerRow, ...]:
-        """Return the answers that count, none of a participant who is left out."""
+        """Return the answers that count, none of an excluded participant."""
         return () if self.left_out else tuple(row for row in self.answers if not row.left_out)
 
     @property
     def counted_trials(self) -> tuple[TrialRow, ...]:
-        """Return the complete trials that count, none of a participant who is left out."""
+        """Return the complete trials that count, none of an excluded participant."""
         counted = (t for t in self.trials if t.trial >= 0 and t.outcome == "complete")
         return () if self.left_out else tuple(counted)
 
@@ -102,11 +102,11 @@ class Participation:
 def participation(
     records: Sequence[Record], design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 ) -> Participation:
-    """Return what records say of one participant, with what the design's rules leave out.
+    """Return one participant's data from the records, with the design's exclusions.
 
     Args:
         records: of one journal in order, the first of them Opened.
-        design: whose exclusion rules hold.
+        design: the design with its exclusion rules.
         questionnaires: by the keys in the design.
 
     Raises:
@@ -134,7 +134,7 @@ def require_fit(
     questionnaires: Mapping[str, Questionnaire],
     folder: Path,
 ) -> None:
-    """Refuse records that no session of this design can have written.
+    """Refuse records that do not fit a session of this design.
 
     Args:
         records: of one journal in order.
@@ -143,7 +143,7 @@ def require_fit(
         folder: of the participant, for the message.
 
     Raises:
-        SetupError: the journal was changed or damaged; it is as it was.
+        SetupError: the journal was changed or damaged; it is not modified.
     """
     began: set[tuple[int, int, int]] = set()
     for number, one in enumerate(records, start=1):
@@ -162,7 +162,7 @@ def require_fit(
 def _misfit(
     number: int, one: Record, design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 ) -> str:
-    """Return why a record is none of this design's sessions, "" if it may be one."""
+    """Return why a record does not fit the design's sessions, "" if it fits."""
     if number == 1 and not isinstance(one, Opened):
         return "a journal begins with Opened"
     shown: list[str] = []
@@ -185,7 +185,7 @@ def _misfit(
 
 
 def _rows(participant: str, records: Iterable[Record]) -> list[AnswerRow]:
-    """Return the answers; of an item that was answered again, the last."""
+    """Return the answers, the last one for an item that was answered again."""
     found: dict[tuple[int | None, str, str], AnswerRow] = {}
     for one in records:
         if isinstance(one, ItemAnswered):
@@ -217,7 +217,7 @@ def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
 
 
 def _judged(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
-    """Leave out practice, presentations that were not completed, and what was not answered."""
+    """Exclude practice, incomplete presentations, and missing answers."""
     if row.trial is not None and row.trial < 0:
         return replace(row, left_out="practice")
     ends = [t.outcome for t in trials if t.trial == row.trial]
@@ -227,12 +227,12 @@ def _judged(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
 
 
 def _without_hasty(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRow]:
-    """Leave out pages that were answered faster than anybody reads."""
+    """Exclude pages that were answered faster than a person can read."""
     rows = list(rows)
     slowest: dict[tuple[int | None, str], float] = {}
     for row in rows:
         page = row.trial, row.questionnaire
-        # A browser that measured nothing was not too fast.
+        # A browser without a measured time was not too fast.
         slowest[page] = max(slowest.get(page, 0.0), inf if isnan(row.ms) else row.ms)
     return [
         replace(row, left_out=row.left_out or "answered too fast")
@@ -248,7 +248,7 @@ def _whole_reason(
     design: StudyDesign,
     questionnaires: Mapping[str, Questionnaire],
 ) -> str:
-    """Return why a participant is left out as a whole, "" where none is."""
+    """Return the reason of a participant's exclusion, "" without one."""
     consents = [r.given for r in records if isinstance(r, Consented)]
     if not consents or not consents[-1]:
         return "did not consent"

@@ -1,10 +1,10 @@
-"""How many participants a study needs: power of its tests under the model of answers.
+"""Sample size of a study: power of its tests under the model of answers.
 
 A closed formula for the signed-rank test (the paired t test's over the asymptotic relative
-efficiency 3/pi; Lehmann, Nonparametrics, 1975, ch. 4) supposes continuous answers. Five points have
-ties, which cost power, so a claim is counted: studies are drawn from the model of answers that
-simulated participants have (gazerig.features.study.simulation) and tested, 5 000 for each number
-of participants, by a fixed seed. The formula is where the search begins, and is shown beside it.
+efficiency 3/pi; Lehmann, Nonparametrics, 1975, ch. 4) assumes continuous answers. Five points have
+ties, which reduce power, so power is simulated: studies are drawn from the simulated participants'
+model of answers (gazerig.features.study.simulation) and tested, 5 000 for each number of
+participants, with a fixed seed. The formula is the start of the search, and is shown as well.
 """
 
 from dataclasses import dataclass
@@ -30,11 +30,11 @@ from gazerig.features.study.simulation import (
 from gazerig.gaze.types import Floats
 
 MOST = 2000
-"""Participants beyond which no number is looked for."""
+"""Largest number of participants in the search."""
 _STUDIES = 5_000
 _SEED = 20_020_405
 _EXACT = 40
-"""Differences up to which the exact chance decides, as it does in the analysis."""
+"""Largest number of differences with an exact test, as in the analysis."""
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(61)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
@@ -43,15 +43,15 @@ Counts = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class PowerQuestion:
-    """What a test has to find.
+    """A test and the effect that it must detect.
 
     Attributes:
-        test: That decides.
+        test: The deciding test.
         effect: d_z of a participant's differences, as they are analysed.
         alpha: Of this one test.
-        two_sided: Differences of either sign count.
-        points: Steps of the rating; 0 for what is continuous, as means of scales nearly are.
-        choices: Direct choices between both that a participant makes, where choices are made.
+        two_sided: Whether differences of either sign count.
+        points: Steps of the rating; 0 for continuous measures, such as, nearly, means of scales.
+        choices: Direct choices between both conditions per participant, for tests of choices.
     """
 
     test: Test
@@ -63,10 +63,10 @@ class PowerQuestion:
 
 
 class PowerClaim(NamedTuple):
-    """What a hypothesis can expect.
+    """Power and sample size of a hypothesis.
 
-    power: with the participants that are planned; formula: participants by the closed formula
-    needed: for the wanted power, a multiple of the orders; None above ``MOST``
+    power: with the planned participants; formula: participants by the closed formula
+    needed: participants for the required power, a multiple of the orders; None above ``MOST``
     """
 
     question: PowerQuestion
@@ -77,15 +77,15 @@ class PowerClaim(NamedTuple):
 
 
 def claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -> PowerClaim:
-    """Return the power of a hypothesis' own test, and how many participants it takes.
+    """Return the power of a hypothesis' own test, and the participants that it needs.
 
-    Where hypotheses are corrected for being many, each gets its share of the false alarms, to which
-    Holm's procedure adds power only.
+    With a correction for several hypotheses each gets its share of alpha; Holm's procedure only
+    increases the power.
 
     Args:
-        design: a checked one.
-        hypothesis: one of its own.
-        measure: what the hypothesis is about.
+        design: a checked design.
+        hypothesis: one of its hypotheses.
+        measure: the hypothesis' measure.
     """
     asked = _question(design, hypothesis, measure)
     n, wanted = design.plan.participants, design.plan.power
@@ -107,9 +107,10 @@ def _question(design: StudyDesign, one: Hypothesis, measure: Measure) -> PowerQu
 
 
 def by_formula(asked: PowerQuestion, power: float) -> int:
-    """Return participants by the normal approximation, ties left out of account.
+    """Return the participants by the normal approximation, without ties.
 
-    n = ((z_alpha + z_power) / d)^2, of rank tests over 3/pi; of choices that of the sign test.
+    n = ((z_alpha + z_power) / d)^2, for rank tests divided by 3/pi; for choices that of the sign
+    test.
     """
     sides = 2 if asked.two_sided else 1
     z_null, z_power = float(stats.norm.isf(asked.alpha / sides)), float(stats.norm.ppf(power))
@@ -121,15 +122,15 @@ def by_formula(asked: PowerQuestion, power: float) -> int:
 
 
 def sample_size(asked: PowerQuestion, power: float, multiple: int = 1) -> int | None:
-    """Return the fewest participants with a power, None if they were more than ``MOST``.
+    """Return the smallest number of participants for a power, None above ``MOST``.
 
     Args:
-        asked: what is to be found.
-        power: wanted chance to find it.
-        multiple: the number must be one of this.
+        asked: the test and its effect.
+        power: required probability to detect it.
+        multiple: the number must be a multiple of it.
     """
     low, high = 0, ceil(by_formula(asked, power) / multiple)
-    if high * multiple > MOST:  # ties only make it more
+    if high * multiple > MOST:  # ties only increase it
         return None
     while power_of(asked, high * multiple) < power:
         low, high = high, ceil(1.3 * high) + 1
@@ -146,7 +147,7 @@ def sample_size(asked: PowerQuestion, power: float, multiple: int = 1) -> int | 
 
 @lru_cache(maxsize=4096)
 def power_of(asked: PowerQuestion, n: int) -> float:
-    """Return the chance that a deciding test of ``n`` participants is significant."""
+    """Return the probability that a deciding test of ``n`` participants is significant."""
     if n < 1:
         return 0.0
     if asked.test == "sign":
@@ -159,9 +160,9 @@ def power_of(asked: PowerQuestion, n: int) -> float:
 
 @lru_cache(maxsize=64)
 def joint(effect: float, points: int) -> Floats:
-    """Return the chances of both ratings of a participant, (points, points).
+    """Return the joint probabilities of a participant's two ratings, (points, points).
 
-    Rows are the rating of the condition expected above, columns of the other one.
+    Rows are the rating of the condition expected to be better, columns of the other one.
     """
     shift, noise = shift_of(effect, points), sqrt(TRIAL_SD**2 + ITEM_SD**2)
     ends = np.array([-np.inf, *thresholds(points), np.inf])
@@ -174,7 +175,7 @@ def joint(effect: float, points: int) -> Floats:
 
 
 def _drawn(asked: PowerQuestion, n: int, rng: np.random.Generator) -> Counts:
-    """Return how many participants gave each pair of ratings, (studies, points, points)."""
+    """Return the number of participants with each pair of ratings, (studies, points, points)."""
     cells = joint(asked.effect, asked.points)
     found: Counts = rng.multinomial(n, (cells / cells.sum()).ravel(), _STUDIES)
     return found.reshape(_STUDIES, asked.points, asked.points)
@@ -187,7 +188,7 @@ def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> floa
         reach = range(1, asked.points)
         up = np.stack([np.trace(drawn, -k, 1, 2) for k in reach], axis=1)
         down = np.stack([np.trace(drawn, k, 1, 2) for k in reach], axis=1)
-    else:  # no two are alike: a participant is a column, in the order of the differences
+    else:  # all differ: a participant is a column, in the order of the differences
         d = rng.normal(asked.effect, 1.0, (_STUDIES, n))
         sign = np.take_along_axis(d, np.argsort(np.abs(d), axis=1), axis=1) > 0.0
         up, down = sign.astype(np.int64), (~sign).astype(np.int64)
@@ -195,11 +196,11 @@ def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> floa
 
 
 def _found(up: Counts, down: Counts, asked: PowerQuestion) -> NDArray[np.bool_]:
-    """Return in which studies the signed-rank test is significant.
+    """Return which studies are significant in the signed-rank test.
 
     Args:
         up: (studies, sizes) differences above zero, by ascending size.
-        down: (studies, sizes) those below.
+        down: (studies, sizes) differences below zero.
         asked: for its alpha and its sides.
     """
     size = up + down
@@ -207,7 +208,8 @@ def _found(up: Counts, down: Counts, asked: PowerQuestion) -> NDArray[np.bool_]:
     above, below = (np.sum(doubled * one, axis=1) for one in (up, down))
     alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
     kept = size.sum(axis=1)
-    # W+ less its mean is half of (above - below) in doubled ranks; its variance sums their squares.
+    # W+ minus its mean is half of (above - below) in doubled ranks; its variance sums their
+    # squares.
     spread = np.sqrt(np.sum(size * doubled.astype(float) ** 2, axis=1))
     z = (np.abs(above - below) - 2.0) / np.maximum(spread, 1e-12)
     found: NDArray[np.bool_] = stats.norm.sf(z) <= alpha
@@ -221,9 +223,9 @@ def _found(up: Counts, down: Counts, asked: PowerQuestion) -> NDArray[np.bool_]:
 
 @lru_cache(maxsize=200_000)
 def _critical(size: tuple[int, ...], alpha: float) -> int:
-    """Return the least doubled sum of ranks on one side whose exact chance is at most alpha.
+    """Return the smallest doubled sum of ranks on one side with exact probability up to alpha.
 
-    size: differences by ascending size; the signs of all are equally likely both ways
+    size: differences by ascending size; all signs are equally likely
     """
     chances, before = np.ones(1), 0
     for many in size:
@@ -239,7 +241,7 @@ def _critical(size: tuple[int, ...], alpha: float) -> int:
 
 @lru_cache(maxsize=_EXACT + 1)
 def _coins(n: int) -> Floats:
-    """Return the chances of 0..n heads of n coins."""
+    """Return the probabilities of 0..n heads of n coins."""
     found: Floats = stats.binom.pmf(np.arange(n + 1), n, 0.5)
     return found
 
@@ -267,7 +269,7 @@ def _rank_sum(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
 
 
 def _leans(asked: PowerQuestion) -> tuple[float, float]:
-    """Return the chances that a participant chooses the better one more often, and less often."""
+    """Return the probabilities that a participant chooses the better one more, or less, often."""
     chances = stats.binom.pmf(np.arange(asked.choices + 1), asked.choices, preference(asked.effect))
     half = 0.5 * asked.choices
     at = np.arange(asked.choices + 1)
@@ -280,7 +282,7 @@ def _sign(asked: PowerQuestion, n: int) -> float:
     above, below = _leans(asked)
     kept = np.arange(n + 1)
     share = above / (above + below)
-    # More than this number above has a chance of at most alpha where both sides are alike.
+    # Without an effect, more than this number above has a probability of at most alpha.
     most = stats.binom.isf(alpha, kept, 0.5)
     found = stats.binom.sf(most, kept, share)
     if asked.two_sided:

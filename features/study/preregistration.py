@@ -1,4 +1,4 @@
-"""What a study states before its first participant: a canonical text with its hash."""
+"""Canonical text of a study before its first participant, with its hash."""
 
 import json
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.questionnaire import Questionnaire
 
 _BY_VALUE = frozenset({"rig", "profile", "character", "scanpath", "params", "recording", "film"})
-"""Keys of a condition that say where its values are from; the values themselves are stated."""
+"""Keys of a condition that name the source of its values; the text has the values instead."""
 
 
 def canonical(
@@ -19,15 +19,15 @@ def canonical(
     questionnaires: Mapping[str, Questionnaire],
     shown: Mapping[str, Mapping[str, object]],
 ) -> bytes:
-    """Return a study as JSON that is the same whenever the study is, however it was written.
+    """Return a study as JSON that depends only on its content, not on how it was written.
 
-    Defaults are written out, keys are sorted, and files are replaced by what they say: comments,
-    formatting, and where the files lie change nothing; any value does.
+    Defaults are written out, keys are sorted, and files are replaced by their content: comments,
+    formatting and paths have no effect; every value has.
 
     Args:
-        design: a checked one.
+        design: a checked design.
         questionnaires: by the keys in the design.
-        shown: of each condition the values of its gaze by dotted key, and the hashes of its files.
+        shown: for each condition the values of its gaze by dotted key, and the hashes of its files.
     """
     stated = _plain(design)
     for key, one in stated["conditions"].items():
@@ -38,7 +38,7 @@ def canonical(
     if presentation["world"] is not None:
         presentation["world"] = Path(presentation["world"]).name
     asked = {key: _plain(one) for key, one in questionnaires.items()}
-    # The order of items is the order in which they are asked.
+    # The order of items is their order of presentation.
     for key, one in questionnaires.items():
         asked[key]["order"] = list(one.items)
     stated["order"] = list(design.conditions)
@@ -50,12 +50,12 @@ def canonical(
 
 
 def design_sha256(canonical: bytes) -> str:
-    """Return the hash that a study's data carry, as 64 hexadecimal digits."""
+    """Return the hash for a study's data, 64 hexadecimal digits."""
     return sha256(canonical).hexdigest()
 
 
 def _plain(value: Any) -> Any:
-    """Return frozen values as what JSON has."""
+    """Convert frozen values to JSON types."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):

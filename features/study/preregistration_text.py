@@ -1,4 +1,4 @@
-"""A study's pre-registration as Markdown: what is expected, shown, asked, tested and left out."""
+"""A study's pre-registration as Markdown, from hypotheses to exclusions."""
 
 from collections.abc import Iterator, Mapping
 from math import ceil
@@ -20,7 +20,7 @@ TESTS: Mapping[Test, str] = {
     "chi_square": "Pearson's chi-square test of the counts of each point",
     "friedman": "Friedman's test over all conditions",
 }
-"""What each test is, in words."""
+"""Description of each test."""
 _QUESTION_S, _SHOWN_ROWS = 6.0, 12
 
 
@@ -34,10 +34,10 @@ def text(
     """Return the pre-registration of a study.
 
     Args:
-        design: a checked one.
+        design: a checked design.
         questionnaires: by the keys in the design.
-        changes: of each condition what differs from the study's rig, by dotted key.
-        sha256: of the canonical text.
+        changes: for each condition the differences from the study's rig, by dotted key.
+        sha256: hash of the canonical text.
         program: version.
     """
     claims = claims_of(design, questionnaires)
@@ -88,7 +88,7 @@ def sentence(one: Hypothesis, design: StudyDesign) -> str:
 
 
 def size_words(design: StudyDesign, found: PowerClaim) -> str:
-    """Return how many participants a hypothesis takes, and what the planned ones give."""
+    """Return the participants that a hypothesis needs, and the power of the planned ones."""
     asked, wanted = found.question, design.plan.power
     needed = f"{found.needed}" if found.needed is not None else f"more than {MOST}"
     few = found.needed is None or found.participants < found.needed
@@ -104,7 +104,7 @@ def size_words(design: StudyDesign, found: PowerClaim) -> str:
 
 
 def minutes(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) -> int:
-    """Return about how long a session takes."""
+    """Return the approximate duration of a session, minutes."""
     trials = len(shown(design)) * design.trials.repetitions + design.trials.practice
     sides = 2 if design.task == "pairwise" else 1
     items = sum(len(questionnaires[key].items) for key in design.questionnaires)
@@ -194,7 +194,7 @@ def _rests(design: StudyDesign) -> str:
 
 
 def _rows(design: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Return the orders of the first participants, as far as they do not repeat."""
+    """Yield the orders of the first participants until they repeat."""
     every = rows(design) if design.trials.order == "williams" else design.plan.participants
     for number in range(1, min(every, _SHOWN_ROWS) + 1):
         yield str(number), ", ".join(one.replace(PAIR, " then ") for one in orders(design, number))
@@ -239,7 +239,7 @@ def _answers(item: Item, language: str) -> str:
 
 
 def _cell(words: str) -> str:
-    """Return text that a table's cell can hold."""
+    """Return text in a form for a table's cell."""
     return words.replace("|", "\\|")
 
 

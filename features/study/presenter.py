@@ -1,4 +1,4 @@
-"""What shows a condition to a participant: the head in the room, or films in the browser."""
+"""Presentation of conditions: the head in the room, or films in the browser."""
 
 from dataclasses import dataclass
 from math import nan
@@ -8,49 +8,49 @@ from gazerig.features.study.session import ShownTrial
 
 
 class HeadLost(Exception):
-    """The head cannot show anything any more; the message says why."""
+    """The head cannot show conditions any more; the message gives the reason."""
 
 
 @dataclass(frozen=True)
 class Presented:
-    """What is known of a presentation that has ended; see records.TrialEnded."""
+    """Data of a presentation that has ended; see records.TrialEnded."""
 
     recording: str = ""
     span_s: tuple[float, float] = (nan, nan)
 
 
 class Presenter(Protocol):
-    """Shows conditions; its calls come from one thread at a time."""
+    """Shows conditions; it is called from one thread at a time."""
 
     def begin(self, shown: ShownTrial) -> None:
-        """Show a condition from now on.
+        """Start to show a condition.
 
         Raises:
-            HeadLost: it cannot.
+            HeadLost: it cannot be shown.
         """
 
     def end(self) -> Presented:
-        """Return what is known of the presentation that ends now."""
+        """End the presentation; return its data."""
 
     def fault(self) -> str:
-        """Return why nothing can be shown, "" while all is well."""
+        """Return why conditions cannot be shown, "" without a fault."""
 
     def restart(self) -> None:
-        """Try to have the head again after a fault; what is wrong then ``fault`` says."""
+        """Try to restart the head after a fault; ``fault`` reports the result."""
 
 
 class FilmPresenter:
-    """Films are shown by the browser: nothing is to be done here."""
+    """Does nothing, because the browser shows the films."""
 
     def begin(self, shown: ShownTrial) -> None:
         """Do nothing."""
 
     def end(self) -> Presented:
-        """Return that nothing was recorded."""
+        """Report that nothing was recorded."""
         return Presented()
 
     def fault(self) -> str:
-        """Return that all is well."""
+        """Report no fault."""
         return ""
 
     def restart(self) -> None:

@@ -1,7 +1,7 @@
-"""How far a participant has come: follows from the design and the records alone.
+"""Progress of a participant, which follows from the design and the records alone.
 
-A session that was cut off goes on where it was: a presentation that was under way begins again,
-everything else is as it was.
+A session that was interrupted resumes at the same place; only a presentation that was in progress
+starts again.
 """
 
 from collections.abc import Iterable
@@ -24,10 +24,10 @@ Step = Literal["consent", "instructions", "rest", "ready", "presentation", "ques
 
 @dataclass(frozen=True)
 class StudyPlace:
-    """Where in a study a participant is.
+    """A participant's place in a study.
 
     trial: practice trials below 0, None outside trials; side: 1 in the second half of a pair
-    questionnaire: key of the one that is asked, "" elsewhere
+    questionnaire: key of the present questionnaire, "" without one
     """
 
     step: Step
@@ -38,17 +38,17 @@ class StudyPlace:
 
 
 class StudyProgress:
-    """What a participant has done, and what comes next.
+    """The completed steps of a participant, and the next one.
 
     Attributes:
-        order: Of the trials that count: condition keys, or pairs "a|b".
+        order: Condition keys, or pairs "a|b", of the trials that count.
         trials: The same by number, practice trials below 0.
-        began: The presentation under way.
+        began: The presentation in progress.
         consented, closed: The decision and the end, None before.
 
     Args:
-        design: a checked one.
-        participant: from 1; it chooses the order.
+        design: a checked design.
+        participant: from 1; it selects the order.
     """
 
     def __init__(self, design: StudyDesign, participant: int) -> None:
@@ -83,12 +83,12 @@ class StudyProgress:
                     self.closed = one
 
     def pass_by(self, place: StudyPlace) -> None:
-        """Leave a place of which nothing is recorded: the instructions, a rest."""
+        """Leave a place without a record: the instructions, a rest."""
         self._passed.add(place)
 
     @property
     def place(self) -> StudyPlace:
-        """Return where the participant is."""
+        """Return the participant's place."""
         if self.closed is not None:
             return StudyPlace("end")
         if self.consented is None:
@@ -113,12 +113,12 @@ class StudyProgress:
             self._lost[one.trial] = self._lost.get(one.trial, 0) + 1
 
     def _given_up(self, trial: int) -> bool:
-        """Whether the head was lost too often in a trial, by the design's rule."""
+        """Return whether the head was lost too often in a trial, by the design's rule."""
         rule = self._design.exclusion
         return self._lost.get(trial, 0) > (rule.repeats if rule.lost_head == "repeat" else 0)
 
     def _in_trial(self, trial: int) -> StudyPlace | None:
-        """Return where in a trial the participant is, None if it is done."""
+        """Return the participant's place in a trial, None after its end."""
         if self._given_up(trial):
             return None
         every = self._design.trials.rest_every

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from gazerig.params import Bounds
 
 Texts = Mapping[str, str]
-"""Language -> text; "en" is always there, and is shown where the study's language is missing."""
+"""Language -> text; "en" is required, and replaces a missing language."""
 
 
 # fmt: off
@@ -20,8 +20,8 @@ class Item:
 
     kind:
         rating: one of ``points`` from ``low`` to ``high``
-        choice: which of two presentations, "first" or "second"
-        text: free text, which may be left empty
+        choice: one of two presentations, "first" or "second"
+        text: free text, which may be empty
     """
 
     text: Annotated[Texts, "the question; empty where the anchors say it all"] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Item:
 
 @dataclass(frozen=True)
 class Questionnaire:
-    """Items asked together."""
+    """Items on one page."""
 
     title: Annotated[str, "name in the report"]
     source: Annotated[str, "reference in full"]

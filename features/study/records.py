@@ -1,8 +1,8 @@
-"""What is known of one participant: one line a record, in the order in which it happened.
+"""The records of one participant: one line per record, in order of time.
 
 A participant's journal (gazerig.features.study.journal) holds these as JSON, each on disk before
-the next page is shown. Conditions are named by their keys in the design; what a browser is sent
-never comes from here.
+the next page is shown. Conditions are named by their keys in the design; browsers never receive
+these records.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from math import nan
 from typing import Literal
 
 STEP_DEG = "largest_step_deg"
-"""Largest step of any joint's goal, from tick to tick, in the switch to the condition."""
+"""Largest step of any joint's goal between two ticks, in the switch to the condition."""
 Outcome = Literal["complete", "head_lost", "interrupted", "withdrawn"]
 AnswerValue = int | str | None
 """A rating 1..points, "first"/"second", free text, or None: not answered."""
@@ -23,7 +23,7 @@ class Opened:
 
     design_sha256: of the design's canonical text (gazerig.features.study.preregistration)
     order: condition keys of all trials in order, for pairs "a|b" as first and second
-    program: version; simulated: the participant is
+    program: version; simulated: whether the participant is simulated
     """
 
     participant: str
@@ -36,7 +36,7 @@ class Opened:
 
 @dataclass(frozen=True)
 class Consented:
-    """Consent to each use, as the consent page asked it."""
+    """Consent to each use, as requested on the consent page."""
 
     given: bool
     pictures: bool
@@ -63,8 +63,8 @@ class TrialBegan:
 class TrialEnded:
     """A presentation ended.
 
-    recording: file beside the journal, "" without; reason: why it was not completed
-    from_s, to_s: when it began and ended in the recording's time, nan without one
+    recording: file next to the journal, "" without; reason: why it was not completed
+    from_s, to_s: its start and end in the recording's time, nan without a recording
     """
 
     trial: int
@@ -83,8 +83,8 @@ class TrialEnded:
 class ItemAnswered:
     """One item was answered.
 
-    trial: None for what is asked once at the end; condition: "a|b" for a pair
-    ms: from the page's appearance to the answer, as the browser measured it
+    trial: None for questions at the end; condition: "a|b" for a pair
+    ms: from the page's appearance to the answer, as measured by the browser
     """
 
     trial: int | None
@@ -98,9 +98,9 @@ class ItemAnswered:
 
 @dataclass(frozen=True)
 class Measured:
-    """Measures of one presentation: name -> value, nan where there is none.
+    """Measures of one presentation: name -> value, nan if unknown.
 
-    values: the design's objective ones, and STEP_DEG
+    values: the design's objective measures, and STEP_DEG
     """
 
     trial: int

@@ -1,6 +1,6 @@
-"""Rules of a study that need no rig: what is wrong with a design or a questionnaire, and the cure.
+"""Rules of a study that need no rig: errors of a design or a questionnaire, with remedies.
 
-Each rule returns (dotted key, broken rule), as the rules between the sections of a rig do.
+Each rule yields (dotted key, broken rule), like the rules between the sections of a rig.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -19,7 +19,7 @@ _NAME = "small letters, digits and _, a letter first, at most 40"
 
 
 def design_rules(design: StudyDesign) -> Found:
-    """Find what is wrong with a design by itself."""
+    """Yield errors within a design."""
     count = len(design.conditions)
     if not _LEAST <= count <= _MOST:
         words = "a study compares two to six; " + (
@@ -36,7 +36,7 @@ def design_rules(design: StudyDesign) -> Found:
 
 
 def _translation_rules(design: StudyDesign) -> Found:
-    """Find translations that nobody can read, and such as leave something out."""
+    """Yield translations that no page uses, and incomplete ones."""
     for language, texts in design.translations.items():
         at = f"translations.{language}"
         if language not in LANGUAGES:
@@ -47,7 +47,7 @@ def _translation_rules(design: StudyDesign) -> Found:
 
 
 def _shown_rules(design: StudyDesign) -> Found:
-    """Find what cannot be shown, and settings that nothing will come of."""
+    """Yield conditions that cannot be shown, and settings without effect."""
     if design.presentation.scene is not None and design.presentation.world is not None:
         yield "presentation.world", "there is a scene as well; give one of them"
     for key, one in design.conditions.items():
@@ -68,7 +68,7 @@ def _shown_rules(design: StudyDesign) -> Found:
 
 
 def _factor_rules(design: StudyDesign) -> Found:
-    """Find factors that do not say of every condition what it is."""
+    """Yield factors that do not define the level of every condition."""
     names = dict.fromkeys(name for one in design.conditions.values() for name in one.factors)
     cells: dict[tuple[str | None, ...], str] = {}
     for key, one in design.conditions.items():
@@ -86,7 +86,7 @@ def _factor_rules(design: StudyDesign) -> Found:
 
 
 def _number_rules(design: StudyDesign) -> Found:
-    """Find numbers of participants with which orders are not balanced."""
+    """Yield numbers of participants that do not balance the orders."""
     if not _LEAST <= len(design.conditions) <= _MOST:
         return
     wanted, every = design.plan.participants, rows(design)
@@ -102,7 +102,7 @@ def _number_rules(design: StudyDesign) -> Found:
 
 
 def _objective_rules(design: StudyDesign) -> Found:
-    """Find objective measures that nothing can measure."""
+    """Yield objective measures that cannot be measured."""
     for i, name in enumerate(design.objective):
         if name in design.objective[:i]:
             yield f"objective.{i}", "stands twice"
@@ -113,7 +113,7 @@ def _objective_rules(design: StudyDesign) -> Found:
 
 
 def objective_rules(design: StudyDesign, known: Collection[str]) -> Found:
-    """Find objective measures that there are not; known: those of the report."""
+    """Yield unknown objective measures; known: the measures of the report."""
     for i, name in enumerate(design.objective):
         if name not in GAZE_MEASURES and name not in known:
             there = ", ".join((*GAZE_MEASURES, *known))
@@ -121,7 +121,7 @@ def objective_rules(design: StudyDesign, known: Collection[str]) -> Found:
 
 
 def questionnaire_rules(asked: Questionnaire) -> Found:
-    """Find what is wrong with a questionnaire by itself."""
+    """Yield errors within a questionnaire."""
     if not asked.items:
         yield "items", "there are none; write at least one"
     for language in asked.instruction:
@@ -141,7 +141,7 @@ def questionnaire_rules(asked: Questionnaire) -> Found:
 
 
 def _item_rules(key: str, item: Item) -> Found:
-    """Find what is wrong with one item."""
+    """Yield errors of one item."""
     at = f"items.{key}"
     if not JOINT_NAME.fullmatch(key):
         yield at, f"no key of an item: {_NAME}"
@@ -165,9 +165,9 @@ def _item_rules(key: str, item: Item) -> Found:
 
 
 def asked_rules(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) -> Found:
-    """Find what does not fit between the task, the questions and the hypotheses.
+    """Yield contradictions between the task, the questions and the hypotheses.
 
-    questionnaires: by the keys in the design; those that could not be read are missing
+    questionnaires: by the keys in the design, without invalid ones
     """
     every = (*design.questionnaires, *design.after)
     for i, key in enumerate(every):
@@ -196,7 +196,7 @@ def asked_rules(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
 
 
 def _place(design: StudyDesign, i: int) -> str:
-    """Return the key of a questionnaire, those after each trial counted first."""
+    """Return the key of a questionnaire; those after each trial are counted first."""
     n = len(design.questionnaires)
     return f"questionnaires.{i}" if i < n else f"after.{i - n}"
 
@@ -204,7 +204,7 @@ def _place(design: StudyDesign, i: int) -> str:
 def _hypothesis_rules(
     design: StudyDesign, one: Hypothesis, known: Mapping[str, Measure], complete: bool
 ) -> Found:
-    """Find what keeps a hypothesis from being tested."""
+    """Yield the reasons why a hypothesis cannot be tested."""
     yield from _side_rules(design, one)
     measure = known.get(one.measure)
     if measure is None:
@@ -227,7 +227,7 @@ def _hypothesis_rules(
 
 
 def _side_rules(design: StudyDesign, one: Hypothesis) -> Found:
-    """Find what keeps both sides of a hypothesis from being compared."""
+    """Yield the reasons why both sides of a hypothesis cannot be compared."""
     sides = {key: design.side(getattr(one, key)) for key in ("better", "than")}
     for key, side in sides.items():
         if not side:
@@ -251,7 +251,7 @@ def _side_rules(design: StudyDesign, one: Hypothesis) -> Found:
 
 
 def _factor_levels(design: StudyDesign) -> list[str]:
-    """Return the levels of all factors as hypotheses name them."""
+    """Return the levels of all factors in the form of hypotheses."""
     pairs = [pair for one in design.conditions.values() for pair in one.factors.items()]
     return [f"{factor}={level}" for factor, level in dict.fromkeys(pairs)]
 
@@ -261,7 +261,7 @@ _EXPLORATORY: Mapping[Test, str] = {
     "chi_square": "has no sign and treats each answer as another person's, so it cannot decide",
 }
 LEVEL_TESTS = ("signed_rank", "rank_sum")
-"""Tests of a participant's means, which may go over several conditions."""
+"""Tests of a participant's means, which may include several conditions."""
 
 
 def _misfit(test: str, measure: Measure, conditions: int) -> str:
@@ -285,6 +285,6 @@ _KINDS = {
 
 
 def _listed(known: Iterable[str]) -> str:
-    """Return names for a message; of many, the first."""
+    """Return names for a message; of a long list the first twelve."""
     names = list(known)
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

@@ -1,4 +1,4 @@
-"""A measure as numbers: one a participant and condition, and the single answers behind them."""
+"""A measure as numbers: one per participant and condition, and the single answers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from gazerig.gaze.types import Floats
 
 @dataclass(frozen=True)
 class Scores:
-    """A measure of all who count.
+    """A measure of all participants who count.
 
-    participants: codes, in the order of the rows; conditions: keys, in that of the columns
-    means: (participants, conditions) over items and repetitions, nan where nothing is known
-    places: (participants, conditions) where each condition was first seen, from 0
-    single: (answers, 3) row of the participant, column of the condition, and the answer itself
+    participants: codes, in the order of the rows; conditions: keys, in the order of the columns
+    means: (participants, conditions) over items and repetitions, nan if unknown
+    places: (participants, conditions) position at which each condition was first seen, from 0
+    single: (answers, 3) row of the participant, column of the condition, and the answer
     """
 
     measure: Measure
@@ -32,11 +32,11 @@ class Scores:
     single: Floats
 
     def columns(self, conditions: Sequence[str]) -> list[int]:
-        """Return where conditions stand."""
+        """Return the columns of conditions."""
         return [self.conditions.index(condition) for condition in conditions]
 
     def column(self, *conditions: str) -> Floats:
-        """Return the means of one condition, or over several, (participants,); nan with a gap."""
+        """Return the means over one or more conditions, (participants,); nan if incomplete."""
         found: Floats = self.means[:, self.columns(conditions)].mean(axis=1)
         return found
 
@@ -46,7 +46,7 @@ class Scores:
         return found
 
     def first_seen(self, *conditions: str) -> Floats:
-        """Return at which place the first of these conditions was seen, (participants,)."""
+        """Return the position at which the first of these conditions was seen, (participants,)."""
         found: Floats = self.places[:, self.columns(conditions)].min(axis=1)
         return found
 
@@ -57,11 +57,11 @@ def scores(
     conditions: Sequence[str],
     questionnaires: Mapping[str, Questionnaire],
 ) -> Scores:
-    """Return a measure of all participants of whom it is known.
+    """Return a measure of all participants with data.
 
     Args:
         measure: a rating, a scale's mean or an objective measure.
-        people: with what is left out marked.
+        people: participants, with exclusions marked.
         conditions: keys of the design.
         questionnaires: by the keys in the design.
     """
@@ -92,9 +92,9 @@ def scores(
 def _values(
     measure: Measure, one: Participation, questionnaires: Mapping[str, Questionnaire]
 ) -> list[tuple[str, float]]:
-    """Return (condition, value) of each trial; of a scale the mean of its items, turned round.
+    """Return (condition, value) of each trial; for a scale the mean of its items after reversal.
 
-    A scale of which fewer than half of the items are answered has no value.
+    A scale with answers to fewer than half of its items has no value.
     """
     if measure.kind == "objective":
         return [
@@ -115,16 +115,16 @@ def _values(
 
 
 def turned(row: AnswerRow, questionnaires: Mapping[str, Questionnaire]) -> float:
-    """Return a rating with reversed items turned round, so that more is more of the scale."""
+    """Return a rating, with reversed items inverted, so that higher means more of the scale."""
     item = questionnaires[row.questionnaire].items[row.item]
-    assert row.value is not None  # such rows are left out
+    assert row.value is not None  # rows without an answer are excluded
     return item.points + 1.0 - float(row.value) if item.reverse else float(row.value)
 
 
 def item_answers(
     measure: Measure, people: Sequence[Participation], questionnaires: Mapping[str, Questionnaire]
 ) -> Floats:
-    """Return the answers to a scale's items, (presentations, items), of whole pages alone."""
+    """Return the answers to a scale's items, (presentations, items), of complete pages only."""
     pages: dict[tuple[str, int | None], dict[str, float]] = {}
     for one in people:
         for row in one.counted:

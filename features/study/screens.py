@@ -1,6 +1,6 @@
-"""What a participant is shown, one screen after the other.
+"""The screens of a participant.
 
-A screen says nothing of conditions: all that a browser may know is in it.
+A screen contains only what a browser may know, and nothing about conditions.
 """
 
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ Ending = Literal["finished", "declined", "withdrawn", "excluded"]
 
 @dataclass(frozen=True)
 class ConsentScreen:
-    """What is kept, and whether the participant agrees.
+    """The stored data, and the participant's consent.
 
-    pictures, gaze: the use is asked for; of films never, as no camera sees who looks at them
+    pictures, gaze: consent to this use is requested; never for films, which no camera observes
     """
 
     pictures: bool
@@ -24,7 +24,7 @@ class ConsentScreen:
 
 @dataclass(frozen=True)
 class InstructionsScreen:
-    """What will happen."""
+    """Description of the session."""
 
     trials: int
     practice: int
@@ -33,7 +33,7 @@ class InstructionsScreen:
 
 @dataclass(frozen=True)
 class ReadyScreen:
-    """Before a presentation: it begins when the participant says so.
+    """Before a presentation, which the participant starts.
 
     number: of the trial, from 1; among ``of`` trials, or practice trials
     side: 0, or 1 for the second presentation of a pair
@@ -52,7 +52,7 @@ class ReadyScreen:
 class PresentationScreen:
     """A presentation.
 
-    film: name under which the film is fetched, another one each time; "" for the head itself
+    film: name under which the film is fetched, different each time; "" for the head itself
     """
 
     number: int
@@ -76,8 +76,8 @@ class Question:
 class QuestionsScreen:
     """One page of questions.
 
-    instruction: what stands above them, by language; empty for nothing
-    once: they are asked once at the end, not of a trial; number is then 0
+    instruction: text above them, by language; empty without one
+    once: they are asked once at the end, not about a trial; number is then 0
     """
 
     number: int
@@ -91,19 +91,19 @@ class QuestionsScreen:
 
 @dataclass(frozen=True)
 class RestScreen:
-    """A rest of at least so many seconds."""
+    """A rest with a minimum duration."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class PausedScreen:
-    """The experimenter has something to do first, e.g. the head is not ready."""
+    """The experimenter must act first, e.g. because the head is not ready."""
 
 
 @dataclass(frozen=True)
 class EndScreen:
-    """The last screen; after ``finished`` it tells what the study was about."""
+    """The last screen; after ``finished`` it explains the study."""
 
     how: Ending
 

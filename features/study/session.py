@@ -1,4 +1,4 @@
-"""One participant's session: which screen is shown, and what is recorded of it.
+"""One participant's session: the present screen and its records.
 
 Methods propose records; they take effect with ``add``, once they are on disk.
 """
@@ -43,12 +43,12 @@ from gazerig.features.study.screens import (
 
 INTERRUPTED = "the program ended"
 _ITEMS = 2
-"""Stream of random numbers of the trials' seed; orders have others."""
+"""Random stream of the trials' seed; orders use others."""
 
 
 @dataclass(frozen=True)
 class ShownTrial:
-    """The presentation that comes or is under way; for the experimenter and the head alone."""
+    """The next or present presentation; for the experimenter and the head only."""
 
     trial: int
     attempt: int
@@ -73,14 +73,14 @@ class StudySession:
     """A participant's session.
 
     Attributes:
-        paused: The experimenter has something to do first: no presentation begins.
+        paused: The experimenter must act first: no presentation begins.
 
     Args:
-        design: a checked one.
+        design: a checked design.
         questionnaires: by the keys in the design.
-        participant: from 1; it chooses the order.
-        secret: makes names of pages and films that nobody can guess.
-        records: what is known of the participant already.
+        participant: from 1; it selects the order.
+        secret: key for unguessable names of pages and films.
+        records: the participant's previous records.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class StudySession:
 
     @property
     def screen(self) -> Screen:
-        """Return what the participant sees now."""
+        """Return the participant's present screen."""
         place, design = self._progress.place, self.design
         if self.paused and place.step == "ready":
             return PausedScreen()
@@ -129,14 +129,14 @@ class StudySession:
 
     @property
     def page(self) -> str:
-        """Return the name of the present screen; the same screen has it again after a crash."""
+        """Return the name of the present screen, which is the same after a crash."""
         return self._token(
             "paused" if self.screen == PausedScreen() else "page", self._progress.place
         )
 
     @property
     def shown(self) -> ShownTrial | None:
-        """Return the presentation that comes or is under way, None between them."""
+        """Return the next or present presentation, None between them."""
         place = self._progress.place
         if place.step not in ("ready", "presentation") or place.trial is None:
             return None
@@ -145,7 +145,7 @@ class StudySession:
 
     @property
     def asked(self) -> "AskedItems | None":
-        """Return what is asked now, None where nothing is; for the program alone."""
+        """Return the present questions, None without any; for the program only."""
         place = self._progress.place
         if place.step != "questions":
             return None
@@ -155,21 +155,21 @@ class StudySession:
 
     @property
     def trial(self) -> int | None:
-        """Return the trial that the participant is in, practice trials below 0; None outside."""
+        """Return the participant's trial, practice trials below 0; None outside."""
         return self._progress.place.trial
 
     @property
     def closed(self) -> bool:
-        """Return whether the session has ended for good."""
+        """Return whether the session has ended permanently."""
         return self._progress.closed is not None
 
     def agreed(self) -> tuple[bool, bool]:
-        """Return whether the participant's gaze may be kept, and pictures of the camera."""
+        """Return whether the participant's gaze may be stored, and camera pictures."""
         said = self._progress.consented
         return (False, False) if said is None else (said.gaze, said.pictures)
 
     def film_of(self, token: str) -> str | None:
-        """Return the condition whose film is shown now under this name, None for another name."""
+        """Return the condition of the film that is shown under this name, None for another name."""
         place, shown = self._progress.place, self.shown
         if shown is None or place.step != "presentation":
             return None
@@ -179,11 +179,11 @@ class StudySession:
     def opened(
         self, code: str, design_sha256: str, program: str, utc: str, simulated: bool = False
     ) -> Opened:
-        """Return the record with which a session begins or is resumed."""
+        """Return the record of the start or resumption of a session."""
         return Opened(code, design_sha256, self.order, program, utc, simulated)
 
     def resumed(self, utc: str) -> tuple[Record, ...]:
-        """Return what is recorded of a presentation that was cut off as the program ended."""
+        """Return the records of a presentation that was interrupted by the end of the program."""
         if self._progress.began is None:
             return ()
         return self._cut("interrupted", nan, utc, INTERRUPTED)
@@ -217,7 +217,7 @@ class StudySession:
         """Return the record of the presentation that begins now.
 
         Raises:
-            WrongAnswer: none is to begin.
+            WrongAnswer: no presentation can begin.
         """
         self._require("ready")
         shown = self.shown
@@ -237,15 +237,15 @@ class StudySession:
         """Return the record of the presentation that ends now.
 
         Args:
-            outcome: how.
-            seconds: how long it was shown.
-            utc: when.
+            outcome: outcome of the presentation.
+            seconds: its duration.
+            utc: its end.
             reason: why it was not completed.
-            recording: file beside the journal that holds it.
-            span_s: its beginning and end in the recording's time.
+            recording: its file next to the journal.
+            span_s: its start and end in the recording's time.
 
         Raises:
-            WrongAnswer: none is under way.
+            WrongAnswer: no presentation is in progress.
         """
         self._require("presentation")
         return self._cut(outcome, seconds, utc, reason, recording, span_s)
@@ -261,16 +261,16 @@ class StudySession:
 
         Args:
             values: answers.
-            ms: response times as the browser reports them.
-            utc: when.
-            longest_ms: for how long the page was shown by the host's clock, nan: not known.
+            ms: response times as reported by the browser.
+            utc: the time.
+            longest_ms: how long the page was shown by the host's clock, nan: unknown.
 
         Raises:
-            WrongAnswer: no questions are shown, one is not answered, or not as it can be.
+            WrongAnswer: no questions are shown, or an answer is missing or invalid.
         """
         self._require("questions")
         asked, items = self.asked, self._items(self._progress.place)
-        assert asked is not None  # on a page of questions
+        assert asked is not None  # a page of questions
         if unknown := set(values) - set(range(len(items))):
             raise WrongAnswer(f"there is no question {min(unknown)}")
         at = (asked.trial, asked.condition, asked.questionnaire)
@@ -284,19 +284,19 @@ class StudySession:
         return tuple(records)
 
     def finish(self, utc: str) -> tuple[Record, ...]:
-        """Return the record of the end, once nothing is left to show or ask."""
+        """Return the record of the end, once nothing remains to show or ask."""
         if self.closed or self._progress.place.step != "end":
             return ()
         return (Closed("finished", "", utc),)
 
     def withdraw(self, utc: str) -> tuple[Record, ...]:
-        """Return the records of a participant who leaves the study."""
+        """Return the records of a participant's withdrawal."""
         if self.closed:
             return ()
         return (*self._cut("withdrawn", nan, utc), Closed("withdrawn", "", utc))
 
     def exclude(self, reason: str, utc: str) -> tuple[Record, ...]:
-        """Return the records of a participant whom the experimenter excludes."""
+        """Return the records of the experimenter's exclusion of the participant."""
         if self.closed:
             return ()
         return (*self._cut("interrupted", nan, utc, reason), Closed("excluded", reason, utc))
@@ -314,7 +314,7 @@ class StudySession:
         recording: str = "",
         span_s: tuple[float, float] = (nan, nan),
     ) -> tuple[Record, ...]:
-        """Return the record of the end of the presentation under way, none without one."""
+        """Return the record of the end of the present presentation, none without one."""
         began = self._progress.began
         if began is None:
             return ()
@@ -329,7 +329,7 @@ class StudySession:
         return "declined" if consented is not None and not consented.given else closed.how
 
     def _number(self, place: StudyPlace) -> tuple[int, int, bool, bool]:
-        """Return the trial's number, of how many, whether it is practice, and of pairs."""
+        """Return the trial's number, the number of trials, whether it is practice, and of pairs."""
         pair = self.design.task == "pairwise"
         if place.trial is None:
             return 0, 0, False, pair
@@ -339,14 +339,14 @@ class StudySession:
         return place.trial + 1, len(self.order), False, pair
 
     def _items(self, place: StudyPlace) -> list[tuple[str, Item]]:
-        """Return the items of a page in the order in which this participant gets them."""
+        """Return the items of a page in this participant's order."""
         asked = self._questionnaires[place.questionnaire]
         items = list(asked.items.items())
         if not asked.shuffled:
             return items
         every = (*self.design.questionnaires, *self.design.after)
         trials = self.design.trials
-        # A seed is not negative; the numbers of practice trials are.
+        # Seeds are not negative, but the numbers of practice trials are.
         row = 0 if place.trial is None else place.trial + trials.practice + 1
         key = (trials.seed, self.participant, _ITEMS, every.index(place.questionnaire), row)
         return [items[i] for i in np.random.default_rng(key).permutation(len(items))]

@@ -1,4 +1,4 @@
-"""Where the shipped studies and questionnaires are."""
+"""Folder of the shipped studies and questionnaires."""
 
 from pathlib import Path
 

@@ -1,10 +1,11 @@
-"""Simulated participants: answers with a known effect, to try a study before anybody comes.
+"""Simulated participants: answers with a known effect, to try a study before the first session.
 
-A rating is a latent normal value cut by thresholds: the participant's own level, what the trial
-left (shared by the items of a scale), the item's noise, and the shift of the condition. The shift
-is solved so that the differences of participants between neighbouring conditions have the wanted
-d_z as they will be analysed: whole points, means of scales and of repetitions. A choice follows
-Bradley & Terry (1952), with the chance that such a difference is above zero.
+A rating is a latent normal value cut by thresholds: the sum of the participant's own level, a
+trial's deviation (shared by the items of a scale), the item's noise, and the shift of the
+condition. The shift is solved so that the participants' differences between neighbouring
+conditions have the required d_z as they will be analysed: integer points, means of scales and of
+repetitions. A choice follows Bradley & Terry (1952), with the probability that such a difference
+is above zero.
 """
 
 from collections.abc import Mapping
@@ -25,8 +26,8 @@ from gazerig.gaze.types import Floats
 from gazerig.params import Bounds
 
 BETWEEN_SD, TRIAL_SD, ITEM_SD = 0.8, 0.7, 0.7
-"""Spreads of participants, of their trials, and of items within a trial; those of d_z's noise are
-the last two, as a participant's level is in both conditions."""
+"""Standard deviations of participants, of their trials, and of items within a trial; the noise of
+d_z contains the last two, because a participant's level is in both conditions."""
 
 _TOTAL_SD = sqrt(BETWEEN_SD**2 + TRIAL_SD**2 + ITEM_SD**2)
 _NODES, _RAW_WEIGHTS = np.polynomial.hermite_e.hermegauss(31)
@@ -39,7 +40,7 @@ _OBJECTIVE_MIDDLE, _OBJECTIVE_SD = 0.5, 0.1
 # fmt: off
 @dataclass(frozen=True)
 class Population:
-    """Whom simulated participants are drawn from."""
+    """Distribution of simulated participants."""
 
     effect: Annotated[float, Bounds(-3, 3), "d_z of the differences between neighbouring conditions"] = 0.6
     careless: Annotated[float, Bounds(0, 1), "share who give one answer to everything"] = 0.0
@@ -51,25 +52,25 @@ class Population:
 
 
 def levels(design: StudyDesign) -> dict[str, int]:
-    """Return how far up each condition stands by the hypotheses, the lowest at 0.
+    """Return the rank of each condition by the hypotheses, the lowest at 0.
 
-    Without hypotheses the first condition stands above the others.
+    Without hypotheses the first condition is above the others.
     """
     pairs = [pair for one in design.hypotheses for pair in design.matched(one)]
     first, *others = design.conditions
     pairs = pairs or [(first, other) for other in others]
     found = dict.fromkeys(design.conditions, 0)
-    for _ in design.conditions:  # as many rounds as the longest chain; circles end with them
+    for _ in design.conditions:  # enough rounds for the longest chain; cycles end, too
         for better, than in pairs:
             found[better] = max(found[better], min(found[than] + 1, len(found) - 1))
     return found
 
 
 def compared_trials(design: StudyDesign) -> int:
-    """Return over how many trials of a participant the mean goes of which a hypothesis decides.
+    """Return the number of a participant's trials in the mean that a hypothesis compares.
 
-    Those of all conditions of a factor's level, or of one condition, each as often as it is shown;
-    where hypotheses differ in that, the fewest.
+    These are the trials of all conditions of a factor's level, or of one condition, with their
+    repetitions; for different hypotheses the smallest number.
     """
     sides = [len(design.side(one.better)) for one in design.hypotheses]
     return min(sides, default=1) * design.trials.repetitions
@@ -77,7 +78,7 @@ def compared_trials(design: StudyDesign) -> int:
 
 @cache
 def thresholds(points: int) -> tuple[float, ...]:
-    """Return the latent values between the points, used equally often where nothing shifts."""
+    """Return the latent values between the points, which are equally frequent without a shift."""
     shares = np.arange(1, points) / points
     return tuple((_TOTAL_SD * special.ndtri(shares)).tolist())
 
@@ -87,7 +88,7 @@ def shift_of(effect: float, points: int, items: int = 1, repetitions: int = 1) -
     """Return the latent shift that gives differences of this d_z.
 
     Args:
-        effect: d_z of mean ratings of the shifted condition less those of the other.
+        effect: d_z of mean ratings of the shifted condition minus those of the other.
         points: steps of the rating.
         items: of the scale whose mean is analysed.
         repetitions: trials of each condition.
@@ -102,9 +103,9 @@ def shift_of(effect: float, points: int, items: int = 1, repetitions: int = 1) -
 
 
 def effect_of(shift: float, points: int, items: int = 1, repetitions: int = 1) -> float:
-    """Return d_z of the differences that a shift of half up and half down gives.
+    """Return d_z of the differences from a shift of half up and half down.
 
-    By Gauss-Hermite quadrature over the participant's level and what the trial left.
+    By Gauss-Hermite quadrature over the participant's level and the trial's deviation.
     """
     own = BETWEEN_SD * _NODES[:, None]
     trial = TRIAL_SD * _NODES[None, :]
@@ -124,8 +125,8 @@ def effect_of(shift: float, points: int, items: int = 1, repetitions: int = 1) -
 
 
 def _moments(latent: Floats, points: int) -> tuple[Floats, Floats]:
-    """Return mean and mean square of the rating at latent values without the item's noise."""
-    # The rating is 1 and one more for each threshold that is passed.
+    """Return mean and mean square of the rating for latent values without the item's noise."""
+    # The rating is 1 plus the number of thresholds below the value.
     above = special.ndtr((latent[..., None] - np.array(thresholds(points))) / ITEM_SD)
     mean: Floats = 1.0 + above.sum(axis=-1)
     square: Floats = 1.0 + (above * (2.0 * np.arange(2, points + 1) - 1.0)).sum(axis=-1)
@@ -133,7 +134,7 @@ def _moments(latent: Floats, points: int) -> tuple[Floats, Floats]:
 
 
 def preference(effect: float) -> float:
-    """Return the chance that the condition above is chosen: that of a difference above zero."""
+    """Return the probability that the better condition is chosen: of a difference above zero."""
     return float(special.ndtr(effect))
 
 
@@ -153,7 +154,7 @@ def differences(
 
 
 class SimulatedParticipant:
-    """One who answers; the same number and population give the same answers in any order."""
+    """A participant; equal numbers and populations give equal answers in any order."""
 
     def __init__(
         self,
@@ -162,13 +163,13 @@ class SimulatedParticipant:
         number: int,
         population: Population,
     ) -> None:
-        """Draw what the participant is like.
+        """Draw the participant's properties.
 
         Args:
             design: of the study.
             questionnaires: by the keys in the design.
             number: from 1.
-            population: whom the participant is drawn from.
+            population: distribution of the participants.
         """
         self._design, self._questionnaires = design, questionnaires
         self._number, self._population = number, population
@@ -182,11 +183,11 @@ class SimulatedParticipant:
     def answer(
         self, trial: int | None, condition: str, questionnaire: str, item: str
     ) -> tuple[AnswerValue, float]:
-        """Return the answer to an item, and the milliseconds that it took.
+        """Return the answer to an item, and its time in milliseconds.
 
         Args:
-            trial: row of the order, practice below 0; None for what is asked once at the end.
-            condition: key, "a|b" for a pair, "" for what is asked once at the end.
+            trial: row of the order, practice below 0; None for questions at the end.
+            condition: key, "a|b" for a pair, "" for questions at the end.
             questionnaire: key in the design.
             item: key in the questionnaire.
         """
@@ -200,7 +201,7 @@ class SimulatedParticipant:
         return self._rating(trial, condition, questionnaire, item, asked, rng), ms
 
     def measured(self, trial: int, condition: str) -> dict[str, float]:
-        """Return the objective measures of a trial, of which each has the population's effect."""
+        """Return the objective measures of a trial, each with the population's effect."""
         shift = sqrt(2.0 / self._shown) * self._population.effect
         values = {}
         for name in self._design.objective:
@@ -211,7 +212,7 @@ class SimulatedParticipant:
         return values
 
     def _preference(self, condition: str, construct: str) -> float:
-        """Return how much more than others this participant likes a condition, latent units."""
+        """Return the participant's own preference for a condition, latent units."""
         if condition not in self._levels:
             return 0.0
         one, found = self._population, 0.0
@@ -258,9 +259,9 @@ class SimulatedParticipant:
         return item.points + 1 - rating if item.reverse else rating
 
     def _height(self, condition: str) -> float:
-        """Return how many shifts a condition lies above the middle; pairs lie there."""
+        """Return the shifts between a condition and the middle; pairs are at the middle."""
         return self._levels[condition] - self._middle if condition in self._levels else 0.0
 
     def _rng(self, of: str) -> np.random.Generator:
-        """Return the random numbers of one thing, whatever was drawn before."""
+        """Return the random numbers of one purpose, independent of earlier draws."""
         return np.random.default_rng((self._population.seed, self._number, crc32(of.encode())))

@@ -1,7 +1,7 @@
-"""One participant's session as it is run: screens out, answers in, everything on disk first.
+"""Execution of one participant's session: screens out, answers in, all data on disk first.
 
-Everything may be called from any thread. What a browser asks for names the page it was asked on;
-what comes twice, or late from a page that is over, changes nothing.
+All methods may be called from any thread. A browser's request names its page; a repeated request,
+or one for a page that is over, has no effect.
 """
 
 import threading
@@ -17,25 +17,25 @@ from gazerig.features.study.screens import PresentationScreen, ReadyScreen, Scre
 from gazerig.features.study.session import ShownTrial, StudySession
 
 WHOLE_SHARE = 0.9
-"""A film of which less was seen has not been shown."""
+"""Share of a film that must be played for a complete presentation."""
 
 
 @dataclass(frozen=True)
 class StudyRunState:
-    """What the experimenter sees.
+    """The session's state for the experimenter.
 
     Attributes:
         participant: Code.
-        screen: What the participant sees.
+        screen: The participant's screen.
         trial: Number of the trial, from 0; below 0 in practice, None outside trials.
-        trials: How many count.
-        shown: The presentation that comes or is under way.
-        presenting: It is under way.
-        elapsed_s: Since it began, 0 without one.
-        answers: How many are on disk.
-        fault: Why nothing can be shown, "" while all is well.
-        paused: By the experimenter.
-        closed: The session has ended for good.
+        trials: Number of trials that count.
+        shown: The next or present presentation.
+        presenting: Whether it is in progress.
+        elapsed_s: Time since its start, 0 without one.
+        answers: Number of answers on disk.
+        fault: Why conditions cannot be shown, "" without a fault.
+        paused: Whether the experimenter has paused the session.
+        closed: Whether the session has ended permanently.
     """
 
     participant: str
@@ -59,8 +59,8 @@ class StudyRun:
         session: with the journal's records.
         journal: open, with the record of the opening.
         presenter: shows the conditions.
-        now_s: returns the time on a clock that never jumps.
-        utc: returns date and time of day.
+        now_s: returns the time of a monotonic clock.
+        utc: returns date and time.
     """
 
     def __init__(
@@ -79,16 +79,16 @@ class StudyRun:
         self._fetched_s = nan
         self._fault = ""
         self._keep(session.resumed(utc()))
-        # How long a page was shown by a program that has ended is not known.
+        # The page's time in an earlier run of the program is unknown.
         self._asked_s = nan
 
     def now(self) -> tuple[str, Screen]:
-        """Return the name of the page that the participant is on, and its screen."""
+        """Return the name of the participant's page, and its screen."""
         with self._lock:
             return self._session.page, self._session.screen
 
     def state(self) -> StudyRunState:
-        """Return what the experimenter sees."""
+        """Return the state for the experimenter."""
         with self._lock:
             session, screen = self._session, self._session.screen
             presenting = isinstance(screen, PresentationScreen)
@@ -113,26 +113,26 @@ class StudyRun:
         """Leave the instructions or a rest.
 
         Raises:
-            WrongAnswer: the page is no such one.
+            WrongAnswer: the page is neither of them.
         """
         with self._lock:
             if page == self._session.page:
                 self._session.go_on()
 
     def begin(self, page: str) -> None:
-        """Begin the presentation.
+        """Start the presentation.
 
-        A head that cannot show it pauses the session, until the experimenter goes on.
+        A head that cannot show it pauses the session, until the experimenter continues.
 
         Raises:
-            NotKept: that it begins could not be written; it does not.
-            WrongAnswer: the page is no such one.
+            NotKept: its start could not be written; it does not start.
+            WrongAnswer: the page is not before a presentation.
         """
         with self._lock:
             if page != self._session.page or not isinstance(self._session.screen, ReadyScreen):
                 return
             shown = self._session.shown
-            assert shown is not None  # of a screen before a presentation
+            assert shown is not None  # a screen before a presentation
             try:
                 self._presenter.begin(shown)
             except HeadLost as lost:
@@ -142,18 +142,18 @@ class StudyRun:
             self._began_s, self._fetched_s = self._now_s(), nan
 
     def film_fetched(self, token: str) -> None:
-        """Note that the participant's browser has the whole film of this name."""
+        """Note that the participant's browser has fetched the whole film of this name."""
         with self._lock:
             if not isfinite(self._fetched_s) and self._session.film_of(token) is not None:
                 self._fetched_s = self._now_s()
 
     def film_ended(self, page: str, seconds: float) -> None:
-        """Record that the browser has shown the film; one cut short begins again.
+        """Record the end of a film; a film that was cut short starts again.
 
         Args:
-            page: on which it was shown.
-            seconds: how much of it was played, as the browser reports. The time since the browser
-                has the film bounds it; a film that was not fetched was not played.
+            page: its page.
+            seconds: time that was played, as reported by the browser. It is limited to the time
+                since the browser has the film; a film that was not fetched was not played.
 
         Raises:
             NotKept: it could not be written.
@@ -163,7 +163,7 @@ class StudyRun:
             if page != self._session.page or not isinstance(screen, PresentationScreen):
                 return
             if not screen.film:
-                return  # the head's own time decides
+                return  # the host's clock decides for a head
             fetched = isfinite(self._fetched_s)
             longest_s = self._now_s() - self._fetched_s if fetched else 0.0
             seconds = min(max(seconds, 0.0), longest_s) if isfinite(seconds) else 0.0
@@ -172,7 +172,7 @@ class StudyRun:
             self._end("complete" if whole else "interrupted", "" if whole else reason, seconds)
 
     def poll(self) -> None:
-        """End the presentation when its time is over or the head was lost; call it often.
+        """End the presentation when its time is over or the head is lost; call it often.
 
         Raises:
             NotKept: the end could not be written; the next call tries again.
@@ -190,16 +190,16 @@ class StudyRun:
                 self._end("complete", "")
 
     def answer(self, page: str, values: Mapping[int, AnswerValue], ms: Mapping[int, float]) -> None:
-        """Record a page of answers; when this returns, they are on disk.
+        """Record a page of answers; on return they are on disk.
 
         Args:
-            page: on which they were given.
+            page: their page.
             values: by the questions' numbers.
-            ms: response times as the browser reports them; none is longer than the page was shown.
+            ms: response times as reported by the browser, limited to the time the page was shown.
 
         Raises:
-            NotKept: they could not be written, and the page is still to be answered.
-            WrongAnswer: one is missing, or not as it can be.
+            NotKept: they could not be written, and the page still needs answers.
+            WrongAnswer: an answer is missing or invalid.
         """
         with self._lock:
             if page == self._session.page:
@@ -207,7 +207,7 @@ class StudyRun:
                 self._keep(self._session.answer(values, ms, self._utc(), longest_ms))
 
     def withdraw(self) -> None:
-        """Record that the participant leaves.
+        """Record the participant's withdrawal.
 
         Raises:
             NotKept: it could not be written.
@@ -216,12 +216,12 @@ class StudyRun:
             self._leave(self._session.withdraw(self._utc()))
 
     def film_of(self, token: str) -> str | None:
-        """Return the condition of the film that is shown now, None for any other name."""
+        """Return the condition of the film that is shown now, None for another name."""
         with self._lock:
             return self._session.film_of(token)
 
     def pause(self, paused: bool) -> None:
-        """Have no presentation begin, or go on, with a head that was lost if it can be had."""
+        """Prevent further presentations, or allow them again and restart a lost head."""
         with self._lock:
             if not paused and self._presenter.fault():
                 self._presenter.restart()
@@ -233,15 +233,15 @@ class StudyRun:
                 self._fault = ""
 
     def repeat(self) -> None:
-        """Have the presentation under way begin again.
+        """Repeat the present presentation.
 
         Raises:
             NotKept: it could not be written.
-            WrongAnswer: none is under way.
+            WrongAnswer: no presentation is in progress.
         """
         with self._lock:
             if not isinstance(self._session.screen, PresentationScreen):
-                raise WrongAnswer("no presentation is under way")
+                raise WrongAnswer("no presentation is in progress")
             self._end("interrupted", "the experimenter had it repeated")
 
     def exclude(self, reason: str) -> None:
@@ -254,7 +254,7 @@ class StudyRun:
             self._leave(self._session.exclude(reason, self._utc()))
 
     def _end(self, outcome: Outcome, reason: str, seconds: float = nan) -> None:
-        """End the presentation under way; seconds: how long it was shown, nan: since it began."""
+        """End the present presentation; seconds: its duration, nan: the time since its start."""
         if not isfinite(seconds):
             seconds = self._now_s() - self._began_s
         what = self._presenter.end()
@@ -268,7 +268,7 @@ class StudyRun:
             self._presenter.end()
 
     def _keep(self, records: Sequence[Record]) -> None:
-        """Have records on disk, then take effect; at the end of all, that as well."""
+        """Write records to disk, then apply them; write the last record at the end."""
         self._journal.write(records)
         self._session.add(records)
         self._asked_s = self._now_s()

@@ -129,7 +129,7 @@ def test_the_page_says_what_a_reviewer_asks(page: str, ratings: StudyAnalysis) -
     for words in (
         "Simulated participants: nobody answered", f"{SHA}; all 12 participants carry it",
         "12 came, 12 count, 12 were planned", "chi-square test of the counts",
-        "Wilcoxon rank-sum test", "expected counts are below 5: believe the exact chance",
+        "Wilcoxon rank-sum test", "expected counts are below 5: use the exact chance",
         "differences are symmetric", "No participant is left out",
         "pages answered in less than 300 ms", "corrected (holm)", "“Natural?”",
         "1 = not at all, 5 = very much", "the order of the conditions does not matter",

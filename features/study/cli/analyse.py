@@ -1,4 +1,4 @@
-"""The command ``gazerig study analyse``: what a study's participants have decided."""
+"""The command ``gazerig study analyse``: the results of a study."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -47,7 +47,7 @@ def analyse(
 
 
 def verdicts(study: "StudyAnalysis") -> list[str]:
-    """Return what became of each hypothesis, one a line."""
+    """Return the verdict on each hypothesis, one per line."""
     from gazerig.features.study.report.apa import measure_words
 
     lines = [f"{len(study.counted)} of {len(study.people)} participants count"]

@@ -1,4 +1,4 @@
-"""The command ``gazerig study design``: a study checked, and stated before it begins."""
+"""The command ``gazerig study design``: checks and pre-registers a study."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -68,7 +68,7 @@ def design(
     ] = False,
     force: ForceOption = False,
 ) -> None:
-    """Check a study's YAML, say how many participants it takes, and write its pre-registration."""
+    """Check a study's YAML, compute its sample size, and write its pre-registration."""
     if example:
         with clear_errors():
             write_file(Path(study), EXAMPLE, force)
@@ -99,16 +99,16 @@ def data_folder(study: "LoadedStudy", data: Path | None) -> Path:
 
 
 def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = False) -> bool:
-    """Write a study's pre-registration into the folder of its data; return whether it was new.
+    """Write a study's pre-registration into its data folder; return whether it was new.
 
     Args:
-        study: a checked one.
-        folder: of its data; it need not be there yet.
-        force: Replace another one.
+        study: a checked study.
+        folder: its data folder, which need not exist.
+        force: Replace a different pre-registration.
 
     Raises:
-        SetupError: the folder has data of another design, or another pre-registration that is
-            not to be replaced, or cannot be written.
+        SetupError: the folder has data of another design, or a different pre-registration without
+            ``force``, or cannot be written.
     """
     import gazerig
     from gazerig.features.study.data_folder import StudyData
@@ -125,15 +125,15 @@ def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = Fals
 
 
 def state(name: str, study: "LoadedStudy", folder: Path) -> None:
-    """See to it that a study is stated before somebody takes part; say so where it is done now.
+    """Make sure that a study is pre-registered before the first participant; report a new one.
 
     Args:
         name: of the study as it was typed.
-        study: a checked one.
-        folder: of its data.
+        study: a checked study.
+        folder: its data folder.
 
     Raises:
-        SetupError: what is stated there, or the data there, are of another design.
+        SetupError: the pre-registration or the data there belong to another design.
     """
     from gazerig.features.study.data_folder import StudyData
 
@@ -153,7 +153,7 @@ def state(name: str, study: "LoadedStudy", folder: Path) -> None:
 
 
 def summary(name: str, study: "LoadedStudy") -> list[str]:
-    """Return what a study is, in a few lines."""
+    """Return a short description of a study, in lines."""
     from gazerig.features.study.order import orders
     from gazerig.features.study.preregistration_text import claims_of, minutes, sentence, size_words
 
@@ -173,7 +173,7 @@ def summary(name: str, study: "LoadedStudy") -> list[str]:
 
 
 def notes(study: "LoadedStudy") -> list[str]:
-    """Return what is allowed and should be known."""
+    """Return remarks about permitted but unusual settings."""
     from gazerig.features.study.preregistration_text import claims_of
 
     design, found = study.design, []

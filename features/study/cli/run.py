@@ -1,4 +1,4 @@
-"""The commands that run a study: its films, a participant's session, and deleting a participant."""
+"""The commands that run a study: its films, a participant's session, and deletion."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gazerig.features.study.run.study_file import LoadedStudy
 
 PAGE = "127.0.0.1:8090"
-"""Where the pages are served."""
+"""Address of the pages."""
 
 Participant = Annotated[
     int | None,
@@ -53,7 +53,7 @@ def run(
     ] = 0.6,
     seed: Annotated[int, typer.Option(min=0, help="With --simulate: seed of the answers.")] = 0,
 ) -> None:
-    """Run a participant's session in the browser; the same command goes on where it was cut off."""
+    """Run a participant's session in the browser; the same command resumes it."""
     with clear_errors(None, port, mock):
         if (participant is None) == (not simulate):
             raise SetupError("say --participant N, or --simulate N for simulated ones")
@@ -130,10 +130,10 @@ def _simulate(
 
 
 def _head(study: "LoadedStudy", asked: RunOptions) -> RunOptions | None:
-    """Return how the head is run, None where films are shown.
+    """Return the options of the head's run, None for films.
 
     Raises:
-        SetupError: options of a head with films, or a scene before real servos.
+        SetupError: options of a head with films, or a scene with real servos.
     """
     shown = study.design.presentation
     if shown.on == "film":
@@ -154,7 +154,7 @@ def _head(study: "LoadedStudy", asked: RunOptions) -> RunOptions | None:
 
 
 def _films(study: "LoadedStudy", data: "StudyData") -> Mapping[str, Path]:
-    """Return the films of a study, made where they are not there yet."""
+    """Return the films of a study; missing ones are rendered."""
     from gazerig.features.study.run.film import films
 
     with progress_bar(remaining=True) as steps:

@@ -1,6 +1,6 @@
-"""What the experimenter sees and does: the session's state, live, and its buttons.
+"""The experimenter's connection: the session's live state, and the buttons.
 
-Speaks as the live page does, so that the stop button (browser/stop.js) is the same.
+It uses the live page's protocol, so that the stop button (browser/stop.js) is the same.
 """
 
 import asyncio
@@ -50,7 +50,7 @@ Watch = Callable[[web.Request, str, Callable[[], Awaitable[None]], float], Await
 class ExperimenterLine:
     """The experimenter's connections.
 
-    trouble: what the disk refused last, "" for nothing
+    trouble: the last error of the disk, "" without one
     """
 
     def __init__(
@@ -62,14 +62,14 @@ class ExperimenterLine:
         notify: Callable[[], None],
         finish: Callable[[], None],
     ) -> None:
-        """Serve nobody yet.
+        """Create it without connections.
 
         Args:
             run: the session.
-            design: the study's, with what its conditions are called.
-            head: the one that is shown.
-            watch: calls something at news and after each beat, until the browser goes.
-            notify: tells all browsers that there is news.
+            design: the study's design, with the labels of its conditions.
+            head: the head that is shown.
+            watch: calls a function at news and at an interval, until the browser disconnects.
+            notify: informs all browsers of news.
             finish: ends the program.
         """
         self._run, self._design, self._head = run, design, head
@@ -78,13 +78,13 @@ class ExperimenterLine:
         self.trouble = ""
 
     def add_to(self, router: web.UrlDispatcher) -> None:
-        """Add the addresses that the page's scripts speak to."""
+        """Add the addresses that the page's scripts use."""
         self._opened_s = asyncio.get_running_loop().time()
         router.add_get("/rig/line", self._line)
         router.add_post("/rig/ask", self._asked)
 
     async def _line(self, request: web.Request) -> web.StreamResponse:
-        """Send the state whenever it changes and every second; receive stops."""
+        """Send the state at every change and every second; receive stops."""
         line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False)
         await line.prepare(request)
 
@@ -99,7 +99,7 @@ class ExperimenterLine:
         return line
 
     def _state(self, elapsed_s: float) -> dict[str, object]:
-        """Return the state as the stop button and the page's script take it."""
+        """Return the state for the stop button and the page's script."""
         head = self._head.report()
         return {
             "stopped": head.says if head.state == "stopped" else "",
@@ -148,7 +148,7 @@ class ExperimenterLine:
         return web.Response(status=status, text=f"{text}\n" if text else None, headers=HEADERS)
 
     async def _obey(self, asked: dict[str, object] | None) -> tuple[int, str]:
-        """Do what is asked; return an HTTP status, and words of a refusal."""
+        """Run a request; return an HTTP status, and the reason of a refusal."""
         if asked is None:
             return 400, "not a JSON object that can be asked for"
         what, why = asked.get("do"), f"{asked.get('why', '')!s}".strip()[:_WORDS]
@@ -162,7 +162,7 @@ class ExperimenterLine:
         return (503, refused) if refused else (204, "")
 
     def _do(self, what: object, why: str) -> str:
-        """Press a button; return words of a refusal, "" where it was done."""
+        """Press a button; return the reason of a refusal, "" on success."""
         match what:
             case "stop":
                 return self._head.stop(f"{why} ({WHO})")

@@ -1,4 +1,4 @@
-"""What the experimenter's page needs of the head that is shown."""
+"""Interface of the experimenter's page to the head."""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -9,47 +9,47 @@ HeadHealth = Literal["none", "alive", "late", "fault", "stopped"]
 
 @dataclass(frozen=True)
 class HeadReport:
-    """How the head is; says: what is wrong or who stopped it, "" for nothing."""
+    """Health of the head; says: the fault or the reason of a stop, "" without one."""
 
     state: HeadHealth
     says: str = ""
 
 
 class HeadLink(Protocol):
-    """A head in another process; its methods are called from any thread, and wait for it."""
+    """A head in another process; its methods are called from any thread, and block."""
 
     def report(self) -> HeadReport:
-        """Return how the head is, at once."""
+        """Return the head's health immediately."""
         ...
 
     def stop(self, why: str) -> str:
-        """Switch its torque off; return why that was not done, "" where it was.
+        """Switch its torque off; return the reason of a failure, "" on success.
 
         Raises:
-            OSError: the head is gone, or does not answer.
+            OSError: the head has ended, or does not answer.
         """
         ...
 
     def resume(self) -> str:
-        """Put its torque on again; return why that was not done, "" where it was.
+        """Switch its torque on again; return the reason of a failure, "" on success.
 
         Raises:
-            OSError: the head is gone, or does not answer.
+            OSError: the head has ended, or does not answer.
         """
         ...
 
 
 class NoHead:
-    """Films are shown: there is nothing to stop."""
+    """Replaces the head for films, with nothing to stop."""
 
     def report(self) -> HeadReport:
-        """Return that there is no head."""
+        """Report that there is no head."""
         return HeadReport("none")
 
     def stop(self, why: str) -> str:
-        """Return why nothing is stopped."""
+        """Return the reason of the failure: no head is shown."""
         return "no head is shown"
 
     def resume(self) -> str:
-        """Return why nothing goes on."""
+        """Return the reason of the failure: no head is shown."""
         return "no head is shown"

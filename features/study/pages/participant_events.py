@@ -1,4 +1,4 @@
-"""What a participant's browser may send: one thing done on one page."""
+"""Events of a participant's browser: one action on one page."""
 
 from collections.abc import Mapping
 
@@ -11,24 +11,24 @@ _MOST_ITEMS = 500
 
 
 class Malformed(ValueError):
-    """What came is nothing that can be done on a page."""
+    """A browser sent data that are not an event of a page."""
 
 
 class ParticipantEvent(msgspec.Struct, tag_field="do"):
-    """One thing done.
+    """One action.
 
-    page: name of the page on which it was done; once: names this sending and its repetitions
+    page: name of its page; once: identifies this event and its repetitions
     """
 
     page: str
     once: str
 
     def tell(self, run: StudyRun) -> None:
-        """Do it to the session; when this returns, it is on disk.
+        """Apply it to the session; on return it is on disk.
 
         Raises:
             NotKept: it could not be written.
-            WrongAnswer: the page has nothing of the kind.
+            WrongAnswer: it does not fit the page.
         """
         raise NotImplementedError
 
@@ -50,7 +50,7 @@ class _Next(ParticipantEvent, tag="next"):
 
 class _Begin(ParticipantEvent, tag="begin"):
     def tell(self, run: StudyRun) -> None:
-        """Begin the presentation."""
+        """Start the presentation."""
         run.begin(self.page)
 
 
@@ -89,15 +89,15 @@ _DECODER = msgspec.json.Decoder(_Consent | _Next | _Begin | _FilmSeen | _Answers
 
 
 def event_of(body: bytes) -> ParticipantEvent:
-    """Return what a browser sent.
+    """Return the event in a request of a browser.
 
     Raises:
-        Malformed: it is not JSON, or nothing that can be done on a page.
+        Malformed: it is not JSON, or not an event of a page.
     """
     try:
         event: ParticipantEvent = _DECODER.decode(body)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise Malformed(f"nothing that can be done on a page: {error}") from None
+        raise Malformed(f"not an event of a page: {error}") from None
     if isinstance(event, _Answers):
         numbers = [_number(one) for one in event.answers]
         if len(numbers) > _MOST_ITEMS or len(set(numbers)) < len(numbers):

@@ -1,4 +1,4 @@
-"""What a participant's browser is sent of a screen: nothing that tells conditions apart."""
+"""The participant's page as JSON: nothing in it distinguishes conditions."""
 
 from collections.abc import Mapping
 
@@ -18,16 +18,16 @@ from gazerig.features.study.screens import (
 
 Json = dict[str, object]
 CONDITIONS_ARE_TOLD = "finished"
-"""How a session must have ended for the debriefing to be sent."""
+"""Ending of a session after which the debriefing is sent."""
 
 
 def page_json(screen: Screen, design: StudyDesign, code: str) -> Json:
-    """Return a screen as the participant's page takes it.
+    """Return a screen as JSON for the participant's page.
 
     Args:
-        screen: what is shown now.
-        design: whose words and lengths are shown; its conditions are not looked at.
-        code: the participant's.
+        screen: the present screen.
+        design: the texts and durations; its conditions are not used.
+        code: code of the participant.
     """
     match screen:
         case ConsentScreen():
@@ -51,7 +51,7 @@ def page_json(screen: Screen, design: StudyDesign, code: str) -> Json:
             }
         case PresentationScreen():
             film = f"/study/film/{screen.film}" if screen.film else None
-            # A film that was cut short begins when the participant says so again.
+            # A film that was cut short starts again at the participant's request.
             more: Json = {"on": design.presentation.on, "seconds": screen.seconds, "again": True}
             return {"kind": "presentation", **_place(screen), **more, "film": film}
         case QuestionsScreen():
@@ -97,7 +97,7 @@ def _questions(screen: QuestionsScreen, design: StudyDesign) -> Json:
 
 
 def _item(number: str, item: Item, language: str) -> Json:
-    """Return a question; its key in the design and its scale stay here."""
+    """Return a question without its key in the design and its scale."""
     texts = [one for one in (item.text, item.low, item.high) if one]
     spoken = language if all(language in one for one in texts) else "en"
     return {
@@ -116,7 +116,7 @@ def _in(texts: Texts, language: str) -> str:
 
 
 def _end(screen: EndScreen, design: StudyDesign, code: str) -> Json:
-    """Return the last page; who did not stay may still ask for their data to be deleted."""
+    """Return the last page; a participant who left may still request deletion of the data."""
     told: Mapping[str, object] = {"text": design.texts.debriefing, "code": code}
     return {
         "kind": "end",

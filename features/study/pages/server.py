@@ -1,9 +1,8 @@
 """Serves the pages of a study: the participant's at "/", the experimenter's at "/experimenter".
 
-Each has a token of its own. What a participant does names the page it was done on and is done
-once, however often and from however many tabs it is sent; the answer is always the page that is
-shown now.
-A page is answered as kept only after the host has it on disk.
+Each has its own token. An event names its page and is applied once, however often and from
+however many tabs it is sent; the answer is always the present page. A page is confirmed only
+after its data are on the host's disk.
 """
 
 import asyncio
@@ -35,7 +34,7 @@ from gazerig.robot.dashboard.door.connection_limits import Connections
 from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, until_one_ends
 
 SENT_BYTES = 256 * 1024
-"""Most that one page of answers may hold."""
+"""Largest page of answers."""
 _MOST_TABS = 16
 _BEAT_S = 2.0
 _READ_S = 5.0
@@ -54,7 +53,7 @@ _EXPERIMENTERS_PATHS = ("/experimenter", "/rig/")
 
 
 class StudyServer:
-    """The pages of one session, served from a thread of its own."""
+    """The pages of one session, served from their own thread."""
 
     def __init__(
         self,
@@ -66,16 +65,16 @@ class StudyServer:
         finish: Callable[[], None],
         head: HeadLink | None = None,
     ) -> None:
-        """Prepare to listen.
+        """Prepare the server.
 
         Args:
             run: the session.
-            design: the study's.
-            address: where to listen, e.g. ("127.0.0.1", 8090).
-            tokens: what the participant's browser must show, and what the experimenter's.
-            films: of each condition; empty with a head.
+            design: the study's design.
+            address: host and port to listen on, e.g. ("127.0.0.1", 8090).
+            tokens: tokens of the participant's and the experimenter's browser.
+            films: film of each condition; empty with a head.
             finish: called from any thread when the experimenter ends the program.
-            head: the one that is shown, None with films.
+            head: the head that is shown, None with films.
         """
         self._study_run, self._design, self._films = run, design, films
         self._address = address
@@ -99,19 +98,19 @@ class StudyServer:
 
     @property
     def participant_url(self) -> str:
-        """Return the address that lets the participant in."""
+        """Return the participant's address with its token."""
         return self._url(_PARTICIPANT, "/")
 
     @property
     def experimenter_url(self) -> str:
-        """Return the address that lets the experimenter in."""
+        """Return the experimenter's address with its token."""
         return self._url(_EXPERIMENTER, "/experimenter")
 
     def open(self) -> None:
-        """Listen.
+        """Start to listen.
 
         Raises:
-            OSError: the address cannot be listened on.
+            OSError: the address is not available.
         """
         self._thread.start()
         if not self._opened.wait(_OPEN_TIMEOUT_S):
@@ -120,7 +119,7 @@ class StudyServer:
             raise self._failed
 
     def notify(self) -> None:
-        """Have the browsers look at what is shown now; from any thread."""
+        """Make the browsers fetch the present page; safe from any thread."""
         with suppress(RuntimeError):  # closed already
             self._loop.call_soon_threadsafe(self._wake)
 
@@ -192,7 +191,7 @@ class StudyServer:
         return admit
 
     def _shown(self) -> Json:
-        """Return the page that is shown now."""
+        """Return the present page."""
         name, screen = self._study_run.now()
         return {
             "page": name,
@@ -205,7 +204,7 @@ class StudyServer:
         return web.json_response(await asyncio.to_thread(self._shown), headers=HEADERS)
 
     async def _done(self, request: web.Request) -> web.Response:
-        """Do what was done on a page; answer with the page that follows."""
+        """Apply an event; answer with the next page."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
         try:
@@ -221,7 +220,7 @@ class StudyServer:
         except NotKept as error:
             self._experimenter.trouble = str(error)
             self._wake()
-            # What the disk says may hold names of files, which are not for participants.
+            # An error of the disk may contain file names, which are not for participants.
             return web.Response(status=507, text="not kept\n", headers=HEADERS)
         if status == 200:
             self._experimenter.trouble = ""
@@ -229,7 +228,7 @@ class StudyServer:
         return web.json_response(page, status=status, headers=HEADERS)
 
     def _take(self, event: ParticipantEvent) -> tuple[int, Json]:
-        """Return 200 where it was done, now or before, 409 where its page is over; and the page."""
+        """Return 200 for an applied event, 409 if its page is over; and the present page."""
         if event.once != self._once:
             if event.page != self._study_run.now()[0]:
                 return 409, self._shown()
@@ -238,7 +237,7 @@ class StudyServer:
         return 200, self._shown()
 
     async def _tell_news(self, request: web.Request) -> web.StreamResponse:
-        """Send the name of the present page whenever it changes, and every two seconds."""
+        """Send the name of the present page at every change, and every two seconds."""
         stream = web.StreamResponse(headers={**HEADERS, "Content-Type": "text/event-stream"})
         await stream.prepare(request)
 
@@ -251,7 +250,7 @@ class StudyServer:
         return stream
 
     async def _film(self, request: web.Request) -> web.StreamResponse:
-        """Send a film's bytes without name, date or tag of the file, which could be told apart."""
+        """Send a film without its name, date or tag, which could identify the condition."""
         token = request.match_info["token"]
         condition = await asyncio.to_thread(self._study_run.film_of, token)
         path = None if condition is None else self._films.get(condition)
@@ -269,16 +268,16 @@ class StudyServer:
         await answer.prepare(request)
         await answer.write_eof()
         if request.method == "GET":
-            self._study_run.film_fetched(token)  # before anything that the browser sends next
+            self._study_run.film_fetched(token)  # before any further event of the browser
         return answer
 
     async def _film_failed(self, request: web.Request) -> web.Response:
-        """Tell the experimenter, until the next thing is done, that the browser plays no films."""
+        """Warn the experimenter, until the next event, that the browser cannot play the films."""
         self._experimenter.trouble = _FILMS_FAIL
         self._wake()
         return web.Response(status=204, headers=HEADERS)
 
-    # --- who listens ----------------------------------------------------------------------------
+    # --- connections ----------------------------------------------------------------------------
 
     async def _watch(
         self,
@@ -287,7 +286,7 @@ class StudyServer:
         tell: Callable[[], Awaitable[None]],
         beat_s: float,
     ) -> None:
-        """Send to a browser now, at news and after each beat, until it goes."""
+        """Send to a browser now, at news and at an interval, until it disconnects."""
         self._connections.lasting(request)
         news = asyncio.Event()
         self._news.add(news)
@@ -307,7 +306,7 @@ class StudyServer:
 
 
 def _is_shared(path: str) -> bool:
-    """Whether both pages need what is there."""
+    """Return whether both pages need this file."""
     return path.startswith("/study/") and path.endswith((".css", ".js", ".svg", ".json"))
 
 

@@ -1,4 +1,4 @@
-"""The files of the study's pages, the same for every study but for the language."""
+"""The files of the study's pages, equal for every study except for the language."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from gazerig.robot.dashboard.door.page_files import file_answer
 FOLDER = Path(__file__).parent / "browser"
 _LIVE = {name: LIVE_PAGE / name for name in ("tokens.css", "icon.svg")}
 _STOP = LIVE_PAGE / "stop.js"
-# Nothing from elsewhere, nothing written into the document; a film is kept as a blob.
+# No external content, no inline content; a film is stored as a blob.
 HEADERS = {
     "X-Frame-Options": "DENY",
     "Referrer-Policy": "no-referrer",
@@ -25,10 +25,10 @@ HEADERS = {
 
 
 class StudyFiles:
-    """Documents at "/" and "/experimenter", all else at "/study/NAME".
+    """Documents at "/" and "/experimenter", all other files at "/study/NAME".
 
     Args:
-        language: of the participant's page.
+        language: language of the participant's page.
     """
 
     def __init__(self, language: str) -> None:

@@ -1,6 +1,6 @@
-"""Sentences and figures as the American Psychological Association wants them (7th edition).
+"""Sentences and numbers in the style of the American Psychological Association (7th edition).
 
-Symbols in italics, exact chances, no zero before the point of what cannot exceed one.
+Symbols in italics, exact probabilities, no zero before the point of values that cannot exceed one.
 """
 
 from math import isfinite
@@ -25,7 +25,7 @@ _MINUS = "\N{MINUS SIGN}"
 
 
 def chance(p: float) -> Markup:
-    """Return a chance with its symbol: three decimals, or that it is below a thousandth."""
+    """Return a probability with its symbol: three decimals, or that it is below a thousandth."""
     if not isfinite(p):
         return Markup("<i>p</i> not known")
     if p < 0.001:
@@ -41,13 +41,13 @@ def bounded(value: float, decimals: int = 2) -> str:
 
 
 def unbounded(value: float, decimals: int = 2) -> str:
-    """Return a number as it is usually written."""
+    """Return a number in the usual notation."""
     text = f"{abs(value):.{decimals}f}"
     return f"{_MINUS}{text}" if value < 0.0 and float(text) else text
 
 
 def effect(size: EffectSize) -> Markup:
-    """Return an effect with its interval, "" where there is none."""
+    """Return an effect with its interval, "" without one."""
     if not isfinite(size.value):
         return Markup("")
     written = bounded if size.bounded else unbounded
@@ -76,7 +76,7 @@ def statistic(test: StatisticalTest) -> Markup:
 
 
 def sentence(one: Decision, study: StudyAnalysis) -> Markup:
-    """Return what was found for one hypothesis as a paper would say it."""
+    """Return the result for one hypothesis as a paper reports it."""
     better, than = study.label(one.hypothesis.better), study.label(one.hypothesis.than)
     what = measure_words(one.measure)
     if one.verdict == "too few" or one.test is None:
@@ -104,7 +104,7 @@ def _chances(one: Decision, correction: str) -> Markup:
 
 
 def _finding(one: Decision, better: str, than: str, what: str) -> Markup:
-    """Return the first half of the sentence: which lies above, and where both lie."""
+    """Return the first half of the sentence: which is higher, and both values."""
     better = better[:1].upper() + better[1:]
     if one.measure.kind == "choice":
         share = Markup("{:.0f}% of direct choices").format(100.0 * one.means[0])
@@ -135,5 +135,5 @@ def plain(value: float) -> str:
 
 
 def measure_words(measure: Measure) -> str:
-    """Return a measure's name as a reader says it."""
+    """Return a measure's name in words."""
     return measure.name.partition(".")[2].replace("_", " ") or measure.name.replace("_", " ")

@@ -1,7 +1,7 @@
-"""A study as a BIDS data set: behavioural tables, and the head's recordings beside them.
+"""A study as a BIDS data set: behavioural tables, and the head's recordings.
 
 Each participant has a table of answers with its JSON (BIDS 1.11.1, behavioural experiments with no
-neural recordings), and for each recording of the head what an eye tracker would have measured
+neural recordings), and for each recording of the head the data of an eye tracker
 (gazerig.robot.recording.export_bids), whose participant is then the head.
 """
 
@@ -38,10 +38,10 @@ _MISSING = "n/a"
 
 
 class StudyDataSet(NamedTuple):
-    """What was written.
+    """The written data set.
 
-    root: its folder; files: how many it has
-    left_out: the recordings that are damaged or gone, each with the reason
+    root: its folder; files: its number of files
+    left_out: damaged or missing recordings, each with the reason
     """
 
     root: Path
@@ -56,17 +56,17 @@ def write_study(
     made_by: str,
     progress: Progress,
 ) -> StudyDataSet:
-    """Write the data set in place of one that gazerig has made before.
+    """Write the data set; an earlier one of gazerig is replaced.
 
     Args:
-        study: analysed.
+        study: the analysis.
         root: the data set's folder.
-        folders: of the participants, in the order of ``study.people``, which hold recordings.
+        folders: folders of the participants with recordings, in the order of ``study.people``.
         made_by: program and version.
-        progress: told which participant is written.
+        progress: is called for each participant.
 
     Raises:
-        SetupError: the folder holds something else, or something cannot be read or written.
+        SetupError: the folder holds other files, or a file cannot be read or written.
     """
     labels = [label_of(one.participant) for one in study.people]
     refuse_foreign(root)
@@ -86,7 +86,7 @@ def write_study(
 
 
 def _frame(study: StudyAnalysis, labels: Sequence[str], made_by: str) -> Iterator[tuple[str, str]]:
-    """Return the files that a data set has beside its participants, and what they hold."""
+    """Yield the files of a data set besides the participants', with their contents."""
     description = {
         "Name": study.design.title,
         **generated(made_by),
@@ -167,7 +167,7 @@ def _sidecar(study: StudyAnalysis) -> dict[str, object]:
 def _write_recordings(
     study: StudyAnalysis, one: Participation, label: str, folder: Path, root: Path
 ) -> Iterator[str]:
-    """Write each recording once, in the order of the trials; give why some are left out."""
+    """Write each recording once, in the order of the trials; yield the reasons of omissions."""
     names = dict.fromkeys(trial.recording for trial in one.trials if trial.recording)
     for number, name in enumerate(names, start=1):
         file = folder / name
@@ -177,7 +177,7 @@ def _write_recordings(
                 trace = trace_of(recording.ticks())
                 labels = labels_of(trace)
                 stretches = stretches_of(trace, labels)
-        except SetupError as error:  # the answers are worth their report without it
+        except SetupError as error:  # the answers deserve their report without it
             yield str(error)
             continue
         info = recording.info

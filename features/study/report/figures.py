@@ -21,8 +21,8 @@ from gazerig.features.study.decisions import Decision
 from gazerig.features.study.statistics.results import EffectSize
 
 _LOW, _HIGH = ((179, 88, 6), (254, 224, 182)), ((216, 218, 235), (84, 39, 136))
-"""From the least to the middle and from there to the most: Brewer's PuOr, which the colour-blind
-tell apart, as red, green and blue of 0 to 255."""
+"""Colours from the lowest point to the middle and on to the highest, RGB of 0 to 255:
+Brewer's PuOr, which is suitable for the colour-blind."""
 
 _MIDDLE = "#e8e8ea"
 _ACCENT = "#1c6ea4"
@@ -31,35 +31,35 @@ _LEAST_NUMBERED = 4.0
 _JITTER = 0.05
 _DARK = 140.0
 _TICK_CHARACTERS = 22
-"""Longer names of conditions go on in another line."""
+"""Width at which names of conditions are wrapped."""
 
 Colour = tuple[int, int, int]
 
 
 def shades(points: int) -> list[str]:
-    """Return one colour a point, from the least to the most, grey in an odd middle."""
+    """Return one colour per point, from the lowest to the highest, grey for a middle point."""
     half = points // 2
     low, high = (_between(*ends, half) for ends in (_LOW, _HIGH))
     return [*low, *([_MIDDLE] if points % 2 else []), *high]
 
 
 def _between(first: Colour, last: Colour, count: int) -> list[str]:
-    """Return evenly spaced colours; of one alone that in between."""
+    """Return evenly spaced colours; for a count of 1 the middle colour."""
     at = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
     mixed = np.rint(np.outer(1.0 - at, first) + np.outer(at, last)).astype(int)
     return ["#{:02x}{:02x}{:02x}".format(*one) for one in mixed.tolist()]
 
 
 def _is_dark(colour: str) -> bool:
-    """Whether white is easier to read on a colour than ink (luma of ITU-R BT.601)."""
+    """Return whether white is more readable on a colour than ink (luma of ITU-R BT.601)."""
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
     return 0.299 * red + 0.587 * green + 0.114 * blue < _DARK
 
 
 def counts_png(some: Sequence[MeasureSummary], study: StudyAnalysis) -> bytes:
-    """Draw how often each point of some items was answered, a bar a condition.
+    """Draw how often each point of some items was answered, one bar per condition.
 
-    The middle of the scale stands on one line.
+    The middles of the scales are aligned.
     """
     names = [study.label(key) for key in study.design.conditions]
     size = (_WIDE_IN, _HEAD_IN + len(some) * (_ROW_IN * len(names) + _ITEM_IN))
@@ -117,7 +117,7 @@ def _paired(figure: Figure, one: MeasureSummary, names: list[str]) -> None:
         return
     x = np.arange(len(names))
     whole = one.measure.kind == "item"
-    # Equal answers lie on one line; a little apart they can be counted. The same every time.
+    # Equal answers are spread a little, so that they can be counted; the spread is deterministic.
     spread = np.linspace(-_JITTER, _JITTER, max(2, len(means))) * (1.0 if whole else 0.0)
     for row, apart in zip(means, spread, strict=False):
         axes.plot(x + apart, row + 1.6 * apart, "-o", color=HUMAN, lw=0.7, ms=2.5, alpha=0.45)
@@ -141,7 +141,7 @@ def forest_png(study: StudyAnalysis, names: list[str]) -> bytes:
 
     Args:
         study: with its decisions.
-        names: one a hypothesis, as the page calls them.
+        names: labels of the hypotheses, as on the page.
     """
     size = (_WIDE_IN, _HEAD_IN + _ROW_IN * max(1, len(names)))
     return png_of(lambda figure: _forest(figure, study.decisions, names), size)

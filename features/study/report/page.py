@@ -1,4 +1,4 @@
-"""The page of a study's report: words, tables and figures put into its template."""
+"""The page of a study's report: texts, tables and figures in its template."""
 
 from base64 import b64encode
 from collections import Counter
@@ -24,7 +24,7 @@ _CLASSES = {
 
 
 class HypothesisLine(NamedTuple):
-    """One hypothesis in short."""
+    """Summary of one hypothesis."""
 
     expected: str
     sentence: Markup
@@ -33,7 +33,7 @@ class HypothesisLine(NamedTuple):
 
 
 class TestLine(NamedTuple):
-    """One test in the table of all; planned: it decides on its hypothesis."""
+    """A row of the table of tests; planned: it decides on its hypothesis."""
 
     expected: str
     test: str
@@ -55,12 +55,12 @@ class StudyFigure(NamedTuple):
 
     @property
     def data_uri(self) -> str:
-        """Return it as the page holds it."""
+        """Return the picture as a data URI for the page."""
         return f"data:image/png;base64,{b64encode(self.png).decode()}"
 
 
 class MeasureSection(NamedTuple):
-    """What the page says of a measure; rows: condition, n, mean, interval, SD, median."""
+    """Section of a measure; rows: condition, n, mean, interval, SD, median."""
 
     title: str
     asked: str
@@ -70,7 +70,7 @@ class MeasureSection(NamedTuple):
 
 
 class ChoiceSection(NamedTuple):
-    """What the page says of choices; table: how often the row was chosen over the column."""
+    """Section of choices; table: how often the row was chosen over the column."""
 
     title: str
     asked: str
@@ -83,9 +83,9 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
     """Return the report of a study as HTML that needs no other file.
 
     Args:
-        study: analysed.
+        study: the analysis.
         made_by: program and version.
-        progress: told how far drawing is.
+        progress: is called with the share of the drawing.
     """
     sections = []
     for k, one in enumerate(study.measures):
@@ -115,7 +115,7 @@ def _forest(study: StudyAnalysis) -> StudyFigure:
 
 
 def banners(study: StudyAnalysis) -> tuple[str, ...]:
-    """Return what a reader must know first."""
+    """Return warnings that precede the report."""
     found = []
     simulated = sum(one.simulated for one in study.people)
     if simulated == len(study.people) and simulated:
@@ -173,7 +173,7 @@ _SHOWN = {"head": "of the head in the room", "film": "of film"}
 
 
 def _switches(study: StudyAnalysis) -> list[tuple[str, str]]:
-    """Return the largest step of a joint as the head went to another condition, if recorded."""
+    """Return the largest step of a joint in the head's switches of condition, if recorded."""
     steps = [t.measured.get(STEP_DEG, nan) for one in study.people for t in one.trials]
     known = [step for step in steps if isfinite(step)]
     if not known:
@@ -204,7 +204,7 @@ def _rules(study: StudyAnalysis) -> tuple[str, ...]:
 
 
 def _rows_left_out(study: StudyAnalysis) -> list[tuple[str, int]]:
-    """Return why single answers of participants who count are left out, and how many."""
+    """Return the reasons of single exclusions of participants who count, with their numbers."""
     why = Counter(row.left_out for one in study.counted for row in one.answers if row.left_out)
     return why.most_common()
 
@@ -246,7 +246,7 @@ def _test_line(one: Decision, test: StatisticalTest, study: StudyAnalysis) -> Te
 
 
 def _in_a_scale(one: MeasureSummary, study: StudyAnalysis) -> bool:
-    """Whether an item is shown with its scale."""
+    """Return whether an item is shown with its scale."""
     measure = one.measure
     if measure.kind != "item":
         return False
@@ -290,7 +290,7 @@ def _known(value: float) -> str:
 
 
 def _asked(one: MeasureSummary | ChoiceSummary, study: StudyAnalysis) -> str:
-    """Return the question as it was asked, in the study's language, or where it is from."""
+    """Return the question in the study's language, or the source of the measure."""
     measure = one.measure
     if measure.kind == "objective":
         return "measured by the head, of each trial"

@@ -1,4 +1,4 @@
-"""An R script with exploratory models of a study, for packages that Python has no match for."""
+"""An R script with exploratory models of a study, for R packages without a Python equivalent."""
 
 from collections.abc import Iterable
 from json import dumps

@@ -20,9 +20,9 @@ _HEAD_BYTES = 4096
 
 
 class StudyReport(NamedTuple):
-    """What was found, and where it is written.
+    """A report and its files.
 
-    page: the report; data_set: what there is of it in BIDS
+    page: the report; data_set: its data in BIDS format
     """
 
     study: StudyAnalysis
@@ -31,21 +31,21 @@ class StudyReport(NamedTuple):
 
 
 def write_report(data: Path, out: Path, made_by: str, utc: str, progress: Progress) -> StudyReport:
-    """Analyse the data of a study and write all that is made of them.
+    """Analyse the data of a study and write the report.
 
-    An earlier report in the folder is replaced; files of others are kept, and refused. An analysis
-    before the planned number of people came is recorded in the data: an interim look.
+    An earlier report in the folder is replaced; a folder with other files is refused. An analysis
+    before the planned number of participants is recorded in the data as an interim look.
 
     Args:
         data: folder of the study's data.
-        out: folder to write to.
+        out: folder of the report.
         made_by: program and version.
-        utc: now.
-        progress: told what is done.
+        utc: the present time.
+        progress: is called with each step.
 
     Raises:
-        SetupError: the data cannot be analysed, or the folder holds something else, or something
-            cannot be written.
+        SetupError: the data cannot be analysed, or the folder holds other files, or a file cannot
+            be written.
     """
     refuse_foreign_folder(out)
     found = collected(data)
@@ -69,7 +69,7 @@ def write_report(data: Path, out: Path, made_by: str, utc: str, progress: Progre
 
 
 def with_looks(study: StudyAnalysis, data: StudyData, utc: str) -> StudyAnalysis:
-    """Return a study with its interim looks; this one is recorded if the sample is not complete.
+    """Return a study with its interim looks; record the present one if the sample is incomplete.
 
     Raises:
         SetupError: it cannot be recorded.
@@ -81,10 +81,10 @@ def with_looks(study: StudyAnalysis, data: StudyData, utc: str) -> StudyAnalysis
 
 
 def refuse_foreign_folder(out: Path) -> None:
-    """Refuse a folder that holds anything but an earlier report.
+    """Refuse a folder with any file that is not of an earlier report.
 
     Raises:
-        SetupError: it does.
+        SetupError: there is such a file.
     """
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return

@@ -1,4 +1,4 @@
-"""A study as tidy tables: one row an answer, one row a presentation; and its results as JSON."""
+"""A study as tidy tables, one row per answer or presentation; and its results as JSON."""
 
 import csv
 import json
@@ -18,17 +18,17 @@ ANSWERS = (
     "participant", "simulated", "trial", "condition", "first", "second", "questionnaire", "item",
     "kind", "scale", "reverse", "points", "value", "ms", "utc", "left_out",
 )  # fmt: skip
-"""Columns of answers.csv; those of the design's factors stand after them."""
+"""Columns of answers.csv; those of the design's factors follow."""
 
 TRIALS = (
     "participant", "simulated", "trial", "side", "condition", "attempts", "outcome", "seconds",
     "utc", "recording", "from_s", "to_s", "reason",
 )  # fmt: skip
-"""Columns of trials.csv; those of the objective measures stand after them."""
+"""Columns of trials.csv; those of the objective measures follow."""
 
 
 _FORMULAS = ("=", "+", "-", "@", "\t", "\n")
-"""Beginnings of a cell that spreadsheets run as a formula, or skip to find one."""
+"""First characters of a cell that spreadsheets execute as a formula, or skip before one."""
 
 
 def factors(study: StudyAnalysis) -> tuple[str, ...]:
@@ -39,7 +39,7 @@ def factors(study: StudyAnalysis) -> tuple[str, ...]:
 
 
 def answers_csv(study: StudyAnalysis) -> str:
-    """Return every answer, those that are left out with the reason."""
+    """Return every answer, with the reason if it is excluded."""
     names = factors(study)
     rows = (
         [*_answer(one, row, study), *_levels(row.condition, names, study)]
@@ -84,7 +84,7 @@ def trials_csv(study: StudyAnalysis) -> str:
 
 
 def results_json(study: StudyAnalysis) -> str:
-    """Return what was decided, and every figure behind it, for programs."""
+    """Return the decisions and all their values, for programs."""
     said = {
         "study": study.name,
         "title": study.design.title,
@@ -122,7 +122,7 @@ def _test(test: StatisticalTest) -> dict[str, object]:
 
 
 def _known(value: Any) -> Any:
-    """Return a value with null for what is not a number, as JSON knows none."""
+    """Return a value with null for NaN, which JSON does not have."""
     if isinstance(value, dict):
         return {key: _known(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
@@ -139,7 +139,7 @@ def _csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def _cell(value: object) -> str:
-    """Return a value as short as it is exact; what is not known is empty."""
+    """Return a value in its shortest exact form; unknown values are empty."""
     if value is None or (isinstance(value, float) and not isfinite(value)):
         return ""
     if isinstance(value, str):
@@ -148,7 +148,7 @@ def _cell(value: object) -> str:
 
 
 def as_text(value: str) -> str:
-    """Return a text that no spreadsheet takes for a formula: such a one gets an apostrophe."""
+    """Return a text that no spreadsheet executes: a formula gets an apostrophe."""
     return f"'{value}" if value.startswith(_FORMULAS) else value
 
 

@@ -1,1 +1,1 @@
-"""A study that is run: the head in a process of its own, films, and what is measured of trials."""
+"""Execution of a study: the process of the head, films, and measures of trials."""

@@ -1,8 +1,8 @@
-"""Films of conditions: the head as the person sees it whom it looks at, rendered without a display.
+"""Films of conditions: the head as seen by the person it looks at, rendered without a display.
 
-The run is simulated with the condition's rig, or read from a recording; the head is the robot
-description of the rig (gazerig.robot.description), the camera stands where the scene's first
-person has their nose, still.
+The run is simulated with the condition's rig, or read from a recording. The head is the robot
+description of the rig (gazerig.robot.description); the camera is fixed at the nose of the scene's
+first person.
 """
 
 import os
@@ -32,28 +32,28 @@ from gazerig.robot.recording.read import RunRecording, used
 
 SIZE_PX, RATE_HZ = 720, 25.0
 SETTLES_S = 3.0
-"""A simulated run begins so long before its film: the head has found the person then."""
+"""Time of a simulated run before its film, in which the head finds the person, seconds."""
 VIEWER_M: Vec3 = (1.0, 0.0, 0.25)
-"""From where a head is seen that looks at nobody."""
+"""Position of the camera for a head that looks at no one."""
 _HEAD_M, _HEAD_SHARE = 0.24, 0.8
-"""Height of a head, and the share of the picture's height that it takes."""
+"""Height of a head, and its share of the picture's height."""
 _BELOW_EYES_M = 0.02
-"""The picture's middle is so far below the eyes."""
-_SAMPLES, _SHADOW_PX = 4, 0  # shadows speckle a skin this near
+"""Distance of the picture's centre below the eyes."""
+_SAMPLES, _SHADOW_PX = 4, 0  # at this distance shadows would speckle the skin
 
 Progress = Callable[[float], None]
-"""Told the share that is done, 0..1."""
+"""Receives the finished share, 0..1."""
 
 
 class HeadPictures:
-    """Pictures of a rig's head from one place.
+    """Pictures of a rig's head from one position.
 
     Args:
-        rig: whose head.
-        p_viewer_m: from where it is seen, world frame of the rig.
+        rig: the rig.
+        p_viewer_m: position of the viewer, world frame of the rig.
 
     Raises:
-        SetupError: the feature world or MuJoCo is not there, or nothing here can render.
+        SetupError: the feature world or MuJoCo is missing, or rendering is impossible here.
     """
 
     def __init__(self, rig: Rig, p_viewer_m: Vec3) -> None:
@@ -88,7 +88,7 @@ class HeadPictures:
         return self._renderer.render(self._data, self._lens, self._R, self._p_m).image
 
     def close(self) -> None:
-        """Free what it renders with."""
+        """Free the renderer."""
         self._renderer.close()
 
 
@@ -103,14 +103,14 @@ def _looking(p_m: Floats, at_m: Floats) -> tuple[Floats, float]:
 
 
 def films(study: LoadedStudy, folder: Path, progress: Callable[[str], Progress]) -> dict[str, Path]:
-    """Return the film of each condition; those that are not there yet are made.
+    """Return the film of each condition; missing ones are rendered.
 
-    Files have names that say nothing; ``index.txt`` in the folder says which is which.
+    The names of the files do not identify conditions; ``index.txt`` in the folder assigns them.
 
     Args:
-        study: a checked one.
-        folder: where films are kept.
-        progress: returns what is told how far the film of a condition is.
+        study: a checked study.
+        folder: folder of the films.
+        progress: returns the progress function for the film of a condition.
 
     Raises:
         SetupError: a film cannot be rendered or written.
@@ -136,10 +136,10 @@ def _lines(path: Path) -> list[str]:
 
 
 def render(study: LoadedStudy, key: str, path: Path, progress: Progress) -> None:
-    """Write the film of a condition; a file that is there is written over.
+    """Write the film of a condition; an existing file is overwritten.
 
     Raises:
-        SetupError: it cannot be rendered or written, or the run that it shows cannot be had.
+        SetupError: it cannot be rendered or written, or its run is not available.
     """
     seconds = study.design.trials.seconds
     rig = study.rigs[key]
@@ -170,7 +170,7 @@ def render(study: LoadedStudy, key: str, path: Path, progress: Progress) -> None
 
 
 def _ticks(study: LoadedStudy, key: str) -> Iterator[Tick]:
-    """Return the ticks that a film shows."""
+    """Yield the ticks of a film."""
     recording = study.design.conditions[key].recording
     if recording is not None:
         with used(Path(recording)):
@@ -184,7 +184,7 @@ def _ticks(study: LoadedStudy, key: str) -> Iterator[Tick]:
 
 
 def _options(study: LoadedStudy, seconds: float) -> RunOptions:
-    """Return the options of the simulated run that a film shows."""
+    """Return the options of a film's simulated run."""
     shown = study.design.presentation
     return RunOptions(
         mock=True, fast=True, seed=shown.seed, scene=shown.scene, world=shown.world,
@@ -193,7 +193,7 @@ def _options(study: LoadedStudy, seconds: float) -> RunOptions:
 
 
 def _viewer_m(study: LoadedStudy, rig: Rig) -> Vec3:
-    """Return where the person has their nose whom the head looks at."""
+    """Return the position of the nose of the person the head looks at."""
     made = assemble(rig, _options(study, 1.0))
     try:
         people = () if made.scene is None else made.scene.people(0.0)

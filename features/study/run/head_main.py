@@ -1,7 +1,7 @@
-"""The head of a study, in a process of its own: python -m gazerig.features.study.run.head_main.
+"""The process of a study's head: python -m gazerig.features.study.run.head_main.
 
-Standard input: the options of the run as one line of JSON. It ends, parked and with its torque off,
-when its input does, so also when the study's program dies.
+Standard input: the options of the run as one line of JSON. It parks, switches the torque off and
+ends when its input ends, so also when the study's program dies.
 """
 
 import os
@@ -19,13 +19,13 @@ _ENDING = (signal.SIGTERM, signal.SIGHUP)
 def main() -> int:
     """Run the head until the input ends; return the exit code."""
     ended: list[str] = []
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the study's program
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the study's program handles Ctrl-C
     for number in _ENDING:
         signal.signal(number, lambda *_: ended.append("a signal"))
     options = options_in(sys.stdin.buffer.readline())
 
     def wait() -> None:
-        while os.read(0, 4096):  # not by the buffer, whose lock the program's end waits for
+        while os.read(0, 4096):  # not through the buffer, whose lock the interpreter needs to exit
             pass
         ended.append("the end of the study's session")
 

@@ -1,8 +1,8 @@
-"""The head in the room shows the conditions of a study: it runs on, and its parameters change.
+"""Shows the conditions of a study on the head in the room by changing parameters of its run.
 
-A condition with a rig of its own needs another run: the head parks and starts as that rig. What
-happens is recorded where the participant agreed to it; camera pictures only where they agreed to
-these.
+A condition with its own rig needs another run: the head parks and restarts with that rig. The run
+is recorded if the participant has agreed to it; camera pictures only if the participant has agreed
+to these.
 """
 
 import threading
@@ -31,16 +31,16 @@ Agreed = Callable[[], tuple[bool, bool]]
 
 
 class HeadPresenter:
-    """Shows conditions on a head; also what the experimenter's page knows of it.
+    """Shows conditions on a head, and reports its health to the experimenter's page.
 
     Attributes:
         head: The process, None while none runs.
 
     Args:
-        study: a checked one.
+        study: a checked study.
         options: of a run of the study's rig.
-        folder: of the participant, for recordings and logs.
-        agreed: asked whenever the head starts.
+        folder: folder of the participant, for recordings and logs.
+        agreed: called whenever the head starts.
         clock: the host's.
     """
 
@@ -60,10 +60,10 @@ class HeadPresenter:
         self._watching.start()
 
     def begin(self, shown: ShownTrial) -> None:
-        """Show a condition from now on; a head that does not run yet is started.
+        """Show a condition from now on; the head is started if necessary.
 
         Raises:
-            HeadLost: it cannot.
+            HeadLost: it cannot be shown.
         """
         head = self._head_for(shown.condition)
         try:
@@ -76,7 +76,7 @@ class HeadPresenter:
         self._from_s = head.state().t_s
 
     def end(self) -> Presented:
-        """Return where in the recording the presentation is that ends now."""
+        """End the presentation; return its place in the recording."""
         try:
             to_s = nan if self.head is None else self.head.state().t_s
         except HeadLost:
@@ -84,14 +84,14 @@ class HeadPresenter:
         return Presented(self._recording, (self._from_s, to_s))
 
     def fault(self) -> str:
-        """Return why nothing can be shown, "" while all is well or nothing runs yet."""
+        """Return why conditions cannot be shown, "" without a fault or a run."""
         report = self._report
         if report.state == "stopped":
             return f"stopped: {report.says}"
         return report.says if report.state == "fault" else ""
 
     def restart(self) -> None:
-        """Start the head again; what is wrong then ``fault`` says."""
+        """Restart the head; ``fault`` reports the result."""
         condition = self._condition
         self.close_head()
         self._report = HeadReport("none")
@@ -102,15 +102,15 @@ class HeadPresenter:
                 self._report = HeadReport("fault", str(lost))
 
     def report(self) -> HeadReport:
-        """Return how the head is, at once."""
+        """Return the head's health immediately."""
         return self._report
 
     def stop(self, why: str) -> str:
-        """Switch its torque off; return why that was not done, "" where it was."""
+        """Switch its torque off; return the reason of a failure, "" on success."""
         return self._asked(lambda head: head.client.stop(why))
 
     def resume(self) -> str:
-        """Put its torque on again; return why that was not done, "" where it was."""
+        """Switch its torque on again; return the reason of a failure, "" on success."""
         return self._asked(lambda head: head.client.resume(confirmed=True))
 
     def close(self) -> None:
@@ -137,7 +137,7 @@ class HeadPresenter:
         return ""
 
     def _head_for(self, condition: str) -> HeadProcess:
-        """Return the head as the rig that a condition needs, started if need be."""
+        """Return the head with a condition's rig; it is started if necessary."""
         one = self._study.design.conditions[condition]
         rig = condition if one.rig is not None else ""
         if self.head is not None and self.head.alive and self._rig == rig:
@@ -160,14 +160,14 @@ class HeadPresenter:
         return self.head
 
     def _changes(self, condition: str) -> Mapping[str, Value]:
-        """Return what turns the running head into a condition, by dotted key."""
+        """Return the changes from the running head to a condition, by dotted key."""
         before = self._condition
         if self._rig:
             return self._study.changes_of_own_rig(condition) if before is None else {}
         return self._study.changes(before, condition)
 
     def _watch(self) -> None:
-        """Keep the report new; the thread of that."""
+        """Keep the report up to date; the target of the watching thread."""
         judge = _Judge(self._clock)
         while not self._ended.wait(_LOOKS_S):
             head = self.head
@@ -182,7 +182,7 @@ class HeadPresenter:
 
 
 class _Judge:
-    """Judges a head by its newest ticks."""
+    """Derives a head's health from its newest ticks."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -190,9 +190,9 @@ class _Judge:
         self._free_s = self._seen_s
 
     def report(self, state: HeadState) -> HeadReport:
-        """Return how the head is.
+        """Return the head's health.
 
-        One that is held for longer than a moment does not show its condition any more.
+        A head that is held for longer than a moment does not show its condition any more.
         """
         now_s = self._clock.now_s()
         if state.t_s != self._tick_s:
@@ -204,7 +204,7 @@ class _Judge:
         if now_s - self._free_s > _HELD_S:
             return HeadReport("fault", f"the joints are held: {_listed(state.reasons)}")
         if now_s - self._seen_s > _LATE_S:
-            return HeadReport("late", "the head does not tick")
+            return HeadReport("late", "the head's control loop is not running")
         return HeadReport("alive")
 
 

@@ -23,18 +23,18 @@ _PATHS = ("record", "video", "replay", "heatmap", "heatmap_face")
 
 
 class HeadProcess:
-    """A head that runs.
+    """A running head.
 
     Attributes:
         client: the connection to it.
 
     Args:
         options: what to run.
-        log: where it writes what happens.
+        log: file of its output.
         clock: the host's.
 
     Raises:
-        HeadLost: it does not come to run; says why.
+        HeadLost: it does not start; the message gives the reason.
     """
 
     def __init__(self, options: RunOptions, log: Path, clock: Clock) -> None:
@@ -59,21 +59,21 @@ class HeadProcess:
         return self._process.poll() is None
 
     def state(self) -> HeadState:
-        """Return the head at its newest tick.
+        """Return the head's state at its newest tick.
 
         Raises:
-            HeadLost: it has none, or is gone.
+            HeadLost: it has no tick, or has ended.
         """
         try:
             state, _ = self.client.state()
         except DriverError as error:
             raise HeadLost(self.last_words() if not self.alive else str(error)) from error
         if state is None:
-            raise HeadLost("the head has not begun to move")
+            raise HeadLost("the head has not started to move")
         return state
 
     def last_words(self) -> str:
-        """Return the last line that it wrote."""
+        """Return the last line of its output."""
         with contextlib.suppress(OSError):
             lines = self._log.read_text(encoding="utf-8", errors="replace").split("\n")
             said = [line.strip() for line in lines if line.strip()]
@@ -82,7 +82,7 @@ class HeadProcess:
         return "the head's program has ended"
 
     def end(self) -> None:
-        """Have it park and switch off, and wait for that; one that hangs is killed."""
+        """Park it, switch it off, and wait for that; a process that hangs is killed."""
         if hasattr(self, "client"):
             with contextlib.suppress(DriverError, OSError):
                 self.client.close()
@@ -111,7 +111,7 @@ class HeadProcess:
             except DriverError:
                 client = None
             self._clock.sleep_until(self._clock.now_s() + _LOOKS_S)
-        late = f"the head did not begin to move within {_STARTS_S:g} s"
+        late = f"the head did not start to move within {_STARTS_S:g} s"
         raise HeadLost(f"{late}: {self.last_words()}")
 
 

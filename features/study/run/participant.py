@@ -1,4 +1,4 @@
-"""One participant's session from start to end: data folder, journal, pages, films or the head."""
+"""One participant's session: data folder, journal, pages, and films or the head."""
 
 import hashlib
 import hmac
@@ -28,15 +28,15 @@ _TOKEN_DIGITS = 32
 
 @dataclass(frozen=True)
 class SessionPlan:
-    """What a session is run with.
+    """Settings of a session.
 
     Attributes:
-        study: A checked one.
-        data: Its folder.
-        number: Of the participant, from 1.
-        address: Where the pages are served, host and port.
-        films: Of each condition; empty with a head.
-        head: How the head is run, None with films.
+        study: A checked study.
+        data: Its data folder.
+        number: Number of the participant, from 1.
+        address: Host and port of the pages.
+        films: Film of each condition; empty with a head.
+        head: Options of the head's run, None with films.
     """
 
     study: LoadedStudy
@@ -48,16 +48,16 @@ class SessionPlan:
 
 
 def utc_now() -> str:
-    """Return date and time of day."""
+    """Return date and time in UTC."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def opened_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str) -> Journal:
-    """Return the journal of a participant who has not finished yet, of this design.
+    """Return the journal of a participant who has not finished yet, for this design.
 
     Raises:
         SetupError: the participant's data were deleted, are of another design or damaged, or a
-            session is under way.
+            session is open.
     """
     code = code_of(number)
     if code in data.deleted():
@@ -85,17 +85,17 @@ def run_session(
     clock: Clock,
     browse: Callable[[str], object] | None = None,
 ) -> str:
-    """Run a participant's session until it is over, or is to stop; return how it ended, in words.
+    """Run a participant's session until it ends or is stopped; return the reason in words.
 
     Args:
-        plan: what to run.
-        stopped: returns why to end now, None to go on; the session can be resumed.
+        plan: settings of the session.
+        stopped: returns why to stop now, None to continue; the session can be resumed.
         say: writes a line for the experimenter.
         clock: the host's.
-        browse: opens the participant's page in a browser here, None: only its address is said.
+        browse: opens the participant's page in a browser here, None: only its address is printed.
 
     Raises:
-        SetupError: the participant has finished already, or the session cannot begin.
+        SetupError: the participant has already finished, or the session cannot start.
     """
     study, data = plan.study, plan.data
     sha256 = data.claim(study.name, study.canonical)
@@ -137,7 +137,7 @@ def run_session(
 def _head(
     plan: SessionPlan, session: StudySession, folder: Path, clock: Clock
 ) -> HeadPresenter | None:
-    """Return what shows the conditions on the head, None with films."""
+    """Return the presenter of conditions on the head, None with films."""
     if plan.head is None:
         return None
     return HeadPresenter(plan.study, plan.head, folder, session.agreed, clock)
@@ -150,14 +150,14 @@ def _ending(
     folder: Path,
     say: Callable[[str], None],
 ) -> Callable[[], None]:
-    """Return what parks the head and measures what it showed; with films it does nothing.
+    """Return a function that parks the head and measures its presentations; no-op with films.
 
     Raises:
-        SetupError: what measures needs a package that is not installed.
+        SetupError: the measures need a package that is not installed.
     """
     if head is None:
         return lambda: None
-    from gazerig.features.study.run.trial_measures import measured  # .7 s of a processor
+    from gazerig.features.study.run.trial_measures import measured  # 0.7 s of CPU time
 
     def over() -> None:
         head.close_head()
@@ -167,9 +167,9 @@ def _ending(
 
 
 def _tokens(secret: bytes, number: int) -> tuple[str, str]:
-    """Return what lets the participant and the experimenter in.
+    """Return the tokens of the participant's and the experimenter's page.
 
-    They are the same when a session is resumed: pages that stood open go on by themselves.
+    A resumed session has the same tokens, so that open pages continue.
     """
 
     def token(who: str) -> str:
@@ -198,9 +198,9 @@ def _until_told(
     say: Callable[[str], None],
     clock: Clock,
 ) -> str:
-    """Have time pass for the session until the program is told to end; return why.
+    """Poll the session until the program is stopped; return the reason.
 
-    over: called once when the session has been closed; its last page stays
+    over: called once after the end of the session; its last page remains
     """
     shown, said, closed = run.now()[0], "", False
     while (why := told()) is None:

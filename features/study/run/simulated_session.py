@@ -1,4 +1,4 @@
-"""Simulated participants go through a study as real ones do: same screens, same journals."""
+"""Simulated participants do a study like real ones: same screens, same journals."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
@@ -35,17 +35,17 @@ def simulate_study(
     population: Population,
     progress: Callable[[float], None] = lambda share: None,
 ) -> None:
-    """Run participants 1 to ``count`` through a study; the same seed gives the same journals.
+    """Run participants 1 to ``count`` through a study; equal seeds give equal journals.
 
     Args:
-        study: a checked one.
+        study: a checked study.
         data: a folder without participants.
-        count: how many.
-        population: whom they are drawn from.
-        progress: told the share that is done, 0..1.
+        count: number of participants.
+        population: distribution of the participants.
+        progress: receives the finished share, 0..1.
 
     Raises:
-        SetupError: there are data of participants already, or they cannot be written.
+        SetupError: the folder has data of participants, or the data cannot be written.
     """
     if data.numbers():
         raise SetupError(
@@ -114,9 +114,9 @@ def _simulate(
 def _answers(
     session: StudySession, person: SimulatedParticipant
 ) -> tuple[dict[int, AnswerValue], dict[int, float]]:
-    """Return the answers to a page and the milliseconds that each took, by number."""
+    """Return the answers to a page and the milliseconds of each, by number."""
     asked = session.asked
-    assert asked is not None  # of a page of questions
+    assert asked is not None  # a page of questions
     values: dict[int, AnswerValue] = {}
     ms: dict[int, float] = {}
     for number, item in enumerate(asked.items):

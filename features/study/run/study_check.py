@@ -1,4 +1,4 @@
-"""A study checked with all that the program knows: scenes, worlds, measures of the report."""
+"""Complete check of a study, including scenes, worlds, and measures of the report."""
 
 from collections.abc import Iterator
 from os.path import isfile
@@ -28,12 +28,12 @@ def checked_study(name_or_path: str) -> LoadedStudy:
 
 
 def _objective(design: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Find objective measures that neither the page nor the report has."""
+    """Yield objective measures that neither the page nor the report has."""
     yield from objective_rules(design, BY_KEY)
 
 
 def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Find scenes and worlds that there are not."""
+    """Yield unknown scenes and worlds."""
     scene, world = design.presentation.scene, design.presentation.world
     known = scenes()
     if scene is not None and scene not in known:
@@ -47,7 +47,7 @@ def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
 
 
 def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Find recordings that the rig cannot repeat for a whole trial."""
+    """Yield recordings that the rig cannot repeat for a whole trial."""
     for key, one in design.conditions.items():
         if one.recording is None or not isfile(one.recording):
             continue
@@ -56,7 +56,7 @@ def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:
             names = next(run.ticks()).guard_result.joints
             rig = load_rig(one.rig or design.presentation.rig)
         except ConfigError:
-            continue  # told at the rig
+            continue  # reported at the rig
         except (BadRecording, StopIteration) as error:
             yield f"conditions.{key}.recording", str(error) or "holds no tick; record it again"
             continue
@@ -75,7 +75,7 @@ def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:
 
 
 def _films(design: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Find films that are over before a presentation counts as seen."""
+    """Yield films that are too short for a presentation."""
     wanted_s = design.trials.seconds
     for key, one in design.conditions.items():
         if one.film is None or not isfile(one.film):

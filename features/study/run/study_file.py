@@ -1,4 +1,4 @@
-"""Studies and questionnaires by name or path: read, and checked with the rigs that they show."""
+"""Studies and questionnaires by name or path, checked with their rigs."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -22,11 +22,11 @@ from gazerig.robot.model.commands import Value
 
 _ENDS = {"recording": ".mcap", "film": ".webm"}
 _GAZE = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
-"""Sections of a rig that decide what is seen of it, whichever servos and camera it has."""
+"""Sections of a rig that determine its appearance, whatever its servos and camera."""
 _MACHINE = frozenset({"bus", "buses", "webcam", "oak", "camera", "camera_recovery"})
-"""Sections that may change between two participants, as a port or a calibration does."""
+"""Sections that may change between two participants, such as a port or a calibration."""
 _WHILE_READ = frozenset({"name", "profile"})
-"""Keys of a rig that only say how it is called and which file was laid over it."""
+"""Keys of a rig with only its name and the applied profile."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,12 @@ class LoadedStudy:
     """A checked study.
 
     Attributes:
-        design: Its paths as seen from the working folder, its questionnaires by their keys.
+        design: Its paths relative to the working folder, its questionnaires by their keys.
         questionnaires: By the keys in the design.
-        rig: The study's own rig, as it is without any condition.
-        rigs: The rig of each condition, with profile, character and parameters laid over it.
+        rig: The study's own rig, without any condition.
+        rigs: The rig of each condition, with profile, character and parameters applied.
         path: The file.
-        text: What it holds.
+        text: Content of the file.
     """
 
     design: StudyDesign
@@ -51,41 +51,41 @@ class LoadedStudy:
 
     @property
     def name(self) -> str:
-        """Return the name of the study's file, after which what it writes is called."""
+        """Return the name of the study's file, which is also used for its output."""
         return self.path.stem
 
     def changes(self, before: str | None, after: str) -> dict[str, Value]:
-        """Return what turns a running head from one condition into another, by dotted key.
+        """Return the changes of a running head from one condition to another, by dotted key.
 
         Args:
-            before: the condition that is shown; None: the head runs with the study's own rig.
+            before: the present condition; None: the head runs with the study's own rig.
             after: a condition of the same rig.
         """
         there = self.rig if before is None else self.rigs[before]
         return _differing(there, self.rigs[after])
 
     def changes_of_own_rig(self, condition: str) -> dict[str, Value]:
-        """Return what a condition lays over its own rig, profile and character, by dotted key."""
+        """Return a condition's changes to its own rig, profile and character, by dotted key."""
         one = self.design.conditions[condition]
         there = load_rig(one.rig or self.design.presentation.rig, one.character, one.profile)
         return _differing(there, self.rigs[condition])
 
     @cached_property
     def canonical(self) -> bytes:
-        """Return what the data's hash is of: all that is shown and asked, defaults and all."""
+        """Return the hashed text: everything that is shown and asked, including defaults."""
         shown = {key: self._shown(key) for key in self.design.conditions}
         return canonical(self.design, self.questionnaires, shown)
 
     @property
     def sha256(self) -> str:
-        """Return the hash that the data carry."""
+        """Return the hash for the study's data."""
         return design_sha256(self.canonical)
 
     def _shown(self, condition: str) -> dict[str, object]:
-        """Return what a participant can see of a condition, by dotted key, and its files' hashes.
+        """Return the visible values of a condition by dotted key, and the hashes of its files.
 
         Raises:
-            OSError: a recording or a film is not there any more.
+            OSError: a recording or a film does not exist any more.
         """
         rig, one = self.rigs[condition], self.design.conditions[condition]
         seen: dict[str, object] = {
@@ -105,9 +105,9 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
     """Return a study by shipped name or path, with its questionnaires and the conditions' rigs.
 
     Args:
-        name_or_path: of the study; files that it names are relative to its own folder.
-        further: rules of what this room does not know, such as scenes; the design that they get
-            has its paths as seen from the working folder.
+        name_or_path: of the study; its file names are relative to its own folder.
+        further: additional rules, such as for scenes; they receive the design with paths relative
+            to the working folder.
 
     Raises:
         gazerig.config.load.ConfigError: with every fault, each with the study's line.
@@ -151,7 +151,7 @@ def load_questionnaire(name_or_path: str) -> Questionnaire:
 
 
 def condition_rig(design: StudyDesign, condition: Condition) -> Rig:
-    """Return the rig that a condition shows, with all that it lays over it.
+    """Return the rig of a condition, with all its changes applied.
 
     Raises:
         gazerig.config.load.ConfigError: with every fault.
@@ -161,7 +161,7 @@ def condition_rig(design: StudyDesign, condition: Condition) -> Rig:
 
 
 def _changes(condition: Condition) -> Iterator[tuple[str, Value]]:
-    """Return what a condition says of its rig beside files, by dotted key."""
+    """Yield a condition's changes to its rig other than files, by dotted key."""
     yield from cast(Mapping[str, Value], condition.params).items()
     if condition.scanpath is not None:
         yield _SCANPATH, condition.scanpath
@@ -177,7 +177,7 @@ def _section(key: str) -> str:
 
 
 def _differing(before: Rig, after: Rig) -> dict[str, Value]:
-    """Return what turns one rig into another, without what its files are called."""
+    """Return the changes from one rig to another, without names of files."""
     found = differences(before, after)
     return {key: value for key, value in found.items() if key not in _WHILE_READ}
 
@@ -196,7 +196,7 @@ def _is_path(name_or_path: str) -> bool:
 
 
 def _from_its_folder(design: StudyDesign, folder: Path) -> StudyDesign:
-    """Return a design with the paths of files as seen from the working folder."""
+    """Return a design with paths relative to the working folder."""
 
     def found(name: str | None) -> str | None:
         return name if name is None or not _is_path(name) else _beside(folder, name)
@@ -227,7 +227,7 @@ def _beside(folder: Path, name: str) -> str:
 
 
 def _asked_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Find questionnaires that cannot be read, and what does not fit those that can."""
+    """Yield unreadable questionnaires, and contradictions with the readable ones."""
     design = _from_its_folder(raw, folder)
     found: dict[str, Questionnaire] = {}
     for list_name in ("questionnaires", "after"):
@@ -246,7 +246,7 @@ def _asked_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
 
 
 def _rig_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Find conditions that cannot be shown, not on a running head, or not told apart."""
+    """Yield conditions that cannot be shown at all, or on a running head, or are equal."""
     design = _from_its_folder(raw, folder)
     try:
         own: Rig | None = load_rig(design.presentation.rig)
@@ -269,12 +269,12 @@ def _rig_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
 
 
 def _condition_faults(at: str, one: Condition, error: ConfigError) -> Iterator[tuple[str, str]]:
-    """Return the faults of a condition's files and parameters, each at the key that caused it."""
+    """Yield the faults of a condition's files and parameters, each at the key that caused it."""
     kinds = {"config/rigs": "rig", "config/profiles": "profile", "config/characters": "character"}
     for fault in error.faults:
         if fault.file in kinds:
             yield f"{at}.{kinds[fault.file]}", fault.rule
-        elif fault.file:  # in a file that it names
+        elif fault.file:  # in a file that the key names
             named = (name for name in kinds.values() if getattr(one, name) == fault.file)
             yield f"{at}.{next(named, 'rig')}".removesuffix(".rig"), str(fault)
         elif fault.key == _BEHAVIOUR or (one.behaviour and "behaviour" in fault.rule):
@@ -288,7 +288,7 @@ def _condition_faults(at: str, one: Condition, error: ConfigError) -> Iterator[t
 
 
 def _file_faults(at: str, one: Condition) -> Iterator[tuple[str, str]]:
-    """Find recordings and films that are not there."""
+    """Yield missing recordings and films."""
     for name, ending in _ENDS.items():
         file = getattr(one, name)
         if file is None:
@@ -300,7 +300,7 @@ def _file_faults(at: str, one: Condition) -> Iterator[tuple[str, str]]:
 
 
 def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator[tuple[str, str]]:
-    """Find what cannot change while a head runs that is to go from condition to condition."""
+    """Yield parameters that cannot change while a head runs from condition to condition."""
     one = design.conditions[key]
     if one.rig is not None or design.presentation.on == "film":
         return
@@ -320,7 +320,7 @@ def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator
 
 
 def _alike(design: StudyDesign, rigs: Mapping[str, Rig]) -> Iterator[tuple[str, str]]:
-    """Find conditions of which each shows what another one shows."""
+    """Yield conditions that show the same as another one."""
     keys = [key for key in design.conditions if key in rigs]
     for i, key in enumerate(keys):
         for other in keys[:i]:
@@ -334,7 +334,7 @@ def _alike(design: StudyDesign, rigs: Mapping[str, Rig]) -> Iterator[tuple[str, 
 
 
 def _same(design: StudyDesign, rigs: Mapping[str, Rig], key: str, other: str) -> bool:
-    """Whether two conditions show the same."""
+    """Return whether two conditions show the same."""
     one, two = design.conditions[key], design.conditions[other]
     files = [(c.recording, c.film) for c in (one, two)]
     if any(file is not None for pair in files for file in pair):
@@ -344,6 +344,6 @@ def _same(design: StudyDesign, rigs: Mapping[str, Rig], key: str, other: str) ->
 
 
 def _here(key: str, error: ConfigError) -> Iterator[tuple[str, str]]:
-    """Return the faults of a file that a key names; of a name that is not shipped, the rule."""
+    """Yield the faults of a file that a key names; for an unknown shipped name, the rule."""
     for fault in error.faults:
         yield key, fault.rule if fault.file.startswith("config/") else str(fault)

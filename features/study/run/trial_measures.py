@@ -1,7 +1,7 @@
-"""What is measured of presentations on the head, from the recordings of its runs.
+"""Measures of presentations on the head, from the recordings of its runs.
 
-The participant is the nearest person. Whether they look at the head is what the detectors find of
-their face and eyes (``Face.looks_at_head``); where that is too uncertain the time does not count.
+The participant is the nearest person. The detectors decide from the face and eyes whether the
+participant looks at the head (``Face.looks_at_head``); times of uncertainty do not count.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -33,19 +33,19 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording.read import RunRecording, used
 
 SWITCH_S = 0.5
-"""Steps of the joints count as those of a switch so long before and after it."""
+"""Time before and after a switch in which steps of the joints belong to it, seconds."""
 
 
 def measured(
     study: LoadedStudy, records: Sequence[Record], folder: Path, say: Callable[[str], None]
 ) -> tuple[Measured, ...]:
-    """Return what is measured of the presentations that have not been yet.
+    """Return the measures of presentations that have none yet.
 
     Args:
-        study: whose objective measures they are.
+        study: the study with its objective measures.
         records: of the participant.
-        folder: of the participant, with the recordings.
-        say: told of a recording that cannot be read; its presentations have no measures.
+        folder: folder of the participant, with the recordings.
+        say: receives a line about a recording that cannot be read, which has no measures.
     """
     began = {
         (one.trial, one.attempt, one.side): one for one in records if isinstance(one, TrialBegan)
@@ -102,7 +102,7 @@ def _values(names: Sequence[str], ticks: Sequence[Tick], from_s: float) -> dict[
 
 
 def largest_step_deg(ticks: Sequence[Tick], from_s: float) -> float:
-    """Return the largest step of a joint's goal from tick to tick about a switch, degrees."""
+    """Return the largest step of a joint's goal between ticks around a switch, degrees."""
     near = [tick for tick in ticks if abs(tick.t_s - from_s) <= SWITCH_S]
     if len(near) < 2:
         return nan
@@ -111,9 +111,9 @@ def largest_step_deg(ticks: Sequence[Tick], from_s: float) -> float:
 
 
 def participants_gaze(ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
-    """Return the measures of GAZE_MEASURES; shares of the time in which a face is seen.
+    """Return the measures of GAZE_MEASURES as shares of the time with a visible face.
 
-    nan where the face was never seen, or its gaze never known.
+    They are nan if no face was visible, or its gaze was never known.
     """
     known = looks = both = 0
     first_s = nan
@@ -135,14 +135,14 @@ def participants_gaze(ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
 
 
 def _participant(tick: Tick) -> Face | None:
-    """Return the nearest face, None where there is none."""
+    """Return the nearest face, None without a face."""
     faces = tick.percept.faces if tick.percept is not None else ()
     head = tick.pose.p_world_head_m
     return min(faces, key=lambda face: norm(sub(face.p_world_m, head)), default=None)
 
 
 def _looked_at(tick: Tick, face: Face) -> bool:
-    """Whether the head's measured gaze is inside the oval of a face."""
+    """Return whether the head's measured gaze is inside the oval of a face."""
     elapsed_s = max(0.0, tick.t_s - (tick.percept.captured_s if tick.percept is not None else 0.0))
     p_m = add(face.p_world_m, scale(face.v_world_m_s, elapsed_s))
     point = on_face(tick.pose.p_world_head_m, cyclopean(tick), p_m, face.R_world_face)

@@ -1,1 +1,1 @@
-"""Tests, effect sizes and models for what participants answered; pure, by SciPy."""
+"""Tests, effect sizes and models for the participants' answers; pure functions, with SciPy."""

@@ -1,4 +1,4 @@
-"""What tests take for granted, checked on the data."""
+"""Assumptions of the tests, checked on the data."""
 
 from collections.abc import Iterator
 from math import isfinite, nan
@@ -17,10 +17,10 @@ _AT_AN_END = 0.5
 
 
 class AssumptionCheck(NamedTuple):
-    """One thing that was looked at.
+    """The check of one assumption.
 
-    p: of the data if it held, nan where it is no test; fine: nothing speaks against it
-    words: what was found, and what follows if it does not hold
+    p: of the data under the assumption, nan without a test; fine: no evidence against it
+    words: the result, and the consequence if the assumption is violated
     """
 
     assumption: str
@@ -35,8 +35,8 @@ def difference_checks(
     """Check the differences of participants: symmetry, normality, and the order of conditions.
 
     Args:
-        differences: (n,) one a participant.
-        better_first: (n,) the condition expected above was seen first.
+        differences: (n,) one per participant.
+        better_first: (n,) whether the condition expected to be better was seen first.
     """
     return [
         *_symmetry(differences), *_normality(differences), *_order(differences, better_first),
@@ -44,7 +44,7 @@ def difference_checks(
 
 
 def _symmetry(d: Floats) -> Iterator[AssumptionCheck]:
-    """Signed ranks compare both sides of zero, which a skewed distribution tilts."""
+    """Check the symmetry of the differences: signed ranks assume it."""
     if len(d) < _LEAST_SKEW or np.ptp(d) == 0.0:
         return
     p = float(stats.skewtest(d).pvalue)
@@ -66,7 +66,7 @@ def _normality(d: Floats) -> Iterator[AssumptionCheck]:
 
 
 def _order(d: Floats, better_first: NDArray[np.bool_]) -> Iterator[AssumptionCheck]:
-    """Whoever saw the conditions the other way round should differ in nothing."""
+    """Check that the order of the conditions makes no difference."""
     first, second = d[better_first], d[~better_first]
     what = "the order of the conditions does not matter"
     if not len(first) or not len(second):
@@ -86,7 +86,7 @@ def _order(d: Floats, better_first: NDArray[np.bool_]) -> Iterator[AssumptionChe
 
 
 def range_check(ratings: Floats, points: int) -> AssumptionCheck:
-    """Check whether a rating had room: most answers at one end hide differences.
+    """Check whether a rating had room: differences are hidden if most answers are at one end.
 
     Args:
         ratings: (n,) at least one.

@@ -1,4 +1,4 @@
-"""Counts of answers: Pearson's chi-square of two or more rows, with an exact chance beside it."""
+"""Counts of answers: Pearson's chi-square of two or more rows, with an exact probability."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -29,16 +29,17 @@ def chi_square(
 ) -> StatisticalTest:
     """Test whether rows of counts come from one distribution: Pearson's chi-square.
 
-    No correction for continuity. Columns that nobody chose are dropped, which the notes say, as
-    they say where expected counts are below five: there the exact chance is to be believed, which
-    is that of all tables with the same margins, or of 9999 of them drawn by a fixed seed.
+    No correction for continuity. Columns without answers are dropped, which is noted. Expected
+    counts
+    below five are noted, too: then the exact probability is valid, which is that of all tables with
+    the same margins, or of 9999 random ones with a fixed seed.
 
     Args:
-        rows: (conditions, points) how often each was answered.
+        rows: (conditions, points) number of answers at each point.
         paired: the same participants answered in all rows, which the test does not use.
 
     Raises:
-        ValueError: a row is empty, or there are not two.
+        ValueError: a row is empty, or there are fewer than two.
     """
     table = np.asarray(rows, np.int64)
     if len(table) < 2 or (table.sum(axis=1) == 0).any():
@@ -54,9 +55,7 @@ def chi_square(
         return StatisticalTest("chi_square", "χ²", 0.0, nan, 1.0, 1.0, least, n, nothing, same)
     found = stats.chi2_contingency(kept, correction=False)
     if small := int((found.expected_freq < _LEAST_EXPECTED).sum()):
-        notes.append(
-            f"{small} of {kept.size} expected counts are below 5: believe the exact chance"
-        )
+        notes.append(f"{small} of {kept.size} expected counts are below 5: use the exact chance")
     return StatisticalTest(
         "chi_square", "χ²", float(found.statistic), float(found.dof), float(found.pvalue),
         exact_chance(kept), least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
@@ -64,17 +63,17 @@ def chi_square(
 
 
 def _least(rows: Counts) -> float:
-    """Return the exact chance of rows that share no column, two columns in all."""
+    """Return the exact probability of rows that share no column, two columns in all."""
     n, first = int(rows.sum()), int(rows[0])
-    # Of rows of one length the table turned round is as extreme.
+    # For rows of equal length the reversed table is as extreme.
     return min(1.0, (2.0 if 2 * first == n else 1.0) / float(special.binom(n, first)))
 
 
 def exact_chance(table: Counts) -> float:
-    """Return the chance of tables at least as extreme with these margins.
+    """Return the probability of tables at least as extreme with these margins.
 
-    Extreme is what has a large chi-square. Tables of two rows are all enumerated while they are
-    at most 200,000; of others 9999 are drawn.
+    Tables with a large chi-square are extreme. Up to 200,000 tables of two rows are all enumerated;
+    otherwise 9999 tables are drawn.
     """
     columns = table.sum(axis=0)
     if len(table) == 2 and np.prod(np.minimum(columns, table.sum(axis=1).min()) + 1.0) < (
@@ -95,7 +94,7 @@ def exact_chance(table: Counts) -> float:
 
 
 def _tables(columns: Counts, row: int) -> tuple[Counts, Floats]:
-    """Return all first rows with these margins, (tables, columns), and their chances."""
+    """Return all first rows with these margins, (tables, columns), and their probabilities."""
     partial = np.zeros((1, 0), np.int64)
     left = np.concatenate([np.cumsum(columns[::-1])[::-1], [0]])
     for column, (_, after) in zip(columns, pairwise(left), strict=True):

@@ -1,7 +1,7 @@
 """Effect sizes with their 95 % intervals.
 
 Intervals are those of the bias-corrected and accelerated bootstrap (Efron 1987) over participants;
-where it has none, as all participants answered alike, the interval is nan.
+they are nan if it is undefined, because all participants answered alike.
 """
 
 import warnings
@@ -20,14 +20,14 @@ _BCA = "BCa bootstrap"
 _MOST_NONCENTRAL = 1e5
 
 Along = Callable[..., Floats]
-"""Samples (..., n), each along its last axis -> figures (...)."""
+"""Samples (..., n), each along its last axis -> statistics (...)."""
 
 
 def rank_biserial(differences: Floats, resamples: int = RESAMPLES) -> EffectSize:
     """Return the matched-pairs rank-biserial correlation (Kerby 2014).
 
     Args:
-        differences: (n,) one a participant, zeros count for neither side.
+        differences: (n,) one per participant; zeros count for neither side.
         resamples: of the bootstrap.
     """
     interval = bootstrapped([differences], matched_correlation, resamples)
@@ -36,10 +36,10 @@ def rank_biserial(differences: Floats, resamples: int = RESAMPLES) -> EffectSize
 
 
 def matched_correlation(differences: Floats, axis: int = -1) -> Floats:
-    """Return (W+ - W-) / (W+ + W-) of differences along an axis, nan where all are zero."""
+    """Return (W+ - W-) / (W+ + W-) of differences along an axis, nan if all are zero."""
     d = np.moveaxis(np.asarray(differences, float), axis, -1)
     zeros = np.count_nonzero(d == 0.0, axis=-1, keepdims=True)
-    # Zeros have the lowest ranks, so those of the others are too high by their number.
+    # Zeros have the lowest ranks, so the other ranks are too high by the number of zeros.
     ranks = np.where(d == 0.0, 0.0, stats.rankdata(np.abs(d), axis=-1) - zeros)
     total = ranks.sum(axis=-1)
     signed = (np.sign(d) * ranks).sum(axis=-1)
@@ -74,7 +74,7 @@ def cohens_dz(differences: Floats, resamples: int = RESAMPLES) -> EffectSize:
     """Return Cohen's d_z: the mean of the differences over their standard deviation.
 
     Args:
-        differences: (n,) one a participant.
+        differences: (n,) one per participant.
         resamples: of the bootstrap.
     """
     interval = bootstrapped([differences], standardised_mean, resamples)
@@ -83,7 +83,7 @@ def cohens_dz(differences: Floats, resamples: int = RESAMPLES) -> EffectSize:
 
 
 def standardised_mean(differences: Floats, axis: int = -1) -> Floats:
-    """Return mean over standard deviation along an axis, nan where all are equal."""
+    """Return mean over standard deviation along an axis, nan if all are equal."""
     mean = np.asarray(np.mean(differences, axis=axis))
     spread = np.asarray(np.std(differences, axis=axis, ddof=1))
     ratio: Floats = np.divide(mean, spread, out=np.full_like(mean, nan), where=spread > 1e-12)
@@ -107,11 +107,11 @@ def kendalls_w(rows: Floats, resamples: int = RESAMPLES) -> EffectSize:
 
 
 def concordance(rows: Floats) -> Floats:
-    """Return Kendall's W of (..., participants, conditions), nan where all rows are ties."""
+    """Return Kendall's W of (..., participants, conditions), nan if all rows are ties."""
     n, k = rows.shape[-2:]
     ranks = stats.rankdata(rows, axis=-1)
     apart = ((ranks.sum(axis=-2) - 0.5 * n * (k + 1)) ** 2).sum(axis=-1)
-    # The spread within rows is k (k^2 - 1) / 12 less what ties take from it.
+    # The spread within rows is k (k^2 - 1) / 12 minus the part of ties.
     most = n * ((ranks - 0.5 * (k + 1)) ** 2).sum(axis=(-1, -2))
     share: Floats = np.divide(apart, most, out=np.full_like(apart, nan), where=most > 0.0)
     return share
@@ -120,7 +120,7 @@ def concordance(rows: Floats) -> Floats:
 def cramers_v(chi2: float, n: int, shape: tuple[int, int]) -> EffectSize:
     """Return Cramer's V of a table.
 
-    The interval is that of the noncentral chi-square distribution turned round (Smithson 2003).
+    The interval is that of the inverted noncentral chi-square distribution (Smithson 2003).
 
     Args:
         chi2: Pearson's statistic.
@@ -140,7 +140,7 @@ def cramers_v(chi2: float, n: int, shape: tuple[int, int]) -> EffectSize:
 
 
 def _noncentrality(chi2: float, df: int, share: float) -> float:
-    """Return the noncentrality under which ``share`` lies below chi2, 0 where none is so small."""
+    """Return the noncentrality with a CDF of ``share`` at chi2, 0 if none is that small."""
 
     def beyond(centre: float) -> float:
         return float(stats.ncx2.cdf(chi2, df, centre) if centre else stats.chi2.cdf(chi2, df))
@@ -154,18 +154,18 @@ def _noncentrality(chi2: float, df: int, share: float) -> float:
 def bootstrapped(
     samples: Sequence[Floats], figure: Along, resamples: int = RESAMPLES, paired: bool = False
 ) -> tuple[float, float]:
-    """Return the 95 % BCa interval of a figure, (nan, nan) where there is none.
+    """Return the 95 % BCa interval of a statistic, (nan, nan) if it is undefined.
 
     Args:
         samples: each (n,); with ``paired`` all of the same participants.
-        figure: vectorised along an axis.
-        resamples: how often participants are drawn again.
+        figure: the statistic, vectorised along an axis.
+        resamples: number of resamplings of the participants.
         paired: the samples are drawn together.
     """
     if min(len(s) for s in samples) < 3 or all(np.ptp(s) == 0.0 for s in samples):
         return nan, nan
     with warnings.catch_warnings(), np.errstate(all="ignore"):
-        # SciPy warns where the bootstrap distribution is degenerate; the interval is then nan.
+        # SciPy warns of a degenerate bootstrap distribution; the interval is then nan.
         warnings.simplefilter("ignore")
         found = stats.bootstrap(
             samples, figure, n_resamples=resamples, paired=paired, vectorized=True, axis=-1,

@@ -1,7 +1,7 @@
 """Rank tests: Wilcoxon's rank-sum and signed-rank, Friedman's, and the sign test.
 
-The chances of large samples are SciPy's, corrected for ties and for continuity; exact ones count
-the permutations of the ranks that were seen, midranks and all (Streitberg & Roehmel 1986).
+Probabilities of large samples are SciPy's, corrected for ties and for continuity; exact ones count
+the permutations of the observed ranks, including midranks (Streitberg & Roehmel 1986).
 """
 
 from math import factorial, isfinite, nan
@@ -16,7 +16,7 @@ from gazerig.features.study.statistics.results import EffectSize, StatisticalTes
 from gazerig.gaze.types import Floats
 
 Zeros = Literal["wilcox", "pratt"]
-"""Differences of zero: left out (Wilcoxon 1945), or ranked and then left out (Pratt 1959)."""
+"""Treatment of zeros: left out (Wilcoxon 1945), or ranked and then left out (Pratt 1959)."""
 
 _MOST_EXACT = 200
 _PERMUTATIONS = 9999
@@ -25,14 +25,14 @@ _SEED = 20020402
 
 
 def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False) -> StatisticalTest:
-    """Test whether b tends to exceed a: Wilcoxon's rank-sum, which is Mann and Whitney's U.
+    """Test whether b tends to exceed a: Wilcoxon's rank-sum, or Mann and Whitney's U.
 
     Args:
         a: (n,) answers.
         b: (m,) answers.
         two_sided: differences of either sign count.
-        paired: the same participants in the same order gave both. The exact chance then swaps each
-            participant's two answers, and the effect's interval resamples participants.
+        paired: the same participants in the same order gave both. The exact probability then swaps
+            each participant's two answers, and the effect's interval resamples participants.
 
     Raises:
         ValueError: one side has no answer.
@@ -50,7 +50,7 @@ def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False)
         return StatisticalTest("rank_sum", "U", half, nan, 1.0, 1.0, least, len(a), effect, same)
     found = stats.mannwhitneyu(b, a, alternative=_side(two_sided), method="asymptotic")
     exact, p = (exact_swaps if paired else exact_rank_sum)(a, b, two_sided), float(found.pvalue)
-    if paired and not isfinite(exact):  # so many that the swaps' sum is normal
+    if paired and not isfinite(exact):  # enough that the swaps' sum is normal
         scores = _swap_scores(a, b).astype(float)
         z = float(scores.sum() / np.sqrt((scores**2).sum()))
         p = float(2.0 * stats.norm.sf(abs(z)) if two_sided else stats.norm.sf(z))
@@ -64,7 +64,7 @@ def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False)
 def exact_rank_sum(a: Floats, b: Floats, two_sided: bool = True) -> float:
     """Return the share of all divisions of the answers that are as extreme as this one.
 
-    Two-sided: as far from the mean rank sum, on either side. nan of more than 200 answers.
+    Two-sided: as far from the mean rank sum, on either side. nan for more than 200 answers.
     """
     whole = np.concatenate([a, b])
     if len(whole) > _MOST_EXACT:
@@ -86,7 +86,7 @@ def exact_rank_sum(a: Floats, b: Floats, two_sided: bool = True) -> float:
 def exact_swaps(a: Floats, b: Floats, two_sided: bool = True) -> float:
     """Return the share of all swaps of participants' answers with as extreme a rank sum.
 
-    It holds however the two answers of a participant depend on each other.
+    It is valid for any dependence between the two answers of a participant.
 
     Args:
         a: (n,) answers, one per participant.
@@ -97,7 +97,7 @@ def exact_swaps(a: Floats, b: Floats, two_sided: bool = True) -> float:
 
 
 def _swap_scores(a: Floats, b: Floats) -> NDArray[np.int64]:
-    """Return by how much each participant's swap changes the doubled rank sum, (n,)."""
+    """Return the change of the doubled rank sum by each participant's swap, (n,)."""
     doubled = np.rint(2.0 * stats.rankdata(np.concatenate([a, b]))).astype(np.int64)
     found: NDArray[np.int64] = doubled[len(a) :] - doubled[: len(a)]
     return found
@@ -106,12 +106,12 @@ def _swap_scores(a: Floats, b: Floats) -> NDArray[np.int64]:
 def signed_rank(
     differences: Floats, two_sided: bool = True, zeros: Zeros = "wilcox"
 ) -> StatisticalTest:
-    """Test whether differences lie about zero: Wilcoxon's signed-rank test.
+    """Test whether differences are centred at zero: Wilcoxon's signed-rank test.
 
     Args:
-        differences: (n,) one a participant.
+        differences: (n,) one per participant.
         two_sided: differences of either sign count.
-        zeros: what is done with differences of zero.
+        zeros: treatment of differences of zero.
     """
     d = np.asarray(differences, float)
     kept = int(np.count_nonzero(d))
@@ -142,7 +142,7 @@ def exact_signed_rank(
 ) -> float:
     """Return the share of all signs of the differences that are as extreme as these.
 
-    nan of more than 200 differences that are not zero.
+    nan for more than 200 nonzero differences.
     """
     d = np.asarray(differences, float)
     if zeros == "wilcox":
@@ -152,7 +152,7 @@ def exact_signed_rank(
 
 
 def _all_signs(scores: NDArray[np.int64], two_sided: bool) -> float:
-    """Return the share of all signs of scores (n,) whose sum is as extreme; nan above 200."""
+    """Return the share of all signs of scores (n,) with as extreme a sum; nan above 200."""
     scores = scores[scores != 0]
     if len(scores) > _MOST_EXACT:
         return nan
@@ -169,9 +169,9 @@ def _all_signs(scores: NDArray[np.int64], two_sided: bool) -> float:
 
 
 def sign(differences: Floats, two_sided: bool = True) -> StatisticalTest:
-    """Test whether more participants lean to one side than to the other: the exact sign test.
+    """Test whether more participants prefer one side than the other: the exact sign test.
 
-    A participant counts once, however many choices he or she made.
+    A participant counts once, regardless of the number of choices.
 
     Args:
         differences: (n,) one per participant; only their signs are used.
@@ -199,8 +199,8 @@ def sign(differences: Floats, two_sided: bool = True) -> StatisticalTest:
 def friedman(rows: Floats) -> StatisticalTest:
     """Test whether conditions differ: Friedman's test, with ties.
 
-    The exact chance is that of 9999 orders of the answers within participants, drawn by a fixed
-    seed.
+    The exact probability is that of 9999 orders of the answers within participants, drawn with a
+    fixed seed.
 
     Args:
         rows: (participants, conditions), three conditions or more.
@@ -225,7 +225,7 @@ def friedman(rows: Floats) -> StatisticalTest:
 
 
 def _permuted_friedman(rows: Floats) -> float:
-    """Return how often answers that are shuffled within participants agree as much."""
+    """Return the share of shuffles within participants that agree at least as much."""
     ranks: NDArray[np.float64] = stats.rankdata(rows, axis=1)
     rng = np.random.default_rng(_SEED)
     seen = float((ranks.sum(axis=0) ** 2).sum())

@@ -1,4 +1,4 @@
-"""Whether the items of a scale measure one thing: Cronbach's alpha."""
+"""Consistency of the items of a scale: Cronbach's alpha."""
 
 from math import nan
 
@@ -13,7 +13,7 @@ def cronbachs_alpha(answers: Floats) -> EffectSize:
     """Return Cronbach's alpha (1951) of a scale, with its interval over participants.
 
     Args:
-        answers: (participants, items), reversed items already turned round.
+        answers: (participants, items), with reversed items inverted.
     """
     rows = np.asarray(answers, float)
     name = "Cronbach's alpha"
@@ -28,7 +28,7 @@ def cronbachs_alpha(answers: Floats) -> EffectSize:
 
 
 def _alpha(items: Floats) -> Floats:
-    """Return alpha of (items, ..., participants), nan where all sums are equal."""
+    """Return alpha of (items, ..., participants), nan if all sums are equal."""
     k = len(items)
     parts = np.var(items, axis=-1, ddof=1).sum(axis=0)
     whole = np.asarray(np.var(items.sum(axis=0), axis=-1, ddof=1))

@@ -1,4 +1,4 @@
-"""What a test gives: statistic, chances, effect with its interval, and what to know of it."""
+"""Results of a test: statistic, probabilities, effect with its interval, and notes."""
 
 from dataclasses import dataclass
 from math import isfinite, nan
@@ -8,9 +8,9 @@ from gazerig.features.study.design import Test
 
 
 class EffectSize(NamedTuple):
-    """An effect with its 95 % interval, nan where there is none.
+    """An effect with its 95 % interval, nan without one.
 
-    name: in words; symbol: as it is printed; method: of the interval
+    name: in words; symbol: as printed; method: of the interval
     bounded: it cannot exceed 1, so no zero is printed before the decimal point
     """
 
@@ -25,14 +25,14 @@ class EffectSize(NamedTuple):
 
 @dataclass(frozen=True)
 class StatisticalTest:
-    """One test that was carried out.
+    """The results of one test.
 
-    symbol, statistic, df: as printed, df is nan where the statistic has none
+    symbol, statistic, df: as printed; df is nan for a statistic without degrees of freedom
     p: by the statistic's distribution in large samples
-    exact_p: of the permutations that the data allow, nan where it was not computed
-    least_p: the smallest exact chance that so few data can have, whatever they are
-    n: participants, or answers where each counts by itself
-    notes: what a reader must know, e.g. counts too small for the large-sample chance
+    exact_p: of the permutations of the data, nan if it was not computed
+    least_p: the smallest exact probability that is possible with this number of data
+    n: participants, or answers if each counts separately
+    notes: warnings for the reader, e.g. counts too small for the large-sample probability
     """
 
     key: Test
@@ -48,10 +48,10 @@ class StatisticalTest:
 
     @property
     def deciding_p(self) -> float:
-        """Return the exact chance where there is one, else that of large samples."""
+        """Return the exact probability if it is known, else that of large samples."""
         return self.exact_p if isfinite(self.exact_p) else self.p
 
 
 def no_effect(name: str, symbol: str) -> EffectSize:
-    """Return the effect of data that have none."""
+    """Return an undefined effect."""
     return EffectSize(name, symbol, nan, nan, nan, "none")
