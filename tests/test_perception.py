@@ -305,6 +305,16 @@ def test_who_has_the_head_above_the_picture_is_where_the_body_is_seen() -> None:
         assert pixel == pytest.approx((body.head_px[0], 0.02 * WIDTH), abs=0.5)
 
 
+@pytest.mark.parametrize(("frames", "waited"), [(1, False), (2, True)])
+def test_a_body_that_is_found_once_is_not_waited_for_as_a_person_is(
+    frames: int, waited: bool
+) -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()))
+    for k in range(1, 25):
+        found = seen(perception, k, people=(body_at(0.4),) if k <= frames else ())
+    assert bool(found.bodies.ids) is waited
+
+
 def body_at(x: float) -> DetectedPerson:
     """Return a person 2 m away who is turned away, so far to the right."""
     ((x_px, y_px),) = project([(x, 0.0, 2.0)], LENS).tolist()

@@ -108,7 +108,7 @@ class Tracker:
 
     def _coasts_s(self, track: Track) -> float:
         """Return how long a track without a detection is still reported."""
-        by_body = track.is_person and track.seen_s > track.faced_s
+        by_body = track.is_person and track.seen_s > track.faced_s and track.frames > 1
         return (self._params.coast_person_ms if by_body else self._params.coast_ms) / 1e3
 
     def _kept_s(self, track: Track) -> float:
