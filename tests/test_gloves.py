@@ -10,7 +10,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import ImageArray, MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector
-from gazerig.drivers.vision.motion.gloves import RADIUS_M, GloveFinder, beside
+from gazerig.drivers.vision.motion.gloves import RADIUS_M, GloveDetector, exclude_gloves
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
@@ -32,13 +32,13 @@ def scene(*balls: Ball, colour: tuple[int, int, int] = RED, noise: float = 3.0) 
     return np.clip(image + grain, 0, 255).astype(np.uint8)
 
 
-def found(finder: GloveFinder, image: ImageArray, t_s: float = 0.0) -> tuple[MovingBlob, ...]:
+def found(finder: GloveDetector, image: ImageArray, t_s: float = 0.0) -> tuple[MovingBlob, ...]:
     return finder.find(image, t_s, LENS, 320)
 
 
 @pytest.mark.parametrize("z", [0.35, 0.6, 0.9, 1.2])
 def test_a_glove_is_where_it_is_and_as_far_away_as_its_size_says(z: float) -> None:
-    (glove,) = found(GloveFinder(), scene((-0.1, 0.08, z)))
+    (glove,) = found(GloveDetector(), scene((-0.1, 0.08, z)))
     assert glove.kind == "hand" and glove.depth_known
     assert glove.p_camera_m[:2] == pytest.approx((-0.1, 0.08), abs=0.02)
     assert glove.p_camera_m[2] == pytest.approx(z, rel=0.07)
@@ -46,7 +46,7 @@ def test_a_glove_is_where_it_is_and_as_far_away_as_its_size_says(z: float) -> No
 
 
 def test_a_punching_glove_before_the_other_leaves_both_with_their_numbers() -> None:
-    finder, punching = GloveFinder(), -1
+    finder, punching = GloveDetector(), -1
     for k, z in enumerate((0.8, 0.72, 0.6, 0.48, 0.40)):
         gloves = found(finder, scene((-0.1 + 0.02 * k, 0.1, z), (0.16, 0.1, 0.85)), k / 30)
         assert len(gloves) == 2
@@ -57,18 +57,18 @@ def test_a_punching_glove_before_the_other_leaves_both_with_their_numbers() -> N
 
 
 def test_what_is_not_red_or_too_far_or_too_small_is_no_glove() -> None:
-    assert found(GloveFinder(), scene()) == ()
-    assert found(GloveFinder(), scene((0.0, 0.1, 0.6), colour=SKIN)) == ()
-    assert found(GloveFinder(), scene((0.0, 0.1, 0.6), colour=(200, 60, 30))) == ()
-    assert found(GloveFinder(), scene((0.0, 0.1, 2.2))) == ()
+    assert found(GloveDetector(), scene()) == ()
+    assert found(GloveDetector(), scene((0.0, 0.1, 0.6), colour=SKIN)) == ()
+    assert found(GloveDetector(), scene((0.0, 0.1, 0.6), colour=(200, 60, 30))) == ()
+    assert found(GloveDetector(), scene((0.0, 0.1, 2.2))) == ()
     rope = scene()
     cv2.line(rope, (0, 300), (639, 310), RED, 8)
-    assert found(GloveFinder(), rope) == ()
-    assert found(GloveFinder(), scene((0.0, 0.1, 0.6))[:, :, 0]) == ()
+    assert found(GloveDetector(), rope) == ()
+    assert found(GloveDetector(), scene((0.0, 0.1, 0.6))[:, :, 0]) == ()
 
 
 def test_a_number_is_kept_for_a_moment_without_the_glove_and_not_for_long() -> None:
-    finder = GloveFinder()
+    finder = GloveDetector()
     (first,) = found(finder, scene((0.1, 0.1, 0.8)), 0.0)
     assert found(finder, scene(), 0.2) == ()
     (again,) = found(finder, scene((0.12, 0.1, 0.8)), 0.4)
@@ -86,19 +86,19 @@ def test_a_glove_of_which_a_part_is_hidden_is_as_far_away_as_it_was(hides: str) 
         whole, hidden = (0.02, 0.1, 0.8), (0.17, 0.1, 0.8)
     others = (other,) if hides == "the other glove" else ()
     last = scene(hidden, *others)
-    finder = GloveFinder()
+    finder = GloveDetector()
     found(finder, scene(whole, *others), 0.0)
     for k in range(1, 5):
         way = [a + 0.25 * k * (b - a) for a, b in zip(whole, hidden, strict=True)]
         gloves = found(finder, scene((way[0], way[1], way[2]), *others), k / 30)
         far = [one.p_camera_m[2] for one in gloves if one.p_camera_m[2] > 0.5]
         assert len(far) == 1 and far[0] == pytest.approx(0.8, rel=0.1)
-    assert all(one.p_camera_m[2] < 0.5 for one in found(GloveFinder(), last))
+    assert all(one.p_camera_m[2] < 0.5 for one in found(GloveDetector(), last))
 
 
 def test_the_longer_a_part_is_hidden_the_less_is_known_of_how_far_away_a_glove_is() -> None:
     whole, cut = scene((0.05, 0.25, 0.8)), scene((0.05, 0.41, 0.8))
-    finder = GloveFinder()
+    finder = GloveDetector()
     seen = [found(finder, cut if 1 <= k <= 15 else whole, k / 30)[0] for k in range(17)]
     sds = [glove.depth_sd_m for glove in seen]
     assert {glove.id for glove in seen} == {seen[0].id}
@@ -110,8 +110,8 @@ def test_the_arm_and_trunk_behind_a_glove_are_nothing_of_their_own() -> None:
     glove = MovingBlob(1, "hand", (0.0, 0.0, 0.8), 0.07, centre_px=(110.0, 130.0))
     trunk = MovingBlob(2, "thing", (0.0, 0.0, 2.0), 0.3, box_px=(60.0, 120.0, 200.0, 300.0))
     other = MovingBlob(3, "thing", (1.0, 0.0, 2.0), 0.1, box_px=(400.0, 120.0, 30.0, 30.0))
-    assert beside((trunk, other), (glove,)) == (other,)
-    assert beside((trunk, other), ()) == (trunk, other)
+    assert exclude_gloves((trunk, other), (glove,)) == (other,)
+    assert exclude_gloves((trunk, other), ()) == (trunk, other)
 
 
 @pytest.mark.parametrize("gloves", [True, False])
@@ -139,12 +139,12 @@ def test_a_white_patch_on_a_glove_does_not_make_it_smaller() -> None:
     image = scene((0.0, 0.05, 0.6))
     u, v = LENS.cx_px, 0.05 / 0.6 * LENS.fy_px + LENS.cy_px
     cv2.circle(image, (round(u + 38), round(v)), 17, (225, 225, 235), -1, cv2.LINE_AA)
-    (glove,) = found(GloveFinder(), image)
+    (glove,) = found(GloveDetector(), image)
     assert glove.p_camera_m[2] == pytest.approx(0.6, rel=0.08)
 
 
 def test_a_glove_that_a_bare_hand_uncovers_does_not_come_nearer() -> None:
-    finder = GloveFinder()
+    finder = GloveDetector()
     away: list[float] = []
     for k in range(16):
         image = scene((-0.1, 0.08, 0.8))

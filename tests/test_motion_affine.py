@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.affine import affine_rest, flow_map, patch_motion
+from gazerig.drivers.vision.motion.affine import affine_residual, fit_affine_warp, patch_motion
 from gazerig.drivers.vision.motion.detector import MotionDetector
 from gazerig.drivers.vision.motion.params import MotionParams
 
@@ -135,14 +135,14 @@ def test_a_map_is_taken_apart_again(
     before = (places - centre - slide) @ np.linalg.inv(forward).T + centre
     flow = places - before
     flow[:outliers] += 5.0
-    motion = patch_motion(*flow_map(places, flow, centre, 200.0))
+    motion = patch_motion(*fit_affine_warp(places, flow, centre, 200.0))
     assert motion.spin_rad == pytest.approx(spin, abs=0.02)
     assert motion.growth == pytest.approx(growth, abs=0.02)
 
 
 def test_points_in_a_row_tell_a_slide_only() -> None:
     places = np.column_stack((np.arange(20.0), np.zeros(20)))
-    back, rest = flow_map(places, np.tile((2.0, 1.0), (20, 1)), places.mean(axis=0), 20.0)
+    back, rest = fit_affine_warp(places, np.tile((2.0, 1.0), (20, 1)), places.mean(axis=0), 20.0)
     motion = patch_motion(back, rest)
     assert motion.slide_px == pytest.approx((2.0, 1.0), abs=0.01)
     assert motion.spin_rad == 0.0 and motion.growth == 0.0 and motion.spin_sd == np.inf
@@ -151,6 +151,6 @@ def test_points_in_a_row_tell_a_slide_only() -> None:
 def test_what_one_map_explains_leaves_nothing() -> None:
     places = np.random.default_rng(1).uniform(0.0, 60.0, (100, 2))
     flow = places @ np.array([[0.1, -0.2], [0.2, 0.1]]) + 3.0
-    assert affine_rest(places, flow) < 1e-9
+    assert affine_residual(places, flow) < 1e-9
     flow[:50] += 4.0
-    assert affine_rest(places, flow) > 1.0
+    assert affine_residual(places, flow) > 1.0

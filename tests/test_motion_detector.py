@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
-from gazerig.drivers.vision.motion.image import made_small
+from gazerig.drivers.vision.motion.detector import MotionDetector, relative_rotation
+from gazerig.drivers.vision.motion.image import scale_down
 from gazerig.drivers.vision.motion.params import MotionParams
 
 DT_S = 1 / 30
@@ -192,7 +192,7 @@ def test_joints_without_a_number_count_as_unknown() -> None:
 )
 def test_what_is_no_picture_is_refused_in_words(picture: NDArray[np.uint8]) -> None:
     with pytest.raises(ValueError, match="an image is"):
-        made_small(picture, 320, lens(320, 240), 0.0)
+        scale_down(picture, 320, lens(320, 240), 0.0)
 
 
 def test_same_pictures_same_answer() -> None:
@@ -214,5 +214,5 @@ def test_forgotten_is_forgotten_and_numbers_are_not_used_again() -> None:
 def test_the_turn_between_two_orientations() -> None:
     c, s = np.cos(0.1), np.sin(0.1)
     before, now = np.eye(3), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    ahead = turned_between(now, before) @ (0.0, 0.0, 1.0)
+    ahead = relative_rotation(now, before) @ (0.0, 0.0, 1.0)
     assert ahead == pytest.approx((-s, 0.0, c))  # who turns right sees the room go left

@@ -3,27 +3,27 @@
 import numpy as np
 import pytest
 
-from gazerig.drivers.vision.motion.clustering import gathered, inscribed_px
+from gazerig.drivers.vision.motion.clustering import cluster_motion, inscribed_px
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.drivers.vision.motion.segmentation import Things
+from gazerig.drivers.vision.motion.segmentation import MotionMask
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 SHAPE = (240, 320)
 Box = tuple[int, int, int, int]
 
 
-def things(*boxes: tuple[Box, tuple[float, float]]) -> Things:
+def things(*boxes: tuple[Box, tuple[float, float]]) -> MotionMask:
     """Make boxes (x, y, width, height) that move as one each."""
     flow = np.zeros((*SHAPE, 2), dtype=np.float32)
     mask = np.zeros(SHAPE, dtype=np.bool_)
     for (x, y, width, height), motion in boxes:
         flow[y : y + height, x : x + width] = motion
         mask[y : y + height, x : x + width] = True
-    return Things(flow, mask, 0.25)
+    return MotionMask(flow, mask, 0.25)
 
 
-def boxes(given: Things, **changed: float) -> list[Box]:
-    return [group.box for group in gathered(given, MotionParams(**changed))]  # type: ignore[arg-type]
+def boxes(given: MotionMask, **changed: float) -> list[Box]:
+    return [group.box for group in cluster_motion(given, MotionParams(**changed))]  # type: ignore[arg-type]
 
 
 def test_apart_is_two_and_near_is_one() -> None:
@@ -118,16 +118,18 @@ def test_the_camera_s_turn_moves_what_is_expected() -> None:
 
 def test_the_largest_disc_within_a_patch_tells_how_thick_it_is() -> None:
     """An arm is as thick as it is wide, however long; small holes and the edge change nothing."""
-    (arm,) = gathered(things(((100, 50, 90, 24), (2, 0))), MotionParams())
+    (arm,) = cluster_motion(things(((100, 50, 90, 24), (2, 0))), MotionParams())
     assert inscribed_px(arm, SHAPE) == pytest.approx(12.0, abs=1.0)
     holed = things(((100, 50, 90, 24), (2, 0)))
     holed.mask[60:62, 120:122] = False
-    assert inscribed_px(gathered(holed, MotionParams())[0], SHAPE) == pytest.approx(12.0, abs=1.0)
+    assert inscribed_px(cluster_motion(holed, MotionParams())[0], SHAPE) == pytest.approx(
+        12.0, abs=1.0
+    )
     plain = things(((0, 50, 90, 24), (2, 0)))
     plain.mask[54:70, :3] = plain.mask[56:68, :70] = False
-    (sleeve,) = gathered(plain, MotionParams())
+    (sleeve,) = cluster_motion(plain, MotionParams())
     assert inscribed_px(sleeve, SHAPE) == pytest.approx(12.0, abs=1.0), "only its edges show"
-    (cut,) = gathered(things(((0, 50, 90, 24), (2, 0))), MotionParams())
+    (cut,) = cluster_motion(things(((0, 50, 90, 24), (2, 0))), MotionParams())
     assert inscribed_px(cut, SHAPE) == pytest.approx(12.0, abs=1.0)
-    (corner,) = gathered(things(((0, 0, 40, 30), (2, 0))), MotionParams())
+    (corner,) = cluster_motion(things(((0, 0, 40, 30), (2, 0))), MotionParams())
     assert inscribed_px(corner, SHAPE) > 25.0, "it goes on beyond both edges"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
+from gazerig.drivers.vision.motion.detector import MotionDetector, relative_rotation
 from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 233.0
@@ -127,7 +127,7 @@ def watch(
                 seen,
                 t_s,
                 LENS,
-                turned_between(now, before) if known else None,
+                relative_rotation(now, before) if known else None,
                 depth(R, boards(t_s), rng) if depth_known else None,
                 now.T @ (before - now) @ LEVER_M if depth_known else None,
             )

@@ -17,7 +17,7 @@ from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
-from gazerig.drivers.vision.body_detector import DetectorWithPeople, with_people
+from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS
 from gazerig.drivers.vision.palms import PalmDetector
@@ -112,7 +112,7 @@ class OneFace:
 def test_frames_carry_palms_between_processes() -> None:
     palms = PalmDetector(FaceDetectorParams(), Seen((200.0, 300.0, 200.0, 260.0, 10.0, 0.8)))
     frames = FrameAnalyzer(
-        DetectorWithPeople(OneFace(), None, palms), None, FrameLocator(None, radians(69.0))
+        BodyDetector(OneFace(), None, palms), None, FrameLocator(None, radians(69.0))
     )
     found, later = (frames.look(Shot(0.03 * i, 1 + i, FRAME)) for i in (0, 1))
     assert pickle.loads(pickle.dumps(found.palms)) == found.palms and later.palms is None
@@ -200,8 +200,8 @@ def test_the_hands_of_a_person_who_signs_are_found_and_no_elbow(
 ) -> None:
     """The one hand is at the forehead, the other before the chest."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(MODELS))
-    detector = with_people(OneFace(), FaceDetectorParams(people_hz=0.0, hands_hz=30.0))
-    assert isinstance(detector, DetectorWithPeople)
+    detector = add_body_detection(OneFace(), FaceDetectorParams(people_hz=0.0, hands_hz=30.0))
+    assert isinstance(detector, BodyDetector)
     film, face = cv2.VideoCapture(str(FILM)), replace(FACE, box_px=(276.0, 92.0, 52.0, 64.0))
     for number in range(37):
         assert film.grab()

@@ -19,7 +19,7 @@ from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
-from gazerig.drivers.vision.body_detector import DetectorWithPeople, with_people
+from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
 from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.drivers.vision.face.auto import AutoDetector
 from gazerig.drivers.vision.face.detector import face_detector
@@ -138,7 +138,7 @@ class Faceless:
 def test_frames_carry_people_between_processes_and_the_page_draws_them() -> None:
     network = Seen([(200.0, 90.0, 200.0, 0.9)], 480.0)
     network.left_of = [0.0, 160.0]
-    detector = DetectorWithPeople(Faceless(), PeopleDetector(FaceDetectorParams(), network))
+    detector = BodyDetector(Faceless(), PeopleDetector(FaceDetectorParams(), network))
     frames = FrameAnalyzer(detector, None, FrameLocator(None, radians(69.0)))
     shown = np.full((480, 640, 3), 90, np.uint8)
     found = frames.look(Shot(0.0, 1, shown))
@@ -164,8 +164,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_damaged_file_is_told_once_and_faces_are_found(folder: Path) -> None:
     PEOPLE.path.write_bytes(b"half of it")
-    detector = with_people(Faceless(), FaceDetectorParams())
-    assert isinstance(detector, DetectorWithPeople)
+    detector = add_body_detection(Faceless(), FaceDetectorParams())
+    assert isinstance(detector, BodyDetector)
     (line,) = detector.events()
     assert "damaged" in line and "gazerig models fetch people" in line
     assert detector.events() == () and detector.find(np.zeros((9, 9, 3), np.uint8)) == ()
@@ -180,8 +180,8 @@ def test_a_file_without_its_package_names_the_extra(
     monkeypatch.setattr(type(PEOPLE), "is_content", lambda self, content: True)
     PEOPLE.path.write_bytes(b"network")
     monkeypatch.setitem(sys.modules, "ai_edge_litert.interpreter", None)
-    detector = with_people(Faceless(), FaceDetectorParams())
-    assert isinstance(detector, DetectorWithPeople)
+    detector = add_body_detection(Faceless(), FaceDetectorParams())
+    assert isinstance(detector, BodyDetector)
     (line,) = detector.events()
     assert "pip install 'gazerig[people]'" in line
 
@@ -338,8 +338,8 @@ def test_people_who_stand_with_their_back_to_the_camera_are_found_and_no_table(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(MODELS))
-    detector = with_people(Faceless(), FaceDetectorParams(people_hz=30.0))
-    assert isinstance(detector, DetectorWithPeople)
+    detector = add_body_detection(Faceless(), FaceDetectorParams(people_hz=30.0))
+    assert isinstance(detector, BodyDetector)
     film = cv2.VideoCapture(str(FILM))
     found: dict[int, list[DetectedPerson]] = {}
     for number in range(520):

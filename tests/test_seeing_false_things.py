@@ -60,7 +60,7 @@ def test_two_thousand_specks_cost_no_more_than_may_be_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     measured = counted(monkeypatch, detector, "patch_motion")
-    compared = counted(monkeypatch, clustering, "affine_rest")
+    compared = counted(monkeypatch, clustering, "affine_residual")
     rng, source = np.random.default_rng(0), MotionSource(MotionParams(), None, 1.2, None)
     most = MotionParams().max_blobs
     x, y = rng.uniform(0, 640, 2000), rng.uniform(0, 400, 2000)

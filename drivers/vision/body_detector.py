@@ -23,7 +23,7 @@ from gazerig.drivers.vision.palms import PalmDetector
 from gazerig.drivers.vision.people import Floats, Network, PeopleDetector
 
 
-class DetectorWithPeople:
+class BodyDetector:
     """A face detector that also finds people whose face is not visible, and palms.
 
     Args:
@@ -63,12 +63,12 @@ class DetectorWithPeople:
         """Find palms; see ``PalmDetector.find``."""
         return None if self._palms is None else self._palms.find(image, captured_s, faces, people)
 
-    def meshed(
+    def add_meshes(
         self, image: ImageArray, faces: tuple[DetectedFace, ...]
     ) -> tuple[DetectedFace, ...]:
         """Return faces that a camera itself has found, with meshes if wanted."""
-        meshed: Callable[..., Any] | None = getattr(self._detector, "meshed", None)
-        return faces if meshed is None else tuple(meshed(image, faces))
+        add_meshes: Callable[..., Any] | None = getattr(self._detector, "add_meshes", None)
+        return faces if add_meshes is None else tuple(add_meshes(image, faces))
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
@@ -76,7 +76,7 @@ class DetectorWithPeople:
         return (*self._log.drain(), *(events() if events is not None else ()))
 
 
-def with_people(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
+def add_body_detection(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
     """Return a detector that also finds people and palms, or the given one without their files.
 
     A file that cannot be used is reported as an event.
@@ -95,7 +95,7 @@ def with_people(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetec
     people, palms = networks
     if people is palms is None and not faults:
         return detector
-    return DetectorWithPeople(
+    return BodyDetector(
         detector,
         None if people is None else PeopleDetector(params, people),
         None if palms is None else PalmDetector(params, palms),

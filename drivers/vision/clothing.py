@@ -90,7 +90,7 @@ class ClothingReader:
         if not (faces or people) or image.ndim != 3 or image.size == 0:
             return faces, people
         heads = [*of_faces, *[_of_person(one) for one in people]]
-        found = clothes(image, heads, [head for _, head in self._before])
+        found = clothing_colours(image, heads, [head for _, head in self._before])
         return (
             tuple([replace(one, clothing=of) for one, of in zip(faces, found, strict=False)]),
             tuple(
@@ -102,7 +102,7 @@ class ClothingReader:
         )
 
 
-def clothes(
+def clothing_colours(
     image: ImageArray, heads: Sequence[_Head | None], covering: Sequence[_Head]
 ) -> list[Clothing | None]:
     """Return the colours below each head, None if too little is visible.

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
-from gazerig.drivers.vision.face.crops import cut_square
+from gazerig.drivers.vision.face.crops import crop_square
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import as_bgr
 from gazerig.drivers.vision.people import Network, anchors, confidences
@@ -77,7 +77,7 @@ class PalmDetector:
         half = _REACH_M * self._px_per_m / 2.0
         y = self._y + _BELOW_M * self._px_per_m
         box = np.array([self._x - half, y - half, self._x + half, y + half])
-        part, where = cut_square(as_bgr(image), box, _SIDE_PX)
+        part, where = crop_square(as_bgr(image), box, _SIDE_PX)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
         boxes, scores = self._network(rgb / np.float32(255.0))
         sure = confidences(scores)

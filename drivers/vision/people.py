@@ -19,7 +19,7 @@ from gazerig.drivers.types import (
     DetectedPerson,
     ImageArray,
 )
-from gazerig.drivers.vision.face.crops import cut_square
+from gazerig.drivers.vision.face.crops import crop_square
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import as_bgr
 
@@ -97,7 +97,7 @@ class PeopleDetector:
     def _in_square(self, frame: ImageArray, square: _Square) -> tuple[DetectedPerson, ...]:
         """Return the people in a square, the most confident first."""
         box = np.array([square.left, 0.0, square.left + square.side, square.side])
-        part, where = cut_square(frame, box, _SIDE_PX)
+        part, where = crop_square(frame, box, _SIDE_PX)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
         boxes, scores = self._network(rgb / np.float32(127.5) - np.float32(1.0))
         sure = confidences(scores)

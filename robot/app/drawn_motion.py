@@ -6,7 +6,7 @@ import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
+from gazerig.drivers.vision.motion.detector import MotionDetector, relative_rotation
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3
 from gazerig.sim_mock.cameras.rendered import Exposure
@@ -33,7 +33,7 @@ class MotionOfDrawn:
         if not self._enabled:
             return ()
         turned = (
-            turned_between(np.array(shot.R_world_camera), np.array(before))
+            relative_rotation(np.array(shot.R_world_camera), np.array(before))
             if before is not None and self._detector.before_s is not None
             else None
         )

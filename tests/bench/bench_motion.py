@@ -16,18 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.vision.motion.clustering import gathered
+from gazerig.drivers.vision.motion.clustering import cluster_motion
 from gazerig.drivers.vision.motion.detector import MotionDetector, at_level
-from gazerig.drivers.vision.motion.ego_motion import at_rest, own_motion
-from gazerig.drivers.vision.motion.image import made_small
+from gazerig.drivers.vision.motion.ego_motion import estimate_ego_motion, predicted_ego_motion
+from gazerig.drivers.vision.motion.image import scale_down
 from gazerig.drivers.vision.motion.optical_flow import (
     FlowSearch,
-    laid,
+    align,
     turn_homography,
     windows_of,
 )
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.drivers.vision.motion.segmentation import unlike, what_moves
+from gazerig.drivers.vision.motion.segmentation import image_difference, segment_motion
 
 PICTURES, DT_S, TURN_RAD = 150, 1 / 30, np.radians(20.0) / 30
 Picture = NDArray[np.uint8]
@@ -63,22 +63,24 @@ def measured(width: int, height: int, turn_rad: float, people: int) -> dict[str,
     for k, picture in enumerate(pictures(width, height, focal * turn_rad, people)):
         t_s = k * DT_S
         given = picture, params.work_px, lens, t_s, params.finest_level
-        now = timed(times, "small and grey", made_small, *given)
+        now = timed(times, "small and grey", scale_down, *given)
         if before is not None:
             H = turn_homography(R, now, before)
-            pair, still = laid(now, before, H), None
+            pair, still = align(now, before, H), None
             ego = None
             if not turn_rad:
-                still = timed(times, "unlike", unlike, pair)
-                ego = timed(times, "stands", at_rest, pair, still.changed)
+                still = timed(times, "unlike", image_difference, pair)
+                ego = timed(times, "stands", predicted_ego_motion, pair, still.changed)
             if ego is not None and still is not None:
                 pair = timed(times, "flow", search.search, pair, windows_of(still.changed))
             else:
                 still, pair = None, timed(times, "flow", search.search, pair)
-                ego = timed(times, "own motion", own_motion, pair, now.K, True)
+                ego = timed(times, "own motion", estimate_ego_motion, pair, now.K, True)
             given_level = at_level(params, now)
-            things = timed(times, "what moves", what_moves, pair, ego, given_level, False, still)
-            timed(times, "grouping", gathered, things, params)
+            things = timed(
+                times, "what moves", segment_motion, pair, ego, given_level, False, still
+            )
+            timed(times, "grouping", cluster_motion, things, params)
         before = now
         timed(times, "all, with slide, loom, spin, place", whole.find, picture, t_s, lens, R)
         grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)

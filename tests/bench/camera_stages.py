@@ -137,7 +137,7 @@ def one_round(case: Case, taken: list[Shot]) -> np.ndarray:
 
     detector: Any = looks._detector
     if case.mesh:
-        detector.meshed = timed("mesh", detector.meshed)
+        detector.add_meshes = timed("mesh", detector.add_meshes)
     detector.find = timed("faces", detector.find)
     looks._motion = timed("motion", looks._motion)  # type: ignore[arg-type]
     rows = []

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.types import DetectedFace, ImageArray
-from gazerig.drivers.vision.face.crops import cut_square
-from gazerig.drivers.vision.face.mtcnn import face_of, proposed
+from gazerig.drivers.vision.face.crops import crop_square
+from gazerig.drivers.vision.face.mtcnn import face_of, propose_faces
 from gazerig.drivers.vision.face.mtcnn_networks import (
     WINDOW_PX,
     Floats,
     MtcnnNetworks,
-    shares,
-    squared,
+    overlap_shares,
+    to_squares,
 )
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import Prepared, as_bgr, largest_first, prepare
+from gazerig.drivers.vision.face.preprocess import PreparedImage, as_bgr, largest_first, prepare
 from gazerig.drivers.vision.face.search_plan import Tile, far_tiles
 from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row
 from gazerig.drivers.vision.model_files import yunet_file
@@ -53,7 +53,7 @@ _BOTH_EVERY = 4
 _CUT_GREY, _SAMPLES = 30.0, 24
 
 
-class _Known(NamedTuple):
+class _KnownFace(NamedTuple):
     """A face of the previous frame.
 
     box: (4,) square in which it is searched next, in pixel edges
@@ -78,7 +78,7 @@ class AutoDetector:
         self._log = EventLog()
         self._networks = MtcnnNetworks()
         self._yunet = self._optional_yunet()
-        self._known: list[_Known] = []
+        self._known: list[_KnownFace] = []
         self._size: tuple[int, ...] = ()
         self._samples = np.zeros(0)
         self._since_search, self._searches, self._next_tile = 0, 0, 0
@@ -136,7 +136,7 @@ class AutoDetector:
         before, self._samples = self._samples, samples
         return before.shape == samples.shape and float(np.abs(samples - before).mean()) > _CUT_GREY
 
-    def _placed_again(self, frame: ImageArray) -> list[_Known]:
+    def _placed_again(self, frame: ImageArray) -> list[_KnownFace]:
         """Return the known faces that are still present, placed in this frame."""
         if not self._known:
             return []
@@ -150,29 +150,29 @@ class AutoDetector:
                 judged[row] = _moving(now, one)
         return _distinct([one for one in judged if one is not None], [])
 
-    def _judged(self, frame: ImageArray, boxes: Floats, least: float) -> list[_Known | None]:
+    def _judged(self, frame: ImageArray, boxes: Floats, least: float) -> list[_KnownFace | None]:
         """Return the face in each square box, None if the last network finds none."""
         placed = self._networks.place(frame, boxes)
-        again = squared(placed.tight)
+        again = to_squares(placed.tight)
         return [
-            _Known(again[row], face_of(placed, row), False) if score >= least else None
+            _KnownFace(again[row], face_of(placed, row), False) if score >= least else None
             for row, score in enumerate(placed.scores)
         ]
 
-    def _around(self, frame: ImageArray, one: _Known) -> _Known | None:
+    def _around(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
         """Search for a lost face around its previous position."""
-        part, where = cut_square(frame, _widened(one.box, _AROUND), _AROUND_PX)
+        part, where = crop_square(frame, _widened(one.box, _AROUND), _AROUND_PX)
         boxes, _ = self._networks.propose(part, _PROPOSE_AT)
         boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
-        boxes = self._networks.refine(frame, squared(boxes))
+        boxes = self._networks.refine(frame, to_squares(boxes))
         found = [face for face in self._judged(frame, boxes, self._params.min_confidence) if face]
         return max(found, key=lambda face: face.face.confidence, default=None)
 
-    def _by_yunet(self, frame: ImageArray, one: _Known) -> _Known | None:
+    def _by_yunet(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
         """Place a face that only YuNet finds."""
         if self._yunet is None:
             return None
-        part, where = cut_square(frame, _widened(one.box, _YUNET_AROUND), _YUNET_PX)
+        part, where = crop_square(frame, _widened(one.box, _YUNET_AROUND), _YUNET_PX)
         rows = self._yunet.search(part, self._params.keep_confidence)
         if not len(rows):
             return None
@@ -180,26 +180,26 @@ class AutoDetector:
         row[:14] *= (where[2] - where[0]) / _YUNET_PX
         row[:2] += where[:2]
         row[4:14] += np.tile(where[:2], 5)
-        return _Known(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
+        return _KnownFace(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
 
-    def _near(self, frame: ImageArray, known: list[_Known], first: bool) -> list[_Known]:
+    def _near(self, frame: ImageArray, known: list[_KnownFace], first: bool) -> list[_KnownFace]:
         """Search the whole frame; return the new faces."""
         prepared = prepare(frame, self._params.work_width_px)
         assert prepared is not None
         self._searches += 1
-        found: list[_Known] = []
+        found: list[_KnownFace] = []
         if self._yunet is not None:
             found += self._near_by_yunet(self._yunet, prepared, known)
         if self._yunet is None or first or self._searches % _BOTH_EVERY == 0:
-            boxes = proposed(self._networks, prepared, self._params.min_face_px)
+            boxes = propose_faces(self._networks, prepared, self._params.min_face_px)
             boxes = self._networks.refine(frame, boxes[_is_new(boxes, [*known, *found])])
             least = self._params.min_confidence
             found += self._accepted(frame, [*known, *found], boxes, least)
         return found
 
     def _near_by_yunet(
-        self, yunet: YunetNetwork, prepared: Prepared, known: list[_Known]
-    ) -> list[_Known]:
+        self, yunet: YunetNetwork, prepared: PreparedImage, known: list[_KnownFace]
+    ) -> list[_KnownFace]:
         """Search the whole frame with YuNet; MTCNN's last network places faces it also finds."""
         least = self._params.min_confidence
         rows = yunet.search(prepared.small, least)
@@ -209,7 +209,7 @@ class AutoDetector:
         fresh = np.flatnonzero(_is_new(boxes, known))
         judged = self._judged(prepared.full, boxes[fresh], least)
         found = [
-            now if now is not None else _Known(boxes[row], face_of_row(rows[row]), True)
+            now if now is not None else _KnownFace(boxes[row], face_of_row(rows[row]), True)
             for row, now in zip(fresh, judged, strict=True)
         ]
         return _distinct(found, known)
@@ -227,7 +227,9 @@ class AutoDetector:
         self._next_tile = (self._next_tile + 1) % len(tiles)
         return tiles[self._next_tile]
 
-    def _far(self, frame: ImageArray, known: list[_Known], tile: Tile | None) -> list[_Known]:
+    def _far(
+        self, frame: ImageArray, known: list[_KnownFace], tile: Tile | None
+    ) -> list[_KnownFace]:
         """Search a tile for small faces; return the new ones."""
         if tile is None:
             return []
@@ -238,20 +240,20 @@ class AutoDetector:
         boxes, _ = self._networks.propose(scaled, _PROPOSE_AT)
         stretch = part.shape[1] / tile.width_px, part.shape[0] / tile.height_px
         boxes = boxes * np.tile(stretch, 2) + (tile.left, tile.top, tile.left, tile.top)
-        boxes = squared(boxes)
+        boxes = to_squares(boxes)
         boxes = self._networks.refine(frame, boxes[_is_new(boxes, known)])
         least = max(_FAR_CONFIDENCE, self._params.min_confidence)
         return self._accepted(frame, known, boxes, least)
 
     def _accepted(
-        self, frame: ImageArray, known: list[_Known], boxes: Floats, least: float
-    ) -> list[_Known]:
+        self, frame: ImageArray, known: list[_KnownFace], boxes: Floats, least: float
+    ) -> list[_KnownFace]:
         """Return the new faces in square boxes that the last network confirms."""
         found = [one for one in self._judged(frame, boxes, least) if one is not None]
         return _distinct(found, known)
 
 
-def _moving(now: _Known, before: _Known) -> _Known:
+def _moving(now: _KnownFace, before: _KnownFace) -> _KnownFace:
     """Return a face with its search box predicted by its motion between frames.
 
     The network places a face that is off the centre of its box too near to that centre.
@@ -274,15 +276,15 @@ def _square_of(points: Floats) -> Floats:
     return np.concatenate([middle - _SQUARE * spread, middle + _SQUARE * spread])
 
 
-def _is_new(boxes: Floats, known: list[_Known]) -> NDArray[np.bool_]:
+def _is_new(boxes: Floats, known: list[_KnownFace]) -> NDArray[np.bool_]:
     """Return a mask of the boxes that are not those of known faces."""
     others = np.array([one.box for one in known]).reshape(-1, 4)
-    return np.asarray(~(shares(boxes, others) > _SAME).any(axis=1))
+    return np.asarray(~(overlap_shares(boxes, others) > _SAME).any(axis=1))
 
 
-def _distinct(found: list[_Known], known: list[_Known]) -> list[_Known]:
+def _distinct(found: list[_KnownFace], known: list[_KnownFace]) -> list[_KnownFace]:
     """Return the found faces that are not known and not duplicates of a more confident one."""
-    kept: list[_Known] = []
+    kept: list[_KnownFace] = []
     for one in sorted(found, key=lambda face: (face.by_yunet, -face.face.confidence)):
         if _is_new(one.box[np.newaxis], [*known, *kept])[0]:
             kept.append(one)

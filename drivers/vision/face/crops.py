@@ -11,7 +11,7 @@ from gazerig.drivers.types import ImageArray
 _AVERAGED_FROM = 1.5
 
 
-def cut_square(
+def crop_square(
     image: ImageArray, box: NDArray[np.float64], side_px: int
 ) -> tuple[ImageArray, NDArray[np.float64]]:
     """Crop a square box (left, top, right, bottom; pixel edges), black beyond the image.

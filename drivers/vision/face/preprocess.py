@@ -16,7 +16,7 @@ _NOISY_GAIN, _SMOOTHED_PX = 2.5, 0.8
 _SAMPLED = 4
 
 
-class Prepared(NamedTuple):
+class PreparedImage(NamedTuple):
     """An image in the two sizes that a detector needs.
 
     full: (height, width, 3) BGR, in the original size
@@ -29,7 +29,7 @@ class Prepared(NamedTuple):
     stretch: NDArray[np.float64]
 
 
-def prepare(image: ImageArray, work_width_px: int) -> Prepared | None:
+def prepare(image: ImageArray, work_width_px: int) -> PreparedImage | None:
     """Convert a grey, BGR or BGRA image to BGR and scale it down; return None if it has no pixels.
 
     Raises:
@@ -44,7 +44,7 @@ def prepare(image: ImageArray, work_width_px: int) -> Prepared | None:
         size = work_width_px, max(1, round(height * work_width_px / width))
         small = np.asarray(cv2.resize(full, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     stretch = np.array([width / small.shape[1], height / small.shape[0]])
-    return Prepared(full, small, stretch)
+    return PreparedImage(full, small, stretch)
 
 
 def grey_range(samples: NDArray[Any]) -> tuple[float, float]:

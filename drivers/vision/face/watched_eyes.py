@@ -29,18 +29,18 @@ _LONGEST_FRAMES = 8
 _LOOKS_A_FRAME, _MOST_LOOKS = 0.25, 2.0
 
 
-class _Look(NamedTuple):
+class _EyeReading(NamedTuple):
     """Last run of the network: (2, ...) eyes, centres of their crops, and resulting points."""
 
     eyes: NDArray[np.float32]
     points: tuple[EyePoints | None, ...]
 
 
-class WatchedEyes:
+class EyeLandmarkCache:
     """Tracker of both eyes of one face, or of its successor: appearance decides, not identity."""
 
     def __init__(self) -> None:
-        self._last: _Look | None = None
+        self._last: _EyeReading | None = None
         self._frames = 0
         self._allowed = _MOST_LOOKS
 
@@ -66,7 +66,9 @@ class WatchedEyes:
             return None if last is None or changed else last.points
         self._allowed -= 1.0
         self._frames = 0
-        self._last = _Look(eyes, tuple([look(crop, which) for which, crop in enumerate(crops)]))
+        self._last = _EyeReading(
+            eyes, tuple([look(crop, which) for which, crop in enumerate(crops)])
+        )
         return self._last.points
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.drivers.vision.motion.image import Floats, middle
-from gazerig.drivers.vision.motion.lucas_kanade import Back
+from gazerig.drivers.vision.motion.image import Floats, upper_median
+from gazerig.drivers.vision.motion.lucas_kanade import AffineWarp
 
 # Flow at neighbouring pixels comes from the same patches: this area counts as one measurement (8 px
 # at half size).
@@ -29,7 +29,7 @@ class PatchMotion(NamedTuple):
     growth: logarithm of the ratio of its size now to its size before
     spin_rad: rotation, positive clockwise in the image
     growth_sd, spin_sd: standard deviations
-    rest_px: residual of the affine motion, along one axis
+    residual_px: residual of the affine motion, along one axis
     """
 
     slide_px: tuple[float, float]
@@ -37,10 +37,12 @@ class PatchMotion(NamedTuple):
     spin_rad: float
     growth_sd: float
     spin_sd: float
-    rest_px: float
+    residual_px: float
 
 
-def flow_map(places: Floats, flow: Floats, centre: Floats, area_px: float) -> tuple[Back, float]:
+def fit_affine_warp(
+    places: Floats, flow: Floats, centre: Floats, area_px: float
+) -> tuple[AffineWarp, float]:
     """Fit the map from now to before to flow at points; return it and its residual.
 
     places, flow: (n, 2) present positions, and their motion from the older image
@@ -51,20 +53,22 @@ def flow_map(places: Floats, flow: Floats, centre: Floats, area_px: float) -> tu
     rows = np.column_stack((arms, np.ones(len(arms))))
     numbers, weights, rest = _fit(rows, flow)
     if numbers is None:
-        return Back(np.eye(2), -np.median(flow, axis=0), np.inf), rest
-    return Back(np.eye(2) - numbers[:2].T, -numbers[2], _spread(rows, weights, rest, area_px)), rest
+        return AffineWarp(np.eye(2), -np.median(flow, axis=0), np.inf), rest
+    return AffineWarp(
+        np.eye(2) - numbers[:2].T, -numbers[2], _spread(rows, weights, rest, area_px)
+    ), rest
 
 
-def patch_motion(back: Back, rest_px: float) -> PatchMotion:
+def patch_motion(back: AffineWarp, residual_px: float) -> PatchMotion:
     """Return slide, growth and spin of a map from now to before."""
     (a, b), (c, d) = back.matrix.tolist()
     shrink = sqrt(max(abs(a * d - b * c), 1e-6))
     sd = back.slope_sd / sqrt(2.0)  # growth and spin are each half the sum of two numbers
     slide = float(-back.shift[0]), float(-back.shift[1])
-    return PatchMotion(slide, -log(shrink), -atan2(c - b, a + d), sd, sd, rest_px)
+    return PatchMotion(slide, -log(shrink), -atan2(c - b, a + d), sd, sd, residual_px)
 
 
-def affine_rest(places: Floats, flow: Floats) -> float:
+def affine_residual(places: Floats, flow: Floats) -> float:
     """Return the residual of a flow after one affine motion, root mean square of the lengths."""
     if len(places) < _LEAST_POINTS:
         return 0.0
@@ -85,7 +89,7 @@ def _fit(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
             return None, weights, scale
         numbers = np.asarray(np.linalg.solve(normal, weighted.T @ flow))
         errors = np.hypot(*(flow - rows @ numbers).T)
-        scale = max(_NOISE_PX, middle(errors) / 1.177)
+        scale = max(_NOISE_PX, upper_median(errors) / 1.177)
         weights = np.maximum(1.0 - (errors / (_TUKEY * scale)) ** 2, 0.0) ** 2
     return numbers, weights, scale
 
@@ -96,9 +100,9 @@ def _flat(normal: Floats) -> bool:
     return bool(xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12)
 
 
-def _spread(rows: Floats, weights: Floats, rest_px: float, area_px: float) -> float:
+def _spread(rows: Floats, weights: Floats, residual_px: float, area_px: float) -> float:
     """Return the standard deviation of the map's slopes, root mean square."""
     inverse = np.linalg.inv(rows.T @ (rows * weights[:, None]) + 1e-9 * np.eye(3))
     points_a_patch = max(1.0, _PATCH_PX2 * len(rows) / max(area_px, 1.0))
     both = 0.5 * float(inverse[0, 0] + inverse[1, 1])
-    return rest_px * sqrt(max(both, 0.0) * points_a_patch)
+    return residual_px * sqrt(max(both, 0.0) * points_a_patch)

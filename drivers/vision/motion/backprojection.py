@@ -57,7 +57,7 @@ def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distanc
     return Distance(z, z * params.assumed_distance_spread, False)
 
 
-def place(point_px: Floats, z_m: float, K: Floats) -> Vec3:
+def back_project(point_px: Floats, z_m: float, K: Floats) -> Vec3:
     """Return the point at depth ``z_m`` of a pixel."""
     x, y = ((point_px - K[:2, 2]) / K[[0, 1], [0, 1]]).tolist()
     return z_m * x, z_m * y, z_m

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.affine import affine_rest
+from gazerig.drivers.vision.motion.affine import affine_residual
 from gazerig.drivers.vision.motion.image import Floats
 from gazerig.drivers.vision.motion.optical_flow import Flow, Mask
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.drivers.vision.motion.segmentation import Things
+from gazerig.drivers.vision.motion.segmentation import MotionMask
 
 Indices = NDArray[np.intp]
 
@@ -53,7 +53,7 @@ class Group(NamedTuple):
         return x, y, int(self.x.max()) - x + 1, int(self.y.max()) - y + 1
 
 
-def fastest(group: Group) -> tuple[Floats, Floats]:
+def fastest_quarter(group: Group) -> tuple[Floats, Floats]:
     """Return the mean position and the mean motion, (2,) each, of a group's fastest quarter."""
     speed = (group.flow * group.flow).sum(axis=1)
     fast = speed >= np.partition(speed, (3 * len(speed)) // 4)[(3 * len(speed)) // 4]
@@ -62,7 +62,7 @@ def fastest(group: Group) -> tuple[Floats, Floats]:
     return at, flow
 
 
-def gathered(things: Things, params: MotionParams) -> list[Group]:
+def cluster_motion(things: MotionMask, params: MotionParams) -> list[Group]:
     """Return the moving things, the largest first."""
     least = max(4, round(params.min_area_share * things.mask.size))
     pieces = [
@@ -115,7 +115,7 @@ def _group(x: Indices, y: Indices, flow: Flow) -> Group:
     return Group(x, y, flow[y, x].astype(np.float64))
 
 
-def _parted(group: Group, things: Things, least: int, splits: int) -> list[Group]:
+def _parted(group: Group, things: MotionMask, least: int, splits: int) -> list[Group]:
     """Split a group of several motions recursively."""
     if splits == 0 or len(group.x) < 2 * least:
         return [group]
@@ -141,7 +141,7 @@ def _sides(group: Group, threshold_px: float) -> Mask | None:
     step = max(1, len(group.x) // _SAMPLE)
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     flow = group.flow
-    together = affine_rest(places[::step], flow[::step])
+    together = affine_residual(places[::step], flow[::step])
     if together < threshold_px:
         return None
     middle = flow.mean(axis=0)
@@ -154,7 +154,7 @@ def _sides(group: Group, threshold_px: float) -> Mask | None:
     faster = max(float(np.hypot(*a)), float(np.hypot(*b)))
     if float(np.hypot(*(a - b))) < _PARTING_SHARE * faster:
         return None
-    rests = [affine_rest(places[side][::step], flow[side][::step]) for side in (sides, ~sides)]
+    rests = [affine_residual(places[side][::step], flow[side][::step]) for side in (sides, ~sides)]
     apart = np.sqrt(share * rests[0] ** 2 + (1.0 - share) * rests[1] ** 2)
     return sides if apart < _BETTER_SHARE * together else None
 

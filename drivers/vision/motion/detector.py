@@ -19,38 +19,57 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.affine import PatchMotion, flow_map, patch_motion
+from gazerig.drivers.vision.motion.affine import PatchMotion, fit_affine_warp, patch_motion
 from gazerig.drivers.vision.motion.anchor import anchor
 from gazerig.drivers.vision.motion.backprojection import (
+    back_project,
     distance,
-    place,
     radius_m,
     small_depth,
     velocity,
 )
-from gazerig.drivers.vision.motion.clustering import Group, fastest, gathered, inscribed_px
-from gazerig.drivers.vision.motion.ego_motion import Ego, at_rest, own_motion, turn_rad
-from gazerig.drivers.vision.motion.gloves import GloveFinder, beside
+from gazerig.drivers.vision.motion.clustering import (
+    Group,
+    cluster_motion,
+    fastest_quarter,
+    inscribed_px,
+)
+from gazerig.drivers.vision.motion.ego_motion import (
+    EgoMotion,
+    estimate_ego_motion,
+    predicted_ego_motion,
+    turn_rad,
+)
+from gazerig.drivers.vision.motion.gloves import GloveDetector, exclude_gloves
 from gazerig.drivers.vision.motion.image import (
     Floats,
     Plane,
     SmallImage,
-    made_small,
-    to_given,
+    scale_down,
+    to_original_px,
 )
-from gazerig.drivers.vision.motion.lucas_kanade import Level, Room, levels, refined
+from gazerig.drivers.vision.motion.lucas_kanade import (
+    BackgroundWarp,
+    Level,
+    blur_images,
+    refine_warp,
+)
 from gazerig.drivers.vision.motion.optical_flow import (
-    Compared,
     Flow,
     FlowSearch,
-    laid,
-    searchable,
+    ImagePair,
+    align,
+    is_searchable,
     turn_homography,
     windows_of,
 )
 from gazerig.drivers.vision.motion.parallax import parallax
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.drivers.vision.motion.segmentation import Unlike, unlike, what_moves
+from gazerig.drivers.vision.motion.segmentation import (
+    ImageDifference,
+    image_difference,
+    segment_motion,
+)
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 _KIND = "thing"
@@ -95,7 +114,7 @@ class MotionDetector:
         self._params = params
         self._search = FlowSearch(params.preset)
         self._tracks = MotionTracks(params)
-        self._gloves = GloveFinder()
+        self._gloves = GloveDetector()
         self._before: SmallImage | None = None
         self._moved_s = -np.inf  # time of the last camera motion known only from the image
         self.report = MotionReport()
@@ -135,12 +154,14 @@ class MotionDetector:
         Raises:
             ValueError: the image has another shape or type.
         """
-        now = made_small(image, self._params.work_px, lens, captured_s, self._params.finest_level)
+        now = scale_down(image, self._params.work_px, lens, captured_s, self._params.finest_level)
         before, self._before = self._before, now
         self.report = self._look(now, before, R_now_before, depth_m, t_now_before_m)
         if self._params.gloves:
             gloves = self._gloves.find(image, captured_s, lens, self._params.work_px)
-            self.report = self.report._replace(blobs=(*gloves, *beside(self.report.blobs, gloves)))
+            self.report = self.report._replace(
+                blobs=(*gloves, *exclude_gloves(self.report.blobs, gloves))
+            )
         return self.report.blobs
 
     def forget(self) -> None:
@@ -158,7 +179,7 @@ class MotionDetector:
         t_now_before_m: Floats | None,
     ) -> MotionReport:
         """Compare two images; return the motion, or the reason why they cannot be compared."""
-        if not searchable(now.grey):
+        if not is_searchable(now.grey):
             return MotionReport(silent="frame too small")
         if before is None or before.grey.shape != now.grey.shape:
             self._tracks.forget()
@@ -175,36 +196,36 @@ class MotionDetector:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
             return MotionReport((), why, turn, ego.share, ego.noise_px)
         params = at_level(self._params, now)
-        things = what_moves(pair, ego, params, R_now_before is None, still)
-        groups = gathered(things, params)
+        things = segment_motion(pair, ego, params, R_now_before is None, still)
+        groups = cluster_motion(things, params)
         blobs = self._blobs(groups, now, pair, ego, depth, dt_s, params.min_flow_px)
         return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
 
     def _compared(
         self, now: SmallImage, before: SmallImage, R_now_before: Floats | None, shift: Flow | None
-    ) -> tuple[Compared, Ego, Unlike | None]:
+    ) -> tuple[ImagePair, EgoMotion, ImageDifference | None]:
         """Compute the flow and the camera's own motion; a large unpredicted one is removed first.
 
         If the camera moved as predicted, flow is computed only where the images differ, and their
         difference is returned too.
         """
-        pair = laid(now, before, turn_homography(R_now_before, now, before))._replace(shift=shift)
+        pair = align(now, before, turn_homography(R_now_before, now, before))._replace(shift=shift)
         moved_before = now.captured_s - self._moved_s < _SHAKES_ON_S
         if shift is None and not moved_before:
-            still = unlike(pair)
-            ego = at_rest(pair, still.changed)
+            still = image_difference(pair)
+            ego = predicted_ego_motion(pair, still.changed)
             if ego is not None:
                 return self._search.search(pair, windows_of(still.changed)), ego, still
         pair = self._search.search(pair)
-        ego = own_motion(pair, now.K, R_now_before is not None, moved_before)
+        ego = estimate_ego_motion(pair, now.K, R_now_before is not None, moved_before)
         if ego.unforeseen_px > 0.0:
             self._moved_s = now.captured_s
         if ego.share < self._params.min_background_share or ego.unforeseen_px < _SEARCH_AGAIN_PX:
             return pair, ego, None
-        again = self._search.search(laid(now, before, ego.total)._replace(shift=shift))
-        return again, own_motion(again, now.K, True), None
+        again = self._search.search(align(now, before, ego.total)._replace(shift=shift))
+        return again, estimate_ego_motion(again, now.K, True), None
 
-    def _cannot_tell(self, pair: Compared, ego: Ego, turn_deg_s: float) -> str:
+    def _cannot_tell(self, pair: ImagePair, ego: EgoMotion, turn_deg_s: float) -> str:
         """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""
         if not turn_deg_s <= self._params.max_turn_deg_s:
             return "the camera turns too fast"
@@ -218,14 +239,14 @@ class MotionDetector:
         self,
         groups: list[Group],
         now: SmallImage,
-        pair: Compared,
-        ego: Ego,
+        pair: ImagePair,
+        ego: EgoMotion,
         depth: Plane | None,
         dt_s: float,
         least_px: float,
     ) -> tuple[MovingBlob, ...]:
         """Measure each patch, and assign ids to those that move by more than ``least_px``."""
-        frames = levels(pair) if groups else ()
+        frames = blur_images(pair) if groups else ()
         measured = [(group, _measured(group, frames, _room(group, pair, ego))) for group in groups]
         measured = [
             one for one in measured if _goes_px(one[0], one[1][1], now.grey.shape) > least_px
@@ -258,17 +279,17 @@ class MotionDetector:
         far = distance(group, depth, self._params)
         point = anchor(group, now.grey, follow.centre, follow.offset)
         follow.offset = point - follow.centre
-        p = place(point, far.z_m, now.K)
+        p = back_project(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
         edges = _edges(group, *now.grey.shape[:2])
         # A thing that the edge of the image cuts does not grow when more of it becomes visible.
         growth_sd = np.inf if any(edges) else motion.growth_sd
         loom = _believed(motion.growth, growth_sd) / dt_s
-        fastest_px, fastest_flow = fastest(group)
-        at = place(fastest_px, far.z_m, now.K)
+        fastest_px, fastest_flow = fastest_quarter(group)
+        at = back_project(fastest_px, far.z_m, now.K)
         fx, fy = (fastest_flow / dt_s).tolist()
         (sx, sy), (x, y, width, height) = now.scale, group.box
-        left, top = to_given((x - 0.5, y - 0.5), now.scale)
+        left, top = to_original_px((x - 0.5, y - 0.5), now.scale)
         edge_px = _EDGE_SHARE * now.grey.shape[1]
         return MovingBlob(
             follow.id,
@@ -283,7 +304,7 @@ class MotionDetector:
             spin_sd_rad_s=motion.spin_sd / dt_s,
             loom_sd_1_s=growth_sd / dt_s,
             box_px=(left, top, width / sx, height / sy),
-            centre_px=to_given((float(point[0]), float(point[1])), now.scale),
+            centre_px=to_original_px((float(point[0]), float(point[1])), now.scale),
             area_px=len(group.x) / (sx * sy),
             flow_px_s=(flow_px_s[0] / sx, flow_px_s[1] / sy),
             fastest_m=at,
@@ -331,28 +352,30 @@ def _edges(group: Group, rows: int, columns: int) -> _Edges:
     return _Edges(x <= near, y <= near, x + width >= columns - near, y + height >= rows - near)
 
 
-def turned_between(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:
+def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:
     """Return R_now_before of two orientations of the camera in the world, (3, 3) each."""
     now, before = np.asarray(R_world_now, float), np.asarray(R_world_before, float)
     out: Floats = now.T @ before
     return out
 
 
-def _room(group: Group, pair: Compared, ego: Ego) -> Room:
+def _room(group: Group, pair: ImagePair, ego: EgoMotion) -> BackgroundWarp:
     """Return the map of a still patch to the older image."""
     if pair.shift is None:
-        return Room(ego.B, np.zeros(2))
-    return Room(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
+        return BackgroundWarp(ego.B, np.zeros(2))
+    return BackgroundWarp(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
 
 
-def _measured(group: Group, frames: tuple[Level, ...], room: Room) -> tuple[Floats, PatchMotion]:
+def _measured(
+    group: Group, frames: tuple[Level, ...], room: BackgroundWarp
+) -> tuple[Floats, PatchMotion]:
     """Return a patch's centre, and the motion there."""
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     middle = places.mean(axis=0)
     step = max(1, len(places) // _SAMPLE)
     places, flow = places[::step], group.flow[::step]
-    start, rest = flow_map(places, flow, middle, float(len(group.x)))
-    return middle, patch_motion(refined(start, places, middle, frames, room), rest)
+    start, rest = fit_affine_warp(places, flow, middle, float(len(group.x)))
+    return middle, patch_motion(refine_warp(start, places, middle, frames, room), rest)
 
 
 def _believed(value: float, sd: float) -> float:

@@ -17,8 +17,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, light_apart, middle
-from gazerig.drivers.vision.motion.optical_flow import Compared, Mask, corners, gradients, moved
+from gazerig.drivers.vision.motion.image import Floats, Grey, upper_median, without_illumination
+from gazerig.drivers.vision.motion.optical_flow import (
+    ImagePair,
+    Mask,
+    corners,
+    gradients,
+    warp_points,
+)
 
 _GRID_PX = 4
 # Margin at the edge, where the flow is worst and leaves the image.
@@ -57,7 +63,7 @@ _REST_STEP, _REST_GRADIENT, _REST_POINTS = 3, 2.0, 60
 _REST_SHARE, _REST_PX = 0.6, 0.05
 
 
-class _Need(NamedTuple):
+class _MotionThresholds(NamedTuple):
     """Requirements for accepting that the whole image moved.
 
     share: share of the textured points that moved together; cells: number of image cells with them
@@ -71,7 +77,11 @@ class _Need(NamedTuple):
 
 # A person close to the lens fills most of the image; a strip of wall that keeps its position shows
 # that. A moving camera sometimes follows a person, who then keeps their position.
-_AGAINST_JOINTS, _STOOD, _MOVES = _Need(0.45, 24, 0.1), _Need(0.35, 24, 0.15), _Need(0.35, 12, 0.4)
+_AGAINST_JOINTS, _STOOD, _MOVES = (
+    _MotionThresholds(0.45, 24, 0.1),
+    _MotionThresholds(0.35, 24, 0.15),
+    _MotionThresholds(0.35, 12, 0.4),
+)
 
 
 class HomographyFit(NamedTuple):
@@ -86,14 +96,14 @@ class HomographyFit(NamedTuple):
     free: bool
 
 
-class Ego(NamedTuple):
+class EgoMotion(NamedTuple):
     """The camera's own motion between two images.
 
     B: (3, 3) pixels of the newer image to those of the older one, turned as predicted
     total: (3, 3) pixels of the older image to those of the newer
     share: share of the textured points that moved with the room; 0 if they only agree on noise
     noise_px: deviation of their flow from it, standard deviation along one axis
-    way_px: median motion of the image by the camera's motion
+    shift_px: median motion of the image by the camera's motion
     unforeseen_px: likewise if only the image shows it, otherwise 0
     fitted: whether the image had enough texture for a fit
     """
@@ -102,12 +112,14 @@ class Ego(NamedTuple):
     total: Floats
     share: float
     noise_px: float
-    way_px: float
+    shift_px: float
     unforeseen_px: float
     fitted: bool
 
 
-def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = False) -> Ego:
+def estimate_ego_motion(
+    pair: ImagePair, K: Floats, predicted: bool, moved_before: bool = False
+) -> EgoMotion:
     """Find the camera's own motion.
 
     K: (3, 3) camera matrix
@@ -132,10 +144,10 @@ def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = 
     way = _way(back, points) if len(points) else 0.0
     unforeseen = _way(B, points) if free else 0.0
     total = _inverse(back)
-    return Ego(B, total / total[2, 2], share, noise, way, unforeseen, fitted)
+    return EgoMotion(B, total / total[2, 2], share, noise, way, unforeseen, fitted)
 
 
-def at_rest(pair: Compared, changed: Mask) -> Ego | None:
+def predicted_ego_motion(pair: ImagePair, changed: Mask) -> EgoMotion | None:
     """Return the predicted motion of the camera if most of the texture confirms it.
 
     pair: images whose flow need not have been computed
@@ -158,10 +170,12 @@ def at_rest(pair: Compared, changed: Mask) -> Ego | None:
     if np.hypot(*slid[:2]) > _REST_PX:
         return None
     way = _way(_inverse(pair.H), corners(pair.now.shape))
-    return Ego(np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0, True)
+    return EgoMotion(
+        np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0, True
+    )
 
 
-def _textured(pair: Compared) -> Floats:
+def _textured(pair: ImagePair) -> Floats:
     """Return the points of a grid, (n, 2), with reliable flow."""
     strength = cv2.cornerMinEigenVal(pair.now, _CORNER_BLOCK)
     height, width = pair.now.shape
@@ -175,9 +189,9 @@ def _room(
     points: Floats,
     there: Floats,
     K: Floats,
-    pair: Compared,
+    pair: ImagePair,
     reach_px: float,
-    need: _Need,
+    need: _MotionThresholds,
 ) -> HomographyFit | None:
     """Fit the motion of the room: as predicted or at rest; otherwise that of the whole image."""
     shape = pair.now.shape
@@ -194,13 +208,13 @@ def _room(
     if free is None or free.share < need.share:
         return found
     # Points that kept their position although the whole image seems to have moved.
-    parted = np.hypot(*(moved(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
+    parted = np.hypot(*(warp_points(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
     edge = _edge(points, shape)
     kept = float(((off < _STANDING_REACH_PX) & parted)[edge].mean()) if edge.any() else 0.0
     return free if kept < need.kept and _outlines_kept(pair, free.B) < _KEPT_OUTLINES else found
 
 
-def _outlines_kept(pair: Compared, B: Floats) -> float:
+def _outlines_kept(pair: ImagePair, B: Floats) -> float:
     """Return the share of the outlines at the edge that did not move although they should have.
 
     Boards and door frames on a plain wall have no corners, so people who walk in front of it have
@@ -214,13 +228,13 @@ def _outlines_kept(pair: Compared, B: Floats) -> float:
     y, x = np.mgrid[:height, :width]
     points = np.column_stack((x.ravel(), y.ravel())).astype(np.float64)
     gx, gy = (g.ravel() for g in gradients(pair.now))
-    moves = moved(B, points) - points
+    moves = warp_points(B, points) - points
     # Beyond one pixel brightness no longer changes as the gradient predicts.
     change = np.abs(gx * moves[:, 0] + gy * moves[:, 1]) / np.maximum(1.0, np.hypot(*moves.T))
     should = (change > _CLEAR_CHANGE) & pair.known.ravel() & _edge(points, (height, width))
     if not should.any():
         return 0.0
-    off = light_apart(pair.now.astype(np.float32) - pair.before)
+    off = without_illumination(pair.now.astype(np.float32) - pair.before)
     changed = np.abs(cv2.blur(off, (3, 3))).ravel()
     return float((changed[should] < _UNCHANGED * change[should]).mean())
 
@@ -245,12 +259,12 @@ def _of_two(
         start = _fitted(points[mine], there[mine], K, shape, np.inf)
         if start is None:
             continue
-        left = moved(_inverse(start.B), there)
+        left = warp_points(_inverse(start.B), there)
         rest = _fitted(points, left, K, shape, _STANDING_REACH_PX, least_cells)
         if rest is None or rest.noise_px > _MIXED_PX:
             continue
         B = start.B @ rest.B
-        off = np.hypot(*(moved(B, points) - there).T)
+        off = np.hypot(*(warp_points(B, points) - there).T)
         along = float((off[edge] < _STANDING_REACH_PX).mean()) if edge.any() else 0.0
         if along > most:
             best, most = HomographyFit(B / B[2, 2], rest.share, rest.noise_px, True), along
@@ -327,7 +341,7 @@ def _image(h: Floats, a: Floats) -> Floats:
 
 def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
     """Return the standard deviation along one axis: the median length is 1.18 times it."""
-    return max(_LEAST_NOISE_PX, middle(errors[mask]) / 1.177)
+    return max(_LEAST_NOISE_PX, upper_median(errors[mask]) / 1.177)
 
 
 def _edge(points: Floats, shape: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -349,13 +363,13 @@ def _inverse(H: Floats) -> Floats:
 
 def _way(H: Floats, points: Floats) -> float:
     """Return the median motion of points by a homography."""
-    return float(np.median(np.hypot(*(moved(H, points) - points).T)))
+    return float(np.median(np.hypot(*(warp_points(H, points) - points).T)))
 
 
-def turn_rad(ego: Ego, grey: Grey, K: Floats) -> float:
+def turn_rad(ego: EgoMotion, grey: Grey, K: Floats) -> float:
     """Return the turn of the image's centre, as an angle in radians."""
     height, width = grey.shape
     middle = np.array([[0.5 * (width - 1), 0.5 * (height - 1)]])
-    rays = (np.concatenate((middle, moved(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]
+    rays = (np.concatenate((middle, warp_points(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]
     a, b = np.column_stack((rays, np.ones(2))) / np.sqrt((rays**2).sum(axis=1) + 1.0)[:, None]
     return float(2.0 * np.arcsin(min(1.0, 0.5 * float(np.linalg.norm(a - b)))))

@@ -75,7 +75,7 @@ class _Glove(NamedTuple):
     sized_s: float
 
 
-class GloveFinder:
+class GloveDetector:
     """Detector of red gloves in consecutive images."""
 
     def __init__(self) -> None:
@@ -257,7 +257,9 @@ def _blob(glove: _Glove, share: float, lens: Intrinsics) -> MovingBlob:
     )
 
 
-def beside(blobs: tuple[MovingBlob, ...], gloves: tuple[MovingBlob, ...]) -> tuple[MovingBlob, ...]:
+def exclude_gloves(
+    blobs: tuple[MovingBlob, ...], gloves: tuple[MovingBlob, ...]
+) -> tuple[MovingBlob, ...]:
     """Return the moving things that contain no glove, as arm and trunk move with one."""
     return tuple(blob for blob in blobs if not any(_holds(blob, glove) for glove in gloves))
 

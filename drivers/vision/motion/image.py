@@ -40,7 +40,7 @@ class SmallImage(NamedTuple):
     fine: Grey
 
 
-def made_small(
+def scale_down(
     image: NDArray[Any], work_px: int, lens: Intrinsics, captured_s: float, level: int = 0
 ) -> SmallImage:
     """Scale an image so that its longer side is at most ``work_px``, and convert it to grey.
@@ -58,7 +58,7 @@ def made_small(
     size = max(1, round(width * shrink)), max(1, round(height * shrink))
     if size != (width, height):
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    fine = grey_of(image)
+    fine = to_grey(image)
     while level and min(size) >> level < LEAST_SIDE_PX:
         level -= 1
     size = max(1, size[0] >> level), max(1, size[1] >> level)
@@ -69,7 +69,7 @@ def made_small(
     )
 
 
-def grey_of(image: NDArray[Any]) -> Grey:
+def to_grey(image: NDArray[Any]) -> Grey:
     """Return the brightness (h, w) of an image in BGR, BGR with alpha, or grey."""
     channels = image.shape[2] if image.ndim == 3 else 1
     if channels == 3:
@@ -89,19 +89,21 @@ def _check(image: NDArray[Any]) -> None:
         )
 
 
-def light_apart(change: Plane) -> Plane:
+def without_illumination(change: Plane) -> Plane:
     """Return a change of brightness without that of the light, which covers wider areas."""
     # Clipped, as otherwise a dark coat would darken its surroundings.
     light = cv2.blur(np.clip(change, -_LIGHT_STEP, _LIGHT_STEP), (_LIGHT_PX, _LIGHT_PX))
     return np.asarray(change - light, np.float32)
 
 
-def to_given(point_px: tuple[float, float], scale: tuple[float, float]) -> tuple[float, float]:
+def to_original_px(
+    point_px: tuple[float, float], scale: tuple[float, float]
+) -> tuple[float, float]:
     """Return the position of a point of the small image in the original image."""
     return (point_px[0] + 0.5) / scale[0] - 0.5, (point_px[1] + 0.5) / scale[1] - 0.5
 
 
-def middle(values: Floats) -> float:
+def upper_median(values: Floats) -> float:
     """Return the upper median of (n,) values, n > 0; five times faster than NumPy's."""
     half = len(values) // 2
     return float(np.partition(values, half)[half])

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, middle
-from gazerig.drivers.vision.motion.optical_flow import Compared, moved
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, upper_median
+from gazerig.drivers.vision.motion.optical_flow import ImagePair, warp_points
 
 # (blur in pixels, most steps) at the level of each image; larger errors are not corrected.
 _LEVELS = ((1.25, 8), (1.0, 6))
@@ -36,7 +36,7 @@ _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
 _EDGE = cv2.BORDER_REPLICATE
 
 
-class Back(NamedTuple):
+class AffineWarp(NamedTuple):
     """An affine map from present positions to earlier ones, without the camera's motion.
 
     matrix: (2, 2); shift: (2,): x -> centre + matrix (x - centre) + shift
@@ -57,7 +57,7 @@ class Level(NamedTuple):
     steps: int
 
 
-def levels(pair: Compared) -> tuple[Level, ...]:
+def blur_images(pair: ImagePair) -> tuple[Level, ...]:
     """Blur the images once for all patches: at the searched size, then at the fine size."""
     (coarse_px, coarse_steps), (fine_px, fine_steps) = _LEVELS
     fine, scale = pair.fine, pair.fine[0].shape[0] / pair.now.shape[0]
@@ -67,7 +67,7 @@ def levels(pair: Compared) -> tuple[Level, ...]:
     )
 
 
-class Room(NamedTuple):
+class BackgroundWarp(NamedTuple):
     """Map of still things to the older image.
 
     B: (3, 3) present pixels to older ones; shift: (2,) additional, at the distance of the patch
@@ -78,13 +78,17 @@ class Room(NamedTuple):
 
     def near(self, centre: Floats) -> tuple[Floats, Floats]:
         """Return (2, 2) and (2,): the map around a position, x -> there + slope (x - centre)."""
-        at = moved(self.B, centre + _AROUND)
+        at = warp_points(self.B, centre + _AROUND)
         return ((at[1:] - at[0]) / _STEP_PX).T, at[0] + self.shift
 
 
-def refined(
-    start: Back, places: Floats, centre: Floats, frames: tuple[Level, ...], room: Room
-) -> Back:
+def refine_warp(
+    start: AffineWarp,
+    places: Floats,
+    centre: Floats,
+    frames: tuple[Level, ...],
+    room: BackgroundWarp,
+) -> AffineWarp:
     """Refine a map on the pixels at ``places``, (n, 2); return the start itself if that fails."""
     arms = places - centre
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))
@@ -101,14 +105,14 @@ def refined(
 
 
 def _aligned(
-    start: Back,
+    start: AffineWarp,
     arms: Floats,
     centre: Floats,
     size: float,
     level: Level,
     slope: Floats,
     there: Floats,
-) -> Back | None:
+) -> AffineWarp | None:
     """Refine at one level; return None if it diverges or does not improve."""
     scale = level.scale
     at = _at(arms + centre, scale).astype(np.intp)
@@ -143,7 +147,7 @@ def _aligned(
     if led_away or noise > first or not np.isfinite(matrix).all():
         return None
     spread = noise * np.sqrt(_ALIKE * np.linalg.inv(normal).diagonal()[:4].mean()) / (size * scale)
-    return Back(matrix, shift, float(spread))
+    return AffineWarp(matrix, shift, float(spread))
 
 
 def _at(places: Floats, scale: float) -> Floats:
@@ -166,8 +170,8 @@ def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, F
 
 def _weighed(errors: Floats) -> tuple[float, Floats]:
     """Return the noise of errors without their mean, and Tukey's weights."""
-    apart = np.abs(errors - middle(errors))
-    noise = max(_LEAST_NOISE, 1.4826 * middle(apart))
+    apart = np.abs(errors - upper_median(errors))
+    noise = max(_LEAST_NOISE, 1.4826 * upper_median(apart))
     return noise, np.maximum(1.0 - (apart / (_TUKEY * noise)) ** 2, 0.0) ** 2
 
 

@@ -35,7 +35,7 @@ Window = tuple[slice, slice]
 """Rows and columns of a part of an image."""
 
 
-class Compared(NamedTuple):
+class ImagePair(NamedTuple):
     """Two images, aligned by the turn that the joints measured.
 
     now: the newer image
@@ -57,7 +57,7 @@ class Compared(NamedTuple):
     windows: tuple[Window, ...] = ()
     shift: Flow | None = None
 
-    def part(self, window: Window) -> "Compared":
+    def part(self, window: Window) -> "ImagePair":
         """Return a part of both images with its flow."""
         return self._replace(
             now=self.now[window],
@@ -75,7 +75,7 @@ class FlowSearch:
         self._dis = cv2.DISOpticalFlow.create(_PRESETS[preset])
         self._dis.setFinestScale(0)
 
-    def search(self, pair: Compared, windows: tuple[Window, ...] | None = None) -> Compared:
+    def search(self, pair: ImagePair, windows: tuple[Window, ...] | None = None) -> ImagePair:
         """Compute the flow in parts of the images; None: everywhere."""
         if windows is None:
             windows = ((slice(0, pair.now.shape[0]), slice(0, pair.now.shape[1])),)
@@ -90,14 +90,14 @@ class FlowSearch:
         return pair._replace(flow=flow, known=known, windows=windows)
 
 
-def laid(now: SmallImage, before: SmallImage, H: Floats) -> Compared:
+def align(now: SmallImage, before: SmallImage, H: Floats) -> ImagePair:
     """Align two images by turning the older one by ``H``; their flow is still 0."""
     grey, known = _turned(before.grey, H)
     fine = grey
     if before.fine is not before.grey:
         fine, _ = _turned(before.fine, _finer(H, before.fine.shape[0] / grey.shape[0]))
     flow: Flow = np.zeros((*grey.shape, 2), dtype=np.float32)
-    return Compared(now.grey, grey, known, flow, H, (now.fine, fine))
+    return ImagePair(now.grey, grey, known, flow, H, (now.fine, fine))
 
 
 def windows_of(changed: Mask) -> tuple[Window, ...] | None:
@@ -128,7 +128,7 @@ def _widened(start: int, length: int, most: int) -> slice:
     return slice(start, min(most, start + length + more))
 
 
-def searchable(grey: Grey) -> bool:
+def is_searchable(grey: Grey) -> bool:
     """Return whether an image has a size and shape in which flow can be computed."""
     short, long = sorted(grey.shape)
     return bool(short >= LEAST_SIDE_PX and long <= _LARGEST_ASPECT * short)
@@ -146,7 +146,7 @@ def turn_homography(R_now_before: Floats | None, now: SmallImage, before: SmallI
     return H
 
 
-def moved(H: Floats, points_px: Floats) -> Floats:
+def warp_points(H: Floats, points_px: Floats) -> Floats:
     """Return points (n, 2) after a homography; infinite if they are behind the camera."""
     homogeneous = points_px @ H[:, :2].T + H[:, 2]
     depth = homogeneous[:, 2:]
@@ -173,7 +173,7 @@ def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
     """Turn an image; return it with a mask of its known pixels."""
     at = corners(grey.shape)
     height, width = grey.shape
-    if np.abs(moved(H, at) - at).max() < _STILL_PX:
+    if np.abs(warp_points(H, at) - at).max() < _STILL_PX:
         return grey, np.ones(grey.shape, dtype=np.bool_)
     # The edge is replicated, as unknown pixels must not look like an edge to the search.
     turned = cv2.warpPerspective(grey, H, (width, height), borderMode=cv2.BORDER_REPLICATE)

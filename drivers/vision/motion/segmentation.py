@@ -11,9 +11,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from gazerig.drivers.vision.motion.ego_motion import Ego
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, light_apart
-from gazerig.drivers.vision.motion.optical_flow import Compared, Flow, Mask, gradients
+from gazerig.drivers.vision.motion.ego_motion import EgoMotion
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, without_illumination
+from gazerig.drivers.vision.motion.optical_flow import Flow, ImagePair, Mask, gradients
 from gazerig.drivers.vision.motion.params import MotionParams
 
 # Window in which brightness is compared: wide enough to average noise, narrow enough for a hand.
@@ -38,7 +38,7 @@ _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
 _EDGE = cv2.BORDER_REPLICATE
 
 
-class Things(NamedTuple):
+class MotionMask(NamedTuple):
     """Independent motion in an image.
 
     flow: (h, w, 2) motion from the older image to the newer, without the camera's, pixels
@@ -53,7 +53,7 @@ class Things(NamedTuple):
     change: Plane | None = None
 
 
-class Unlike(NamedTuple):
+class ImageDifference(NamedTuple):
     """Difference between the images, with the room at rest.
 
     squares: (h, w) local mean of squares, grey levels
@@ -69,7 +69,7 @@ class Unlike(NamedTuple):
         return self.squares > _NOISE_RATIO * self.noise
 
 
-def unlike(pair: Compared, there: Flow | None = None) -> Unlike:
+def image_difference(pair: ImagePair, there: Flow | None = None) -> ImageDifference:
     """Compare two images.
 
     Args:
@@ -77,16 +77,16 @@ def unlike(pair: Compared, there: Flow | None = None) -> Unlike:
         there: Positions (h, w, 2) of still things in the older one; None: unchanged.
     """
     squares = _squares(pair.now, pair.before, there)
-    return Unlike(squares, _ROUNDING + float(np.quantile(squares[::4, ::4], 0.3)))
+    return ImageDifference(squares, _ROUNDING + float(np.quantile(squares[::4, ::4], 0.3)))
 
 
-def what_moves(
-    pair: Compared,
-    ego: Ego,
+def segment_motion(
+    pair: ImagePair,
+    ego: EgoMotion,
     params: MotionParams,
     by_image: bool = False,
-    still: Unlike | None = None,
-) -> Things:
+    still: ImageDifference | None = None,
+) -> MotionMask:
     """Return the flow without ego-motion, masked by confirmation from both frames.
 
     Args:
@@ -99,21 +99,21 @@ def what_moves(
     """
     there = None if still is not None and pair.shift is None else _there(pair, ego)
     if still is None or pair.shift is not None:
-        still = unlike(pair, there)
+        still = image_difference(pair, there)
     threshold = max(params.min_flow_px, params.noise_factor * ego.noise_px)
     if not by_image:
-        threshold += params.parallax_share * ego.way_px
+        threshold += params.parallax_share * ego.shift_px
     shape = pair.now.shape
     change = np.zeros(shape, np.float32)
     flow = np.zeros((*shape, 2), np.float32)
-    things = Things(flow, np.zeros(shape, np.bool_), threshold, change)
+    things = MotionMask(flow, np.zeros(shape, np.bool_), threshold, change)
     for window in pair.windows:
         part = pair.part(window)
         corner = np.array((window[1].start, window[0].start), np.float32)
         at = None if there is None else there[window] - corner
         rest = -part.flow if at is None else at - _added(part.flow, 1.0)
         moves = rest
-        if by_image and ego.way_px > _STANDS_PX:
+        if by_image and ego.shift_px > _STANDS_PX:
             moves = rest - _nearer(rest, ego, params.parallax_share)
         mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _jumps(part.shift)
         mask &= part.known
@@ -128,7 +128,7 @@ def what_moves(
     return things
 
 
-def _there(pair: Compared, ego: Ego) -> Flow:
+def _there(pair: ImagePair, ego: EgoMotion) -> Flow:
     """Return the positions of still things in the older image, (h, w, 2)."""
     there = _background(ego.B, pair.now.shape)
     if pair.shift is not None:
@@ -136,7 +136,7 @@ def _there(pair: Compared, ego: Ego) -> Flow:
     return there
 
 
-def _solid(pair: Compared, there: Flow | None) -> Plane:
+def _solid(pair: ImagePair, there: Flow | None) -> Plane:
     """Return the square of the relative change of brightness, without light, (h, w).
 
     A shadow darkens neighbouring pixels alike; a thing has its own edges.
@@ -171,7 +171,7 @@ def _jumps(shift: Flow | None) -> Plane | float:
     return np.asarray(ends[..., 0] + ends[..., 1], dtype=np.float32)
 
 
-def _nearer(rest: Flow, ego: Ego, most: float) -> Flow:
+def _nearer(rest: Flow, ego: EgoMotion, most: float) -> Flow:
     """Return the part of a motion that a still thing nearer than the room could have, (h, w, 2).
 
     A lens that turns also moves sideways, so near things move like the room but farther, and things
@@ -213,7 +213,7 @@ def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
     return np.dstack(((a * x + b * y + c) / depth, (d * x + e * y + f) / depth))
 
 
-def _borne_out(pair: Compared, still: Plane, noise: float, rest: Flow) -> Mask:
+def _borne_out(pair: ImagePair, still: Plane, noise: float, rest: Flow) -> Mask:
     """Return a mask of pixels that the flow explains and the camera's motion does not.
 
     Background that a thing has uncovered changed too, and any flow explains plain background. But
@@ -237,7 +237,7 @@ def _added(flow: Flow, sign: float) -> Flow:
 
 def _squares(now: Grey, before: Grey, there: Flow | None) -> Plane:
     """Return the local mean square difference from the older image, seen through a map."""
-    off = light_apart(now.astype(np.float32) - _through(before, there))
+    off = without_illumination(now.astype(np.float32) - _through(before, there))
     return np.asarray(cv2.blur(off * off, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 

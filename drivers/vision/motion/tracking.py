@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gazerig.drivers.vision.motion.image import Floats
-from gazerig.drivers.vision.motion.optical_flow import moved
+from gazerig.drivers.vision.motion.optical_flow import warp_points
 from gazerig.drivers.vision.motion.params import MotionParams
 
 # Largest distance from the expected position, in sizes (root of box width times height).
@@ -91,7 +91,7 @@ class MotionTracks:
         forget_s = self._params.forget_ms / 1e3
         self._follows = [f for f in self._follows if t_s - f.seen_s <= forget_s]
         for follow in self._follows:
-            at = moved(total, follow.centre[None, :])[0] + follow.velocity_px_s * dt_s
+            at = warp_points(total, follow.centre[None, :])[0] + follow.velocity_px_s * dt_s
             if np.isfinite(at).all():
                 follow.centre = at
 
