@@ -5,8 +5,8 @@ import pytest
 from gazerig.drivers.feetech.memory_table import REGISTERS
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.checks import apply_fix
 from gazerig.features.bringup.doctor.run import apply_fixes, check, check_all
+from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.feetech.chain import build_feetech

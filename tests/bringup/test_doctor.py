@@ -9,9 +9,9 @@ from present import present
 
 from gazerig.drivers.servo_bus.discovery import ping
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.doctor.checks import examine, take
 from gazerig.features.bringup.doctor.diagnostics import worst
 from gazerig.features.bringup.doctor.families import CHECKS
+from gazerig.features.bringup.doctor.servo_rules import examine, take
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 

@@ -10,8 +10,8 @@ from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.channel_test import sent_home
+from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro
 from gazerig.features.bringup.doctor.diagnostics import worst
-from gazerig.features.bringup.doctor.maestro import apply_fix, visit
 from gazerig.features.bringup.doctor.run import apply_fixes
 from gazerig.features.bringup.maestro_settings import (
     clipped,
@@ -46,7 +46,7 @@ class Rig:
         self.board.exchange(bytes.fromhex(text))
 
     def check(self):
-        return visit(self.port, self.params, self.setups, self.usb)
+        return visit_maestro(self.port, self.params, self.setups, self.usb)
 
     def errors(self):
         return self.board.faults.board()["errors"]
@@ -156,7 +156,7 @@ def test_a_script_is_stopped_by_fix():
     findings = rig.check()
     assert one(findings, "warn", "the board", "runs a script")
     assert rig.board.faults.board()["script"]  # looking alone does not stop it
-    (done,) = apply_fixes(lambda fix: apply_fix(rig.port, rig.params, fix), findings)
+    (done,) = apply_fixes(lambda _: stop_script(rig.port, rig.params), findings)
     assert str(done) == "the board: script 1 -> 0: done"
     assert not rig.board.faults.board()["script"] and worst(rig.check()) != "warn"
 

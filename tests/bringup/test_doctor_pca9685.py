@@ -14,8 +14,8 @@ from gazerig.drivers.pca9685.registers import (
     pulse,
 )
 from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.doctor.boards import visit_pca9685
 from gazerig.features.bringup.doctor.diagnostics import worst
-from gazerig.features.bringup.doctor.pca9685 import visit
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pca9685.bridge import build_bridge
 
@@ -48,21 +48,21 @@ class Rig:
 
 
 def test_a_good_board_is_well_and_what_it_cannot_tell_is_said() -> None:
-    findings = visit(Rig().port, PARAMS, SETUPS)
+    findings = visit_pca9685(Rig().port, PARAMS, SETUPS)
     assert worst(findings) == "note"
     assert findings[0].what == "answers at 0x40; pulses on 0 of 2 channels"
     assert any("no watchdog" in one.what for one in findings)
 
 
 def test_a_board_that_is_not_there_is_one_finding_with_its_remedy() -> None:
-    (only,) = visit(Rig().port, Pca9685Params(address=0x41), SETUPS)
+    (only,) = visit_pca9685(Rig().port, Pca9685Params(address=0x41), SETUPS)
     assert only.level == "error" and only.what == "no PCA9685 answers at 0x41"
     assert "VCC" in only.remedy and "jumpers" in only.remedy
 
 
 def test_a_channel_that_no_board_has() -> None:
     wrong = SETUPS[1]._replace(id=16)
-    findings = visit(Rig().port, PARAMS, (SETUPS[0], wrong))
+    findings = visit_pca9685(Rig().port, PARAMS, (SETUPS[0], wrong))
     assert findings[0].level == "error" and "channels 0 to 15" in findings[0].what
     assert "eyes_tilt" in findings[0].where
 
@@ -74,6 +74,6 @@ def test_a_channel_that_no_board_has() -> None:
 def test_pulses_that_were_left_on(counts: int, level: str, remedy: str) -> None:
     rig = Rig()
     rig.leave_pulse(0, counts)
-    found = visit(rig.port, PARAMS, SETUPS)[0]
+    found = visit_pca9685(rig.port, PARAMS, SETUPS)[0]
     assert found.level == level and "though no program runs it" in found.what
     assert remedy in found.remedy

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -22,14 +23,19 @@ from gazerig.features.bringup.cli.ports import (
     setups_on,
 )
 from gazerig.features.bringup.cli.progress import JsonOption, console, progress, wipe
-from gazerig.features.bringup.doctor import camera as checkup_camera
-from gazerig.features.bringup.doctor import maestro as doctor_maestro
-from gazerig.features.bringup.doctor import pca9685 as doctor_pca9685
 from gazerig.features.bringup.doctor import run as checkup
-from gazerig.features.bringup.doctor.checks import apply_fix
-from gazerig.features.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, worst
-from gazerig.features.bringup.doctor.run import AppliedFix
-from gazerig.features.bringup.doctor.text import as_plain, grouped, summed_up
+from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro, visit_pca9685
+from gazerig.features.bringup.doctor.camera import LOOK_S, examine_camera
+from gazerig.features.bringup.doctor.diagnostics import (
+    BOARD,
+    Diagnostic,
+    Fix,
+    as_plain,
+    grouped,
+    summed_up,
+    worst,
+)
+from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
 from gazerig.robot.cli.suggestions import completed
@@ -69,8 +75,13 @@ def doctor(
                 _fix(model, lines, findings, tell)
                 tell("after that:")
                 findings = _examined(model, lines, tell)
-        detector = examine_detector(model.detector)
-        eyes = [detector] if camera is None else [detector, *_examine_webcam(model, camera)]
+        eyes = [examine_detector(model.detector)]
+        if camera is not None:
+            from gazerig.drivers.camera.webcam import Webcam
+
+            progress(f"looking through webcam {camera} for {LOOK_S:g} s")
+            source = Webcam(camera, model.webcam)
+            eyes += examine_camera(source, model.camera, model.detector, RealClock().now_s)
         show_findings(eyes, tell)
         if as_json:
             rows = [as_plain(one, bus) for bus, some in findings.items() for one in some]
@@ -89,50 +100,31 @@ def examine_detector(params: FaceDetectorParams) -> Diagnostic:
     return Diagnostic("note" if cure else "ok", text, "detector", cure)
 
 
-def _examine_webcam(rig: Rig, number: int) -> list[Diagnostic]:
-    """Look through a webcam, and return what it does not take and how it sees."""
-    from gazerig.drivers.camera.webcam import Webcam
-
-    progress(f"looking through webcam {number} for {checkup_camera.LOOK_S:g} s")
-    source = Webcam(number, rig.webcam)
-    return checkup_camera.examine_camera(source, rig.camera, rig.detector, RealClock().now_s)
-
-
 def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:
     """Examine every bus, and tell what was found; return the findings by bus."""
     findings = {}
     for bus, line in lines.items():
-        findings[bus] = _examine(rig, bus, line)
+        config, setups = rig.bus_named(bus), setups_on(rig, bus)
+        if config.kind in BOARDS:
+            examine = partial(BOARDS[config.kind], line, config, setups)
+        else:
+            kind = kind_of(setups[0].model)
+            examine = partial(checkup.check, line, kind, setups, config.baud, progress)
+        findings[bus] = checkup.check_all(line, bench.host, examine)
         if can_be_released(rig, bus):
             findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
         wipe()
         if len(lines) > 1:
-            tell(f"{bus_label(rig, bus)} ({rig.bus_named(bus).kind}, {line.port_name}):")
+            tell(f"{bus_label(rig, bus)} ({config.kind}, {line.port_name}):")
         show_findings(findings[bus], tell)
     return findings
 
 
-def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
-    """Examine one bus."""
-    config, setups = rig.bus_named(bus), setups_on(rig, bus)
-
-    def behind() -> list[Diagnostic]:
-        board = BOARDS.get(config.kind)
-        if board is not None:
-            return board(line, config, setups)
-        return checkup.check(line, kind_of(setups[0].model), setups, config.baud, progress)
-
-    return checkup.check_all(line, bench.host, behind)
-
-
-def _maestro(line: BusPort, config: BusConfig, setups: Sequence[ServoConfig]) -> list[Diagnostic]:
-    usb = bench.usb_id(line.port_name)
-    return doctor_maestro.visit(line, config.maestro, setups, usb)
-
-
 BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[Diagnostic]]] = {
-    "maestro": _maestro,
-    "pca9685": lambda line, config, setups: doctor_pca9685.visit(line, config.pca9685, setups),
+    "maestro": lambda line, config, setups: visit_maestro(
+        line, config.maestro, setups, bench.usb_id(line.port_name)
+    ),
+    "pca9685": lambda line, config, setups: visit_pca9685(line, config.pca9685, setups),
 }
 """What examines boards, by the kind of bus."""
 
@@ -155,28 +147,26 @@ def _fix(
     tell: Tell,
 ) -> None:
     """Mend what can be, and say each thing."""
-    done: list[AppliedFix] = []
+    done = []
     for bus, line in lines.items():
         done += checkup.fix_latency(line.port_name, bench.host)
         if any(finding.fixes for finding in findings[bus]):
-            done += _apply(rig, bus, line, findings[bus])
+            config = rig.bus_named(bus)
+            line.setBaudRate(config.baud)
+
+            def write(
+                one: Fix, bus: str = bus, line: BusPort = line, config: BusConfig = config
+            ) -> str:
+                if one.servo_id == BOARD:
+                    return stop_script(line, config.maestro)
+                return apply_fix(line, kind_of(setups_on(rig, bus)[0].model), one)
+
+            done += checkup.apply_fixes(write, findings[bus])
             line.closePort()
     for one in done:
         tell(str(one))
     if not done:
         tell("nothing that --fix may mend")
-
-
-def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Diagnostic]) -> list[AppliedFix]:
-    config = rig.bus_named(bus)
-    line.setBaudRate(config.baud)
-
-    def write(one: Fix) -> str:
-        if one.servo_id == BOARD:
-            return doctor_maestro.apply_fix(line, config.maestro, one)
-        return apply_fix(line, kind_of(setups_on(rig, bus)[0].model), one)
-
-    return list(checkup.apply_fixes(write, findings))
 
 
 def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:

@@ -1,22 +1,26 @@
-"""What an examination finds, as values: how bad, what, where, and what to do about it."""
+"""Findings of an examination as values: how bad, what, where, the remedy; and their texts."""
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
+
+from gazerig.robot.control.event_text import runs
 
 Level = Literal["ok", "note", "warn", "error"]
 LEVELS: tuple[Level, ...] = ("ok", "note", "warn", "error")
 
-
 BOARD = -1
-"""In place of a servo's id: the board that servos hang on."""
+"""In place of a servo id: the board to which the servos are connected."""
+
+_JOINT = re.compile(r"(\w+) \((servo|channel) (\d+)\)")
 
 
 class Fix(NamedTuple):
-    """One register write that mends something and moves nothing.
+    """One register write that repairs something and moves nothing.
 
-    servo_id: ``BOARD`` for the board itself, whose "registers" are what can be told to it
-    was: the value found, None where it could not be read
+    servo_id: ``BOARD`` for the board itself, whose "registers" are its settings
+    was: the value found, None if it could not be read
     """
 
     servo_id: int
@@ -32,11 +36,11 @@ class Fix(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One thing found.
+    """One finding.
 
     level: ok, note (worth knowing), warn (works, but not well), error (does not work)
-    what: the fact; where: port, joint or file; remedy: what to do, "" where nothing is needed
-    fixes: what ``--fix`` may do about it
+    what: the fact; where: port, joint or file; remedy: what to do, "" if nothing is needed
+    fixes: what ``--fix`` may write
     """
 
     level: Level
@@ -50,6 +54,62 @@ class Diagnostic:
         return f"{self.level}: {self.where}: {self.what}{f': {self.remedy}' if self.remedy else ''}"
 
 
+class Advice(NamedTuple):
+    """A row of a table of findings; the texts have fields as of ``str.format``."""
+
+    level: Level
+    what: str
+    remedy: str = ""
+
+    def at(self, where: str, *fixes: Fix, **facts: object) -> Diagnostic:
+        """Return the finding at a place.
+
+        facts: values of the fields of the texts
+        """
+        what, remedy = self.what.format(**facts), self.remedy.format(**facts)
+        return Diagnostic(self.level, what, where, remedy, fixes)
+
+
 def worst(findings: Iterable[Diagnostic]) -> Level:
-    """Return the worst level there is, "ok" where nothing was found."""
+    """Return the worst level, "ok" without findings."""
     return max((finding.level for finding in findings), key=LEVELS.index, default="ok")
+
+
+def grouped(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str, str]]:
+    """Return level, places, what and remedy, the worst first; equal findings are one row."""
+    groups: dict[tuple[Level, str, str], list[str]] = {}
+    for finding in findings:
+        groups.setdefault((finding.level, finding.what, finding.remedy), []).append(finding.where)
+    rows = [(level, together(at), what, cure) for (level, what, cure), at in groups.items()]
+    return sorted(rows, key=lambda row: -LEVELS.index(row[0]))
+
+
+def together(places: Sequence[str]) -> str:
+    """Name several places; joints first, then their servos: "a, b, c (servos 1-3)"."""
+    found = [match for place in places if (match := _JOINT.fullmatch(place))]
+    nouns = {match[2] for match in found}
+    if len(places) == 1 or len(found) < len(places) or len(nouns) > 1:
+        return ", ".join(places)
+    names = ", ".join(match[1] for match in found)
+    return f"{names} ({nouns.pop()}s {runs([int(match[3]) for match in found])})"
+
+
+def as_plain(finding: Diagnostic, bus: str) -> dict[str, object]:
+    """Return a finding as JSON can hold it; bus: the name of its bus, "" for the main one."""
+    return {
+        "bus": bus,
+        "level": finding.level,
+        "where": finding.where,
+        "what": finding.what,
+        "cure": finding.remedy,
+        "fixes": [fix._asdict() for fix in finding.fixes],
+    }
+
+
+def summed_up(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:
+    """Count findings by level, and offer what --fix may do."""
+    counts = [(level, sum(f.level == level for f in findings)) for level in reversed(LEVELS)]
+    text = ", ".join(f"{count} {level}" for level, count in counts if count)
+    fixable = sum(bool(finding.fixes) for finding in findings)
+    offer = f"; gazerig doctor --fix mends {fixable} of them" if fixable and not fixed else ""
+    return f"{rig}: {text}{offer}"

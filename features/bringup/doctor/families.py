@@ -1,21 +1,19 @@
-"""What the doctor must know of each family of smart servo: registers, right values and texts.
+"""What the doctor must know of each family of smart servo: registers, correct values and texts.
 
 Sources: ROBOTIS e-Manual, X series; Feetech, memory table STS3215.
 """
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from gazerig.drivers.dynamixel import control_table as dynamixel
 from gazerig.drivers.feetech import memory_table as feetech
-from gazerig.features.bringup.doctor.subject import (
-    FirmwareNote,
-    Protection,
-    ServoChecks,
-    WantedSetting,
-)
+from gazerig.features.bringup.doctor.diagnostics import Advice, Level
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, SCS
 from gazerig.features.bringup.servo_family import ServoKind
+
+FIX = "gazerig doctor --fix"
 
 COMMON = (
     *("status_return_level", "torque_enable", "baud_rate", "return_delay_time", "operating_mode"),
@@ -27,6 +25,74 @@ COMMON = (
 
 DELAY_UNIT_US = 1e6 * dynamixel.RETURN_DELAY_UNIT_S
 """The same for all."""
+
+
+class WantedSetting(NamedTuple):
+    """A register that should have one value.
+
+    text: describes a value
+    remedy: any other than ``FIX`` offers no fix; {setup.name} is the joint
+    mask: chooses its bits
+    least, most: other values within them are as good
+    """
+
+    register: str
+    value: int
+    level: Level
+    text: Callable[[int], str]
+    remedy: str = FIX
+    mask: int = ~0
+    least: int | None = None
+    most: int | None = None
+
+    def met_by(self, value: int) -> bool:
+        """Return whether a register with this value is as it should be."""
+        if self.least is None and self.most is None:
+            return value & self.mask == self.value
+        above = self.least is None or value >= self.least
+        return above and (self.most is None or value <= self.most)
+
+
+class Protection(NamedTuple):
+    """The register by which a servo protects motor and gears.
+
+    errors: those that it must heed, by the bits of the register
+    text: with {errors} and {value}
+    by_hand: what to do, by the model; None: missing bits may be set
+    """
+
+    register: str
+    errors: Mapping[int, str]
+    text: str
+    by_hand: Callable[[str], str] | None = None
+
+
+@dataclass(frozen=True)
+class ServoChecks:
+    """What rules must know of a kind of servo.
+
+    program: the maker's, for settings that this program cannot write
+    manual: the maker's
+    registers: those that rules read
+    ping_only: Status Return Level 0 means that only pings are answered
+    out_of_voltage: effect of a supply outside the limits
+    error_remedies: by the error; {setup.id} is the servo's id; "" for an error that is found by
+        its measured value alone
+    unlimited_at_zero: both position limits 0 mean no limits
+    firmware_notes: of a model; each with the firmware below which it applies; the first counts
+    """
+
+    kind: ServoKind
+    program: str
+    manual: str
+    registers: tuple[str, ...]
+    ping_only: bool
+    out_of_voltage: str
+    error_remedies: Mapping[str, str]
+    unlimited_at_zero: bool
+    wanted: tuple[WantedSetting, ...]
+    protection: Protection
+    firmware_notes: Callable[[str], tuple[tuple[int, Advice], ...]]
 
 
 def _common(kind: ServoKind, position: int, others: Mapping[int, str]) -> tuple[WantedSetting, ...]:
@@ -70,20 +136,13 @@ def _startup(value: int) -> str:
     return f"{what} when power comes (Startup Configuration {value})"
 
 
-def _firmware_notes(model: str) -> tuple[FirmwareNote, ...]:
+def _firmware_notes(model: str) -> tuple[tuple[int, Advice], ...]:
     series = dynamixel.MODELS[model].family
-    slow = FirmwareNote(
-        dynamixel.FAST_READ_SINCE[series],
-        "warn",
-        "has no fast sync read: the loop is slower",
-        f"update it with {WIZARD}",
-    )
-    moved = FirmwareNote(
-        dynamixel.X330_WIDE_INDIRECT_SINCE,
-        "note",
-        "keeps its indirect data elsewhere (208); that is known",
-    )
-    return (slow, moved) if series == "x330" else (slow,)
+    slow = "firmware {found.firmware} has no fast sync read: the loop is slower"
+    moved = "firmware {found.firmware} keeps its indirect data elsewhere (208); that is known"
+    notes = ((dynamixel.FAST_READ_SINCE[series], Advice("warn", slow, f"update it with {WIZARD}")),)
+    wide = (dynamixel.X330_WIDE_INDIRECT_SINCE, Advice("note", moved))
+    return (*notes, wide) if series == "x330" else notes
 
 
 _DYNAMIXEL = ServoChecks(
@@ -160,10 +219,10 @@ _FEETECH = ServoChecks(
         "input voltage": "",
         "encoder": "its angle sensor fails: replace the servo if it comes again",
         "overheating": "let it cool for 20 minutes and find what makes it work so hard",
-        "overcurrent": "free the joint and check plugs and wires for shorts; gazerig reboot {id} "
+        "overcurrent": "free the joint and check plugs and wires for shorts; gazerig reboot {setup.id} "
         "ends it",
         "overload": "free the joint: something holds it or its range is too wide; gazerig reboot "
-        "{id} ends it",
+        "{setup.id} ends it",
     },
     unlimited_at_zero=True,
     wanted=(
@@ -180,7 +239,7 @@ _FEETECH = ServoChecks(
             "position_offset", 0, "note",
             lambda v: f"its positions are shifted by {v} steps (Offset): the calibration counts "
             "on that",
-            "leave it so; after a change of it run gazerig calibrate --joint {joint}",
+            "leave it so; after a change of it run gazerig calibrate --joint {setup.name}",
         ),
         WantedSetting(
             "temperature_limit", HOTTEST_C, "warn",

@@ -17,13 +17,50 @@ from gazerig.drivers.serial.list_ports import (
     latency_ms,
     serial_ports,
 )
-from gazerig.features.bringup.doctor.diagnostics import Diagnostic
+from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic
 
 UDEV_FILE = "/etc/udev/rules.d/99-servo-bus.rules"
 UDEV_RULE = (
     'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", '
     f'ATTR{{latency_timer}}="{RECOMMENDED_LATENCY_MS}"'
 )
+
+
+ADVICE = {
+    # fmt: off
+    "well": Advice("ok", "is there and may be opened"),
+    "name": Advice(
+        "note", "may be called otherwise after replugging", "write {name} into the YAML's bus.port"
+    ),
+    "absent": Advice(
+        "error",
+        "there is no such port",
+        "plug the adaptor in; ports here: {ports}; then name one "
+        "with --port or in the YAML's bus.port",
+    ),
+    "no port": Advice("error", "is no serial port", "name one of gazerig scan"),
+    "joined": Advice(
+        "error",
+        "may be used by the group {group} only",
+        "log out and in again, this session began before you joined the group",
+    ),
+    "group": Advice(
+        "error",
+        "may be used by the group {group} only",
+        "sudo usermod -aG {group} $USER, then log out and in",
+    ),
+    "held": Advice("error", "is held open by {holders}", "end it first"),
+    "unread": Advice("note", "its latency timer cannot be read", "look into {file}"),
+    "quick": Advice("ok", "hands answers over after {ms} ms (latency timer)"),
+    "slow": Advice(
+        "warn",
+        "keeps short answers back for {ms} ms (latency timer): about {rate} readings a second "
+        "at most",
+        f"now: echo {RECOMMENDED_LATENCY_MS} | sudo tee {{file}}; for good, in {UDEV_FILE}: "
+        + UDEV_RULE.replace("{", "{{").replace("}", "}}"),
+    ),
+    # fmt: on
+}
 
 
 class PortFacts(NamedTuple):
@@ -44,17 +81,24 @@ def port_facts(device: str, host: Host) -> PortFacts:
 
 
 def examine_port(facts: PortFacts) -> list[Diagnostic]:
-    """Judge a port; with an error among the findings it cannot be used."""
-    trouble = [finding for finding in (_there(facts), _free(facts)) if finding is not None]
+    """Return the findings about a port; with an error among them it cannot be used."""
+    device, access = facts.device, facts.access
+    trouble = ""
+    if not access.exists:
+        trouble = "absent"
+    elif not access.serial:
+        trouble = "no port"
+    elif not access.allowed:
+        trouble = "joined" if access.joined else "group"
+    elif facts.holders:
+        trouble = "held"
     if trouble:
-        return trouble[:1]
-    lasting = next((p.by_id for p in facts.others if p.device == facts.device and p.by_id), None)
-    findings = [Diagnostic("ok", "is there and may be opened", facts.device)]
+        here, holders = name_ports(facts.others), ", ".join(facts.holders)
+        return [ADVICE[trouble].at(device, ports=here, group=access.group, holders=holders)]
+    lasting = next((p.by_id for p in facts.others if p.device == device and p.by_id), None)
+    findings = [ADVICE["well"].at(device)]
     if lasting is not None:
-        findings.append(
-            Diagnostic("note", "may be called otherwise after replugging", facts.device,
-                    f"write {lasting} into the YAML's bus.port")
-        )  # fmt: skip
+        findings.append(ADVICE["name"].at(device, name=lasting))
     return findings
 
 
@@ -64,49 +108,13 @@ def name_ports(ports: Sequence[SerialPort]) -> str:
     return ", ".join(named) or "none"
 
 
-def _there(facts: PortFacts) -> Diagnostic | None:
-    device, access = facts.device, facts.access
-    if not access.exists:
-        return Diagnostic(
-            "error",
-            "there is no such port",
-            device,
-            f"plug the adaptor in; ports here: {name_ports(facts.others)}; then name one with "
-            "--port or in the YAML's bus.port",
-        )
-    if not access.serial:
-        return Diagnostic("error", "is no serial port", device, "name one of gazerig scan")
-    if access.allowed:
-        return None
-    again = "log out and in again, this session began before you joined the group"
-    cure = again if access.joined else f"sudo usermod -aG {access.group} $USER, then log out and in"
-    return Diagnostic("error", f"may be used by the group {access.group} only", device, cure)
-
-
-def _free(facts: PortFacts) -> Diagnostic | None:
-    if not facts.holders:
-        return None
-    named = ", ".join(facts.holders)
-    return Diagnostic("error", f"is held open by {named}", facts.device, "end it first")
-
-
 def examine_latency(device: str, host: Host) -> list[Diagnostic]:
-    """Judge the latency timer of an adaptor; nothing where it has none."""
+    """Return the finding about an adaptor's latency timer, none without such a timer."""
     file = latency_file(device, host)
     if file is None:
         return []
     ms = latency_ms(file)
     if ms is None:
-        return [Diagnostic("note", "its latency timer cannot be read", device, f"look into {file}")]
-    if ms <= RECOMMENDED_LATENCY_MS:
-        return [Diagnostic("ok", f"hands answers over after {ms} ms (latency timer)", device)]
-    return [
-        Diagnostic(
-            "warn",
-            f"keeps short answers back for {ms} ms (latency timer): about "
-            f"{1000 // (ms or 1)} readings a second at most",
-            device,
-            f"now: echo {RECOMMENDED_LATENCY_MS} | sudo tee {file}; for good, in {UDEV_FILE}: "
-            f"{UDEV_RULE}",
-        )
-    ]
+        return [ADVICE["unread"].at(device, file=file)]
+    advice = ADVICE["quick" if ms <= RECOMMENDED_LATENCY_MS else "slow"]
+    return [advice.at(device, ms=ms, file=file, rate=1000 // (ms or 1))]

@@ -21,12 +21,47 @@ from gazerig.drivers.serial.list_ports import (
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, corrupt, ping, scan_ids
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.doctor.checks import visit
-from gazerig.features.bringup.doctor.diagnostics import Diagnostic, Fix, worst
+from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix, worst
 from gazerig.features.bringup.doctor.port import examine_latency, examine_port, port_facts
+from gazerig.features.bringup.doctor.servo_rules import visit
 from gazerig.features.bringup.servo_family import ServoKind, Tell
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
+
+ADVICE = {
+    # fmt: off
+    "nobody": Advice(
+        "error",
+        "no servo answers, at {baud} bit/s or any other rate",
+        "{kind.no_reply} gazerig scan asks other kinds of servos, too",
+    ),
+    "elsewhere": Advice(
+        "error",
+        "answers at {found.baud} bit/s, the rig's rate is {baud}",
+        "connect it alone and run gazerig setup --joint {setup.name}",
+    ),
+    "pieces": Advice(
+        "error",
+        "answers in pieces only: two servos share its id, or a plug is loose",
+        "connect it alone and look with gazerig scan",
+    ),
+    "silent": Advice(
+        "error",
+        "does not answer",
+        "check its two plugs; is its id set? gazerig setup, with it connected alone, tells",
+    ),
+    "new": Advice(
+        "warn",
+        "servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the missing",
+        "a new one? connect it alone and run gazerig setup",
+    ),
+    "stranger": Advice(
+        "warn",
+        "servo {found.id} ({found.model}) answers and is not in the YAML",
+        "take it off the bus, or give it the id of a joint with gazerig setup",
+    ),
+    # fmt: on
+}
 
 
 class Presence(NamedTuple):
@@ -127,10 +162,15 @@ def look(
     missing = tuple(setup for setup in setups if setup.id not in there)
     known = {setup.id for setup in setups}
     strangers = tuple(found for i, found in sorted(there.items()) if i not in known)
-    elsewhere = tuple(_elsewhere(port, kind, baud, tell)) if missing else ()
+    elsewhere: list[FoundServo] = []
+    for other in kind.family.usual_rates if missing else ():
+        if other != baud:
+            tell(f"a servo is missing: asking at {other} bit/s")
+            if port.setBaudRate(other) and any_reply(port, kind.family):
+                elsewhere += scan_ids(port, kind.family, other)[0]
     if missing:
         _open(port, baud)
-    return Presence(there, missing, strangers, elsewhere, spoilt)
+    return Presence(there, missing, strangers, tuple(elsewhere), spoilt)
 
 
 def _open(port: BusPort, baud: int) -> None:
@@ -138,68 +178,20 @@ def _open(port: BusPort, baud: int) -> None:
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 57600 or 1000000")
 
 
-def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterator[FoundServo]:
-    """Search at all other baud rates."""
-    for other in kind.family.usual_rates:
-        if other == baud:
-            continue
-        tell(f"a servo is missing: asking at {other} bit/s")
-        if port.setBaudRate(other) and any_reply(port, kind.family):
-            yield from scan_ids(port, kind.family, other)[0]
-
-
 def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Diagnostic]:
-    """Judge who is there and who is not."""
+    """Return findings about servos that are missing and servos that are not in the YAML."""
     if presence.missing and not presence.there and not presence.elsewhere:
-        yield Diagnostic(
-            "error",
-            f"no servo answers, at {baud} bit/s or any other rate",
-            "the bus",
-            f"{kind.no_reply} gazerig scan asks other kinds of servos, too",
-        )
+        yield ADVICE["nobody"].at("the bus", baud=baud, kind=kind)
         return
     at = {found.id: found for found in presence.elsewhere}
     for setup in presence.missing:
-        yield _missing(setup, at.pop(setup.id, None), presence.corrupt.get(setup.id, 0), baud)
+        found = at.pop(setup.id, None)
+        cause = "elsewhere" if found else "pieces" if setup.id in presence.corrupt else "silent"
+        yield ADVICE[cause].at(servo_label(setup), setup=setup, found=found, baud=baud)
     for found in at.values():
-        yield Diagnostic(
-            "warn",
-            f"servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the "
-            "missing",
-            "the bus",
-            "a new one? connect it alone and run gazerig setup",
-        )
+        yield ADVICE["new"].at("the bus", found=found)
     for found in presence.strangers:
-        yield Diagnostic(
-            "warn",
-            f"servo {found.id} ({found.model}) answers and is not in the YAML",
-            "the bus",
-            "take it off the bus, or give it the id of a joint with gazerig setup",
-        )
-
-
-def _missing(setup: ServoConfig, at: FoundServo | None, spoilt: int, baud: int) -> Diagnostic:
-    where = servo_label(setup)
-    if at is not None:
-        return Diagnostic(
-            "error",
-            f"answers at {at.baud} bit/s, the rig's rate is {baud}",
-            where,
-            f"connect it alone and run gazerig setup --joint {setup.name}",
-        )
-    if spoilt:
-        return Diagnostic(
-            "error",
-            "answers in pieces only: two servos share its id, or a plug is loose",
-            where,
-            "connect it alone and look with gazerig scan",
-        )
-    return Diagnostic(
-        "error",
-        "does not answer",
-        where,
-        "check its two plugs; is its id set? gazerig setup, with it connected alone, tells",
-    )
+        yield ADVICE["stranger"].at("the bus", found=found)
 
 
 # --- fixes

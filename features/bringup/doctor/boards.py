@@ -1,0 +1,362 @@
+"""What is wrong with a board of hobby servos and the channels of a rig; nothing moves.
+
+A Maestro clears its error register when it reports it, so what it held is among the findings.
+What cannot be read over its serial line is a note, with what to set in Pololu's program. A
+PCA9685 keeps no errors; its registers are read, nothing is written. Sources: Pololu Maestro
+User's Guide (0J40), sections 4.b, 4.e, 5.a and 5.e; NXP, PCA9685 data sheet, rev. 4.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from gazerig.drivers.bus.servo_models import servo_label
+from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.maestro.commands import MICRO, MOST_INPUT
+from gazerig.drivers.maestro.line import MaestroLink
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.doctor.diagnostics import BOARD, Advice, Diagnostic, Fix
+from gazerig.features.bringup.maestro_settings import FACTORY_US, wide_range
+
+WHERE = "the board"
+
+SCRIPT = "script"
+"""In place of a register: the board's own script runs (1) or not (0)."""
+
+TIMEOUT = "serial timeout"
+_BAD_SCRIPT = "its script is at fault: delete it in Pololu's program"
+CURES = {
+    # fmt: off
+    "serial signal error": "something was sent at another baud rate, or the line is disturbed: compare "
+    "bus.maestro.baud with Pololu's program, check ground and cable",
+    "serial overrun": "the board could not follow: restart it, and report it if it comes again",
+    "serial buffer full": "too much was sent at once: is another program using the board?",
+    "serial CRC error": "check bytes were wrong: set bus.maestro.crc as 'Enable CRC' in Pololu's program, check "
+    "the cable",
+    "serial protocol error": "it was sent what it does not know: another program, another protocol or a "
+    "disturbed line",
+    TIMEOUT: "no commands came for longer than its timeout, so its channels went home, as they should while no "
+    "program runs",
+    "script stack error": _BAD_SCRIPT,
+    "script call stack error": _BAD_SCRIPT,
+    "script program counter error": _BAD_SCRIPT,
+    # fmt: on
+}
+
+_ON_USB = (
+    "take the first of its two ports (the Command Port), and set it to 'USB Dual Port' in Pololu's "
+    "program"
+)
+
+ADVICE = {
+    # fmt: off
+    "no feedback": Advice(
+        "note",
+        "hobby servos tell nothing: position, load, temperature and supply cannot be examined",
+    ),
+    "beyond": Advice(
+        "error", "the board has channels 0..{last} only", "correct its id in the YAML"
+    ),
+    "not read": Advice(
+        "note",
+        "was not asked: others give pulses, and were it not there, the board would send them home",
+        "stop the pulses of all servos and look again",
+    ),
+    "silent": Advice(
+        "error",
+        "the board does not answer about this channel",
+        "has it so many channels? correct its id, or bus.maestro.channels",
+    ),
+    "input": Advice("error", "is an input", "set its channel to Servo in Pololu's program"),
+    "left on": Advice("warn", "gets pulses of {us:g} us though no program runs it", "{remedy}"),
+    "outside": Advice(
+        "error",
+        "gets pulses of {us:g} us though no program runs it, outside its range "
+        "{low:g}..{high:g} us",
+        "{remedy}",
+    ),
+    "mute on USB": Advice("error", "no Maestro answers at {baud} bit/s", _ON_USB),
+    "mute": Advice(
+        "error",
+        "no Maestro answers at {baud} bit/s",
+        f"has it power? on USB {_ON_USB}; on its serial pins check TX, RX, ground and {{baud}} bit/s",
+    ),
+    "form": Advice(
+        "error",
+        "answers the {form} form only, the YAML says {params.protocol}",
+        "{number}write bus.maestro.protocol: {form}, or set the device number",
+    ),
+    "CRC": Advice(
+        "error",
+        "wants a check byte (CRC) after every command, the YAML says crc: false",
+        "write bus.maestro.crc: true, or change 'Enable CRC' in Pololu's program",
+    ),
+    "no CRC": Advice(
+        "error",
+        "wants no CRC, the YAML says crc: true",
+        "write bus.maestro.crc: false, or change 'Enable CRC' in Pololu's program",
+    ),
+    "size": Advice(
+        "error",
+        "has {size} channels, the YAML says {params.channels}",
+        "write bus.maestro.channels: {size}",
+    ),
+    "timeout": Advice("note", "held an error, cleared now: {error}", "{cure}"),
+    "error": Advice("warn", "held an error, cleared now: {error}", "{cure}"),
+    "script": Advice(
+        "warn",
+        "runs a script of its own, which may move servos against the program",
+        "gazerig doctor --fix stops it; for good delete it in Pololu's program",
+    ),
+    "wide range": Advice(
+        "note",
+        "goes to {low:g}..{high:g} us, beyond the {factory[0]}..{factory[1]} us of a new "
+        "board, which cuts goals silently",
+        "set its Min to {range[0]} and its Max to {range[1]} in Pololu's program",
+    ),
+    # fmt: on
+}
+
+
+class BoardRules(NamedTuple):
+    """Differences between makes.
+
+    most_input: a channel that reports at most this pulse is an input; 0: none can be
+    left_on, outside: remedies for pulses inside and outside a joint's range that no program
+        sends; {name} is the joint
+    note: what no board of the make reports
+    """
+
+    most_input: int
+    left_on: str
+    outside: str
+    note: Advice
+
+
+MAESTRO = BoardRules(
+    most_input=MOST_INPUT,
+    left_on="gazerig home ends with its pulses off; for good set 'On startup or error' to Off in "
+    "Pololu's program",
+    outside="switch the servo supply off; set 'On startup or error' to Off in Pololu's program",
+    note=Advice(
+        "note",
+        "its channels' own ranges and its serial timeout cannot be read over the serial line",
+        "gazerig setup lists what to set in Pololu's program, and tries the ranges out with "
+        "the servo supply off; without a timeout servos hold when the program or the cable dies",
+    ),
+)
+PCA9685 = BoardRules(
+    most_input=0,
+    left_on="gazerig home ends with its pulses off",
+    outside="switch the servo supply off, then gazerig reboot {name} ends its pulses",
+    note=Advice(
+        "note",
+        "has no watchdog: when the cable or the computer dies it goes on with its last pulses",
+        "keep the switch of the servo supply at hand",
+    ),
+)
+
+
+def examine(
+    rules: BoardRules,
+    setups: Sequence[ServoConfig],
+    pulses: Mapping[int, int | None],
+    channels: int,
+    own: Sequence[Diagnostic],
+    well: str,
+) -> list[Diagnostic]:
+    """Return all findings about a board that answers.
+
+    Args:
+        rules: of its make.
+        setups: the servos of the rig.
+        pulses: by channel, quarter microseconds, 0 for none, None without an answer; channels
+            that were not read are missing.
+        channels: number of its channels.
+        own: other findings of the make.
+        well: description of a healthy board.
+    """
+    findings = [*own, *_channels(rules, setups, pulses, channels)]
+    if not any(finding.level in ("warn", "error") for finding in findings):
+        given = sum(1 for pulse in pulses.values() if pulse)
+        well = f"{well}; pulses on {given} of {len(pulses)} channels"
+        findings.insert(0, Diagnostic("ok", well, WHERE))
+    return [*findings, ADVICE["no feedback"].at("the servos"), rules.note.at(WHERE)]
+
+
+def _channels(
+    rules: BoardRules,
+    setups: Sequence[ServoConfig],
+    pulses: Mapping[int, int | None],
+    channels: int,
+) -> Iterator[Diagnostic]:
+    """Return findings about the channels of the rig."""
+    for setup in setups:
+        pulse, where = pulses.get(setup.id), servo_label(setup)
+        if setup.id >= channels:
+            yield ADVICE["beyond"].at(where, last=channels - 1)
+        elif setup.id not in pulses:
+            yield ADVICE["not read"].at(where)
+        elif pulse is None:
+            yield ADVICE["silent"].at(where)
+        elif 0 < pulse <= rules.most_input:
+            yield ADVICE["input"].at(where)
+        elif pulse:
+            us, low, high = (one / US_STEPS for one in (pulse, setup.min_steps, setup.max_steps))
+            inside = low <= us <= high
+            remedy = (rules.left_on if inside else rules.outside).format(name=setup.name)
+            advice = ADVICE["left on" if inside else "outside"]
+            yield advice.at(where, us=us, low=low, high=high, remedy=remedy)
+
+
+# --- Maestro
+
+
+def visit_maestro(
+    port: BusPort, params: MaestroParams, setups: Sequence[ServoConfig], usb: str
+) -> list[Diagnostic]:
+    """Read and check everything that a board reports; nothing moves.
+
+    Args:
+        port: opened here.
+        params: protocol of the board according to the rig.
+        setups: the servos of the rig.
+        usb: vendor and product id of its port, "" unless on USB.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    found, size = probe(port, params), USB_CHANNELS.get(usb)
+    if found is None:
+        return [ADVICE["mute" if size is None else "mute on USB"].at(WHERE, baud=params.baud)]
+    channels = size or params.channels
+    line = MaestroLink(port, _spoken(params, found))
+    pulses = _pulses(line, setups, channels, found, size is not None)
+    crc = "on" if found.crc else "off"
+    named = f"{channels} channels{'' if size else ' assumed'}"
+    well = f"answers in the {' and the '.join(found.forms)} form, CRC {crc}, {named}, no script"
+    own = list(_board_findings(params, found, size))
+    findings = examine(MAESTRO, setups, pulses, channels, own, well)
+    wide = [
+        ADVICE["wide range"].at(
+            servo_label(setup),
+            low=setup.min_steps / US_STEPS,
+            high=setup.max_steps / US_STEPS,
+            factory=FACTORY_US,
+            range=limits,
+        )
+        for setup in setups
+        if (limits := wide_range(setup)) is not None
+    ]
+    return [*findings[:-1], *wide, findings[-1]]
+
+
+def _pulses(
+    line: MaestroLink,
+    setups: Sequence[ServoConfig],
+    channels: int,
+    found: DetectedMaestro,
+    sized: bool,
+) -> dict[int, int | None]:
+    """Read the pulses of a rig's channels.
+
+    If a board is queried for a channel that it does not have, that is an error to it, and it
+    sends all channels home. So channels that cannot be there are not read; nor, while any channel
+    gives pulses and the size of the board is not known, those beyond the six of every board.
+    """
+    pulses: dict[int, int | None] = {}
+    sure = MICRO if any(found.pulses) and not sized else channels
+    for channel in sorted(setup.id for setup in setups):
+        if sure <= channel < channels:
+            continue
+        silent = None in pulses.values()
+        heard = None if silent or channel >= channels else line.pulses((channel,))
+        pulses[channel] = None if heard is None else heard[0]
+    if None in pulses.values():
+        # What it did not understand is in its register now, and is no fault.
+        line.greet()
+    return pulses
+
+
+def _spoken(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
+    """Return the protocol of a board that was found, whatever the rig says."""
+    form = params.protocol if params.protocol in found.forms else found.forms[0]
+    return replace(params, protocol=form, crc=found.crc)
+
+
+def _board_findings(
+    params: MaestroParams, found: DetectedMaestro, size: int | None
+) -> Iterator[Diagnostic]:
+    """Return findings about protocol, size, errors and script."""
+    if params.protocol not in found.forms:
+        pololu = params.protocol == "pololu"
+        number = f"its device number is not {params.device}; " if pololu else ""
+        yield ADVICE["form"].at(WHERE, form=found.forms[0], params=params, number=number)
+    if found.crc != params.crc:
+        yield ADVICE["CRC" if found.crc else "no CRC"].at(WHERE)
+    if size is not None and size != params.channels:
+        yield ADVICE["size"].at(WHERE, size=size, params=params)
+    for error in found.errors:
+        # With a timeout set, every pause between two programs is one.
+        advice = ADVICE["timeout" if error == TIMEOUT else "error"]
+        yield advice.at(WHERE, error=error, cure=CURES.get(error, "look it up in Pololu's guide"))
+    if found.script:
+        yield ADVICE["script"].at(WHERE, Fix(BOARD, SCRIPT, 0, 1))
+
+
+def stop_script(port: BusPort, params: MaestroParams) -> str:
+    """Stop the board's script; return "" or why it was not done. Nothing moves.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    found = probe(port, params)
+    if found is None:
+        raise PortError(f"{port.port_name}: no Maestro answers: gazerig doctor names the cure")
+    line = MaestroLink(port, _spoken(params, found))
+    line.send(line.speech.stop_script())
+    return "" if line.ask(line.speech.script_status(), 1) == b"\1" else "it runs on"
+
+
+# --- PCA9685
+
+
+def visit_pca9685(
+    port: BusPort, params: Pca9685Params, setups: Sequence[ServoConfig]
+) -> list[Diagnostic]:
+    """Read and check everything that the boards of one bus report; nothing moves.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    if not port.setBaudRate(params.baud):
+        raise PortError(f"{port.port_name} cannot run at {params.baud} bit/s: name its port")
+    board = Pca9685Board(port, params)
+    findings, fitting = [], []
+    for setup in setups:
+        try:
+            params.check(setup)
+            fitting.append(setup)
+        except ValueError as error:
+            what = str(error).removeprefix(f"channel {setup.id}: ")
+            findings.append(
+                Diagnostic("error", what, servo_label(setup), "correct its id or range in the YAML")
+            )
+    try:
+        pulses = board.find(fitting, EventLog())
+    except ServoMissing as error:
+        what, _, remedy = str(error).removeprefix(f"{port.port_name}: ").partition(": ")
+        return [*findings, Diagnostic("error", what, WHERE, remedy)]
+    named = " and ".join(f"{address:#x}" for address in params.addresses)
+    read = dict(zip((setup.id for setup in fitting), pulses, strict=True))
+    return examine(PCA9685, fitting, read, params.channels, findings, f"answers at {named}")
