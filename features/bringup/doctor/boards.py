@@ -32,97 +32,64 @@ SCRIPT = "script"
 
 TIMEOUT = "serial timeout"
 _BAD_SCRIPT = "its script is at fault: delete it in Pololu's program"
+# fmt: off
 CURES = {
-    # fmt: off
-    "serial signal error": "something was sent at another baud rate, or the line is disturbed: compare "
-    "bus.maestro.baud with Pololu's program, check ground and cable",
+    "serial signal error": "something was sent at another baud rate, or the line is disturbed: "
+        "compare bus.maestro.baud with Pololu's program, check ground and cable",
     "serial overrun": "the board could not follow: restart it, and report it if it comes again",
     "serial buffer full": "too much was sent at once: is another program using the board?",
-    "serial CRC error": "check bytes were wrong: set bus.maestro.crc as 'Enable CRC' in Pololu's program, check "
-    "the cable",
-    "serial protocol error": "it was sent what it does not know: another program, another protocol or a "
-    "disturbed line",
-    TIMEOUT: "no commands came for longer than its timeout, so its channels went home, as they should while no "
-    "program runs",
+    "serial CRC error": "check bytes were wrong: set bus.maestro.crc as 'Enable CRC' in Pololu's "
+        "program, check the cable",
+    "serial protocol error":
+        "it was sent what it does not know: another program, another protocol or a disturbed line",
+    TIMEOUT: "no commands came for longer than its timeout, so its channels went home, as they "
+        "should while no program runs",
     "script stack error": _BAD_SCRIPT,
     "script call stack error": _BAD_SCRIPT,
     "script program counter error": _BAD_SCRIPT,
-    # fmt: on
 }
+# fmt: on
 
 _ON_USB = (
     "take the first of its two ports (the Command Port), and set it to 'USB Dual Port' in Pololu's "
     "program"
 )
 
+# fmt: off
 ADVICE = {
-    # fmt: off
-    "no feedback": Advice(
-        "note",
-        "hobby servos tell nothing: position, load, temperature and supply cannot be examined",
-    ),
-    "beyond": Advice(
-        "error", "the board has channels 0..{last} only", "correct its id in the YAML"
-    ),
-    "not read": Advice(
-        "note",
+    "no feedback": Advice("note",
+        "hobby servos tell nothing: position, load, temperature and supply cannot be examined"),
+    "beyond": Advice("error", "the board has channels 0..{last} only",
+        "correct its id in the YAML"),
+    "not read": Advice("note",
         "was not asked: others give pulses, and were it not there, the board would send them home",
-        "stop the pulses of all servos and look again",
-    ),
-    "silent": Advice(
-        "error",
-        "the board does not answer about this channel",
-        "has it so many channels? correct its id, or bus.maestro.channels",
-    ),
+        "stop the pulses of all servos and look again"),
+    "silent": Advice("error", "the board does not answer about this channel",
+        "has it so many channels? correct its id, or bus.maestro.channels"),
     "input": Advice("error", "is an input", "set its channel to Servo in Pololu's program"),
     "left on": Advice("warn", "gets pulses of {us:g} us though no program runs it", "{remedy}"),
-    "outside": Advice(
-        "error",
-        "gets pulses of {us:g} us though no program runs it, outside its range "
-        "{low:g}..{high:g} us",
-        "{remedy}",
-    ),
+    "outside": Advice("error", "gets pulses of {us:g} us though no program runs it, outside its "
+        "range {low:g}..{high:g} us", "{remedy}"),
     "mute on USB": Advice("error", "no Maestro answers at {baud} bit/s", _ON_USB),
-    "mute": Advice(
-        "error",
-        "no Maestro answers at {baud} bit/s",
-        f"has it power? on USB {_ON_USB}; on its serial pins check TX, RX, ground and {{baud}} bit/s",
-    ),
-    "form": Advice(
-        "error",
-        "answers the {form} form only, the YAML says {params.protocol}",
-        "{number}write bus.maestro.protocol: {form}, or set the device number",
-    ),
-    "CRC": Advice(
-        "error",
-        "wants a check byte (CRC) after every command, the YAML says crc: false",
-        "write bus.maestro.crc: true, or change 'Enable CRC' in Pololu's program",
-    ),
-    "no CRC": Advice(
-        "error",
-        "wants no CRC, the YAML says crc: true",
-        "write bus.maestro.crc: false, or change 'Enable CRC' in Pololu's program",
-    ),
-    "size": Advice(
-        "error",
-        "has {size} channels, the YAML says {params.channels}",
-        "write bus.maestro.channels: {size}",
-    ),
+    "mute": Advice("error", "no Maestro answers at {baud} bit/s",
+        f"has it power? on USB {_ON_USB}; on its serial pins check TX, RX, ground and {{baud}} bit/s"),
+    "form": Advice("error", "answers the {form} form only, the YAML says {params.protocol}",
+        "{number}write bus.maestro.protocol: {form}, or set the device number"),
+    "CRC": Advice("error", "wants a check byte (CRC) after every command, the YAML says crc: false",
+        "write bus.maestro.crc: true, or change 'Enable CRC' in Pololu's program"),
+    "no CRC": Advice("error", "wants no CRC, the YAML says crc: true",
+        "write bus.maestro.crc: false, or change 'Enable CRC' in Pololu's program"),
+    "size": Advice("error", "has {size} channels, the YAML says {params.channels}",
+        "write bus.maestro.channels: {size}"),
     "timeout": Advice("note", "held an error, cleared now: {error}", "{cure}"),
     "error": Advice("warn", "held an error, cleared now: {error}", "{cure}"),
-    "script": Advice(
-        "warn",
-        "runs a script of its own, which may move servos against the program",
-        "gazerig doctor --fix stops it; for good delete it in Pololu's program",
-    ),
-    "wide range": Advice(
-        "note",
-        "goes to {low:g}..{high:g} us, beyond the {factory[0]}..{factory[1]} us of a new "
-        "board, which cuts goals silently",
-        "set its Min to {range[0]} and its Max to {range[1]} in Pololu's program",
-    ),
-    # fmt: on
+    "script": Advice("warn", "runs a script of its own, which may move servos against the program",
+        "gazerig doctor --fix stops it; for good delete it in Pololu's program"),
+    "wide range": Advice("note", "goes to {low:g}..{high:g} us, beyond the "
+        "{factory[0]}..{factory[1]} us of a new board, which cuts goals silently",
+        "set its Min to {range[0]} and its Max to {range[1]} in Pololu's program"),
 }
+# fmt: on
 
 
 class BoardRules(NamedTuple):

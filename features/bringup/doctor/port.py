@@ -26,41 +26,27 @@ UDEV_RULE = (
 )
 
 
+# fmt: off
 ADVICE = {
-    # fmt: off
     "well": Advice("ok", "is there and may be opened"),
-    "name": Advice(
-        "note", "may be called otherwise after replugging", "write {name} into the YAML's bus.port"
-    ),
-    "absent": Advice(
-        "error",
-        "there is no such port",
-        "plug the adaptor in; ports here: {ports}; then name one "
-        "with --port or in the YAML's bus.port",
-    ),
+    "name": Advice("note", "may be called otherwise after replugging",
+        "write {name} into the YAML's bus.port"),
+    "absent": Advice("error", "there is no such port", "plug the adaptor in; ports here: {ports}; "
+        "then name one with --port or in the YAML's bus.port"),
     "no port": Advice("error", "is no serial port", "name one of gazerig scan"),
-    "joined": Advice(
-        "error",
-        "may be used by the group {group} only",
-        "log out and in again, this session began before you joined the group",
-    ),
-    "group": Advice(
-        "error",
-        "may be used by the group {group} only",
-        "sudo usermod -aG {group} $USER, then log out and in",
-    ),
+    "joined": Advice("error", "may be used by the group {group} only",
+        "log out and in again, this session began before you joined the group"),
+    "group": Advice("error", "may be used by the group {group} only",
+        "sudo usermod -aG {group} $USER, then log out and in"),
     "held": Advice("error", "is held open by {holders}", "end it first"),
     "unread": Advice("note", "its latency timer cannot be read", "look into {file}"),
     "quick": Advice("ok", "hands answers over after {ms} ms (latency timer)"),
-    "slow": Advice(
-        "warn",
-        "keeps short answers back for {ms} ms (latency timer): about {rate} readings a second "
-        "at most",
+    "slow": Advice("warn", "keeps short answers back for {ms} ms (latency timer): about {rate} "
+        "readings a second at most",
         f"now: echo {RECOMMENDED_LATENCY_MS} | sudo tee {{file}}; for good, in {UDEV_FILE}: "
-        + UDEV_RULE.replace("{", "{{").replace("}", "}}"),
-    ),
-    # fmt: on
+        "{rule}"),
 }
+# fmt: on
 
 
 class PortFacts(NamedTuple):
@@ -117,4 +103,4 @@ def examine_latency(device: str, host: Host) -> list[Diagnostic]:
     if ms is None:
         return [ADVICE["unread"].at(device, file=file)]
     advice = ADVICE["quick" if ms <= RECOMMENDED_LATENCY_MS else "slow"]
-    return [advice.at(device, ms=ms, file=file, rate=1000 // (ms or 1))]
+    return [advice.at(device, ms=ms, file=file, rate=1000 // (ms or 1), rule=UDEV_RULE)]

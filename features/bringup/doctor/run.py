@@ -28,40 +28,23 @@ from gazerig.features.bringup.servo_family import ServoKind, Tell
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 
+# fmt: off
 ADVICE = {
-    # fmt: off
-    "nobody": Advice(
-        "error",
-        "no servo answers, at {baud} bit/s or any other rate",
-        "{kind.no_reply} gazerig scan asks other kinds of servos, too",
-    ),
-    "elsewhere": Advice(
-        "error",
-        "answers at {found.baud} bit/s, the rig's rate is {baud}",
-        "connect it alone and run gazerig setup --joint {setup.name}",
-    ),
-    "pieces": Advice(
-        "error",
-        "answers in pieces only: two servos share its id, or a plug is loose",
-        "connect it alone and look with gazerig scan",
-    ),
-    "silent": Advice(
-        "error",
-        "does not answer",
-        "check its two plugs; is its id set? gazerig setup, with it connected alone, tells",
-    ),
-    "new": Advice(
-        "warn",
+    "nobody": Advice("error", "no servo answers, at {baud} bit/s or any other rate",
+        "{kind.no_reply} gazerig scan asks other kinds of servos, too"),
+    "elsewhere": Advice("error", "answers at {found.baud} bit/s, the rig's rate is {baud}",
+        "connect it alone and run gazerig setup --joint {setup.name}"),
+    "pieces": Advice("error", "answers in pieces only: two servos share its id, or a plug is loose",
+        "connect it alone and look with gazerig scan"),
+    "silent": Advice("error", "does not answer",
+        "check its two plugs; is its id set? gazerig setup, with it connected alone, tells"),
+    "new": Advice("warn",
         "servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the missing",
-        "a new one? connect it alone and run gazerig setup",
-    ),
-    "stranger": Advice(
-        "warn",
-        "servo {found.id} ({found.model}) answers and is not in the YAML",
-        "take it off the bus, or give it the id of a joint with gazerig setup",
-    ),
-    # fmt: on
+        "a new one? connect it alone and run gazerig setup"),
+    "stranger": Advice("warn", "servo {found.id} ({found.model}) answers and is not in the YAML",
+        "take it off the bus, or give it the id of a joint with gazerig setup"),
 }
+# fmt: on
 
 
 class Presence(NamedTuple):

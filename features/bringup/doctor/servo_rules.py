@@ -30,82 +30,47 @@ MEANT = 0.875
 VOLTAGE = "input voltage"
 """Every family's name of an unfit voltage, in bit 0."""
 
+# fmt: off
 ADVICE = {
-    # fmt: off
-    "well": Advice(
-        "ok",
-        "{found.model}, firmware {firmware}, {volts:.1f} V, {present_temperature} degC, "
-        "at step {present_position}",
-    ),
-    "model": Advice(
-        "error",
-        "is {found.model}, the YAML says {setup.model}",
-        "connect the right servo and run gazerig setup --joint {setup.name}, or correct the model in the YAML",
-    ),
-    "collision": Advice(
-        "error",
+    "well": Advice("ok", "{found.model}, firmware {firmware}, {volts:.1f} V, {present_temperature} "
+        "degC, at step {present_position}"),
+    "model": Advice("error", "is {found.model}, the YAML says {setup.model}",
+        "connect the right servo and run gazerig setup --joint {setup.name}, or correct the model "
+        "in the YAML"),
+    "collision": Advice("error",
         "{corrupt} of 6 answers came in pieces: two servos share id {setup.id}, or a plug is loose",
-        "connect this joint's servo alone and look with gazerig scan; a second one with "
-        "the same id gets its own by gazerig setup",
-    ),
+        "connect this joint's servo alone and look with gazerig scan; a second one with the same "
+        "id gets its own by gazerig setup"),
     "mute": Advice("error", "answers pings and nothing else (Status Return Level 0)", FIX),
-    "unread": Advice(
-        "error",
-        "gave no good answer about {named}",
-        "check its plug and its neighbours' and try again",
-    ),
+    "unread": Advice("error", "gave no good answer about {named}",
+        "check its plug and its neighbours' and try again"),
     "latched": Advice("error", "has latched: {error}", "{remedy}; then gazerig reboot {setup.id}"),
     "reported": Advice("error", "reports: {error}", "{remedy}"),
     "voltage": Advice("error", "{limits}{checks.out_of_voltage}", "{remedy}"),
-    "weak": Advice(
-        "warn",
-        "{limits}; made for {model.rated_v:g} V, it is slow and weak here",
-        "measure at the supply and at this servo: thin wires and long chains lose volts",
-    ),
-    "firmware": Advice(
-        "error",
-        "firmware {found.firmware}, the YAML wants {setup.firmware_min}",
-        "update it with {checks.program}",
-    ),
-    "baud": Advice(
-        "warn",
-        "answers at {found.baud} bit/s, but its Baud Rate is {rate}: after its next start "
-        "it will not be heard here",
-        "gazerig setup --joint {setup.name}",
-    ),
+    "weak": Advice("warn", "{limits}; made for {model.rated_v:g} V, it is slow and weak here",
+        "measure at the supply and at this servo: thin wires and long chains lose volts"),
+    "firmware": Advice("error", "firmware {found.firmware}, the YAML wants {setup.firmware_min}",
+        "update it with {checks.program}"),
+    "baud": Advice("warn", "answers at {found.baud} bit/s, but its Baud Rate is {rate}: after its "
+        "next start it will not be heard here", "gazerig setup --joint {setup.name}"),
     "unlimited": Advice("warn", "has no position limits of its own and many turns", FIX),
-    "narrow": Advice(
-        "warn", "its own position limits {low}..{high} cut the YAML's range {least}..{most}", FIX
-    ),
-    "wide": Advice(
-        "note", "its own position limits {low}..{high} are wider than the YAML's range", FIX
-    ),
-    "latch": Advice(
-        "note",
-        "a moment outside {low:.1f}..{high:.1f} V switches its torque off until it is "
-        "restarted ({register} {value})",
-        "size the supply for all servos at once, and feed long chains at both "
-        "ends; gazerig reboot brings a latched servo back",
-    ),
-    "overload": Advice(
-        "warn",
-        "its overload protection cannot act as meant (Overload Torque {share} %, "
-        "Protection Time {seconds:g} s)",
-        "set Overload Torque (36) to 80 and Protection Time (35) to 200 with {checks.program}",
-    ),
-    "slower": Advice(
-        "note",
+    "narrow": Advice("warn",
+        "its own position limits {low}..{high} cut the YAML's range {least}..{most}", FIX),
+    "wide": Advice("note", "its own position limits {low}..{high} are wider than the YAML's range",
+        FIX),
+    "latch": Advice("note", "a moment outside {low:.1f}..{high:.1f} V switches its torque off "
+        "until it is restarted ({register} {value})", "size the supply for all servos at once, and "
+        "feed long chains at both ends; gazerig reboot brings a latched servo back"),
+    "overload": Advice("warn", "its overload protection cannot act as meant (Overload Torque "
+        "{share} %, Protection Time {seconds:g} s)",
+        "set Overload Torque (36) to 80 and Protection Time (35) to 200 with {checks.program}"),
+    "slower": Advice("note",
         "its Velocity Limit is {limit:.0f} deg/s, the YAML asks for {asked:.0f}",
-        "lower max_speed_deg_s in the YAML or raise the limit with {checks.program}",
-    ),
-    "slow": Advice(
-        "note",
-        "the YAML asks its shaft for {asked:.0f} deg/s; without load and at "
-        "{model.rated_v:g} V it turns {limit:.0f}",
-        "lower max_speed_deg_s in the YAML",
-    ),
-    # fmt: on
+        "lower max_speed_deg_s in the YAML or raise the limit with {checks.program}"),
+    "slow": Advice("note", "the YAML asks its shaft for {asked:.0f} deg/s; without load and at "
+        "{model.rated_v:g} V it turns {limit:.0f}", "lower max_speed_deg_s in the YAML"),
 }
+# fmt: on
 """Findings that a function decides on; those of one condition are in ``RULES``."""
 
 
@@ -348,58 +313,33 @@ def _speed(state: ServoState) -> Iterator[Diagnostic]:
 
 _HOT = "{present_temperature} degC, it switches off above {temperature_limit}"
 
+# fmt: off
 RULES: tuple[Rule, ...] = (
-    # fmt: off
     _errors,
     _voltage,
-    RegisterRule(
-        ("present_temperature", "temperature_limit"),
-        lambda _, warm, limit: warm >= limit,
-        Advice("error", _HOT, "let it cool"),
-    ),
-    RegisterRule(
-        ("present_temperature", "temperature_limit"),
+    RegisterRule(("present_temperature", "temperature_limit"), lambda _, warm, limit: warm >= limit,
+        Advice("error", _HOT, "let it cool")),
+    RegisterRule(("present_temperature", "temperature_limit"),
         lambda _, warm, limit: limit - WARM_C <= warm < limit,
-        Advice("warn", _HOT, "let it cool"),
-    ),
-    RegisterRule(
-        ("torque_enable",),
-        lambda _, torque: torque != 0,
-        Advice(
-            "warn",
+        Advice("warn", _HOT, "let it cool")),
+    RegisterRule(("torque_enable",), lambda _, torque: torque != 0,
+        Advice("warn",
             "its torque is on though no program runs it; its settings cannot be changed so",
-            "hold the joint, its torque goes off: gazerig reboot {setup.id}",
-        ),
-    ),
-    RegisterRule(
-        ("bus_watchdog",),
-        lambda _, watchdog: watchdog == TRIPPED,
-        Advice(
-            "warn",
-            "its bus watchdog has tripped: it refuses goals (a program ended without notice)",
-            FIX,
-        ),
-        (("bus_watchdog", 0),),
-    ),
-    RegisterRule(
-        ("lock",),
-        lambda _, lock: lock == 0,
-        Advice(
-            "warn",
-            "its memory is open (Lock 0): whatever is written to its settings stays for good",
-            FIX,
-        ),
-        (("lock", 1),),
-    ),
-    RegisterRule(
-        ("present_position",),
+            "hold the joint, its torque goes off: gazerig reboot {setup.id}")),
+    RegisterRule(("bus_watchdog",), lambda _, watchdog: watchdog == TRIPPED,
+        Advice("warn",
+            "its bus watchdog has tripped: it refuses goals (a program ended without notice)", FIX),
+        (("bus_watchdog", 0),)),
+    RegisterRule(("lock",), lambda _, lock: lock == 0,
+        Advice("warn",
+            "its memory is open (Lock 0): whatever is written to its settings stays for good", FIX),
+        (("lock", 1),)),
+    RegisterRule(("present_position",),
         lambda s, at: not s.setup.min_steps <= at <= s.setup.max_steps,
-        Advice(
-            "warn",
+        Advice("warn",
             "stands at step {present_position}, outside its range {setup.min_steps}..{setup.max_steps}",
-            "turn it inside by hand (torque off); if it is inside already, gazerig calibrate --joint {setup.name}",
-        ),
-    ),
+            "turn it inside by hand (torque off); if it is inside already, gazerig calibrate --joint "
+            "{setup.name}")),
     _firmware,
     _baud,
     _wanted,
@@ -408,8 +348,8 @@ RULES: tuple[Rule, ...] = (
     _voltage_latch,
     _overload,
     _speed,
-    # fmt: on
 )
+# fmt: on
 
 
 def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
