@@ -8,12 +8,12 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.recording.gaze_angles import GazeAngles, trace_of
+from gazerig.robot.recording.gaze_angles import GazeAngles, collect_gaze_angles
 from gazerig.robot.recording.gaze_labels import (
     LabelledInterval,
     Labels,
-    labels_of,
-    stretches_of,
+    find_intervals,
+    label_samples,
 )
 
 RATE_HZ = 200.0
@@ -38,9 +38,9 @@ class Run:
 
     def __init__(self, ticks: Sequence[Tick]) -> None:
         self.ticks = ticks
-        self.trace: GazeAngles = trace_of(ticks)
-        self.labels: Labels = labels_of(self.trace)
-        self.stretches: tuple[LabelledInterval, ...] = stretches_of(self.trace, self.labels)
+        self.trace: GazeAngles = collect_gaze_angles(ticks)
+        self.labels: Labels = label_samples(self.trace)
+        self.stretches: tuple[LabelledInterval, ...] = find_intervals(self.trace, self.labels)
 
     def onsets_s(self, event: str) -> np.ndarray:
         return np.array([s.onset_s for s in self.stretches if s.event == event])

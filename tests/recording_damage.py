@@ -21,7 +21,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import run
-from gazerig.robot.recording.gaze_angles import trace_of
+from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording, used
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
@@ -163,7 +163,7 @@ DAMAGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (
 
 def _exported(file: Path) -> object:
     with used(file):
-        return trace_of(RunRecording(file).ticks()).time_s.tolist()
+        return collect_gaze_angles(RunRecording(file).ticks()).time_s.tolist()
 
 
 def _shown(file: Path) -> object:

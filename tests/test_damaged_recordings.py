@@ -35,7 +35,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(run: bytes, tmp_path: Path, hon
     file = tmp_path / "bomb.mcap"
     file.write_bytes(with_bomb(run, 300 << 20, honest))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(DriverError, match="a chunk of"):
+    with pytest.raises(DriverError, match="a chunk (of|whose)"):
         USES["export"](file)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 150_000  # kB
 
@@ -60,7 +60,7 @@ def test_in_a_file_that_was_not_closed_every_chunk_is_checked(
     if right:
         assert len(list(RunRecording(file).ticks())) > 10
         return
-    with pytest.raises(BadRecording, match="wrong check sum"):
+    with pytest.raises(BadRecording, match="wrong checksum"):
         list(RunRecording(file).ticks())
 
 

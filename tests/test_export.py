@@ -19,13 +19,18 @@ from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
-from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeTarget, in_space, trace_of
+from gazerig.robot.recording.gaze_angles import (
+    MOVEMENTS,
+    GazeTarget,
+    collect_gaze_angles,
+    gaze_in_space,
+)
 from gazerig.robot.recording.gaze_labels import (
     LabelledInterval,
-    labels_of,
-    lag_of,
+    estimate_lag,
+    find_intervals,
+    label_samples,
     speed_deg_s,
-    stretches_of,
 )
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -51,11 +56,11 @@ def pose(left_deg: tuple[float, float], right_deg: tuple[float, float], yaw: flo
 
 
 def test_left_and_up_are_positive_and_the_head_carries_the_eyes() -> None:
-    still = in_space(pose((10.0, 5.0), (6.0, 5.0), 0.0))
+    still = gaze_in_space(pose((10.0, 5.0), (6.0, 5.0), 0.0))
     assert still.left_deg == pytest.approx((10.0, 5.0))
     assert still.right_deg == pytest.approx((6.0, 5.0))
     assert still.cyclopean_deg == pytest.approx((8.0, 5.0), abs=0.01)
-    turned = in_space(pose((10.0, 0.0), (6.0, 0.0), 20.0))
+    turned = gaze_in_space(pose((10.0, 0.0), (6.0, 0.0), 20.0))
     assert turned.left_deg == pytest.approx((30.0, 0.0))
     assert turned.cyclopean_deg == pytest.approx((28.0, 0.0))
 
@@ -68,7 +73,7 @@ def test_a_rolled_head_turns_what_is_sideways_into_what_is_up() -> None:
         eye_left_rad=(radians(7.0), 0.0),
         eye_right_rad=(radians(7.0), 0.0),
     )
-    assert in_space(rolled).cyclopean_deg == pytest.approx((0.0, 7.0), abs=1e-9)
+    assert gaze_in_space(rolled).cyclopean_deg == pytest.approx((0.0, 7.0), abs=1e-9)
 
 
 def test_an_eye_whose_servo_is_silent_is_lost_and_only_that(face: Run) -> None:
@@ -77,7 +82,7 @@ def test_an_eye_whose_servo_is_silent_is_lost_and_only_that(face: Run) -> None:
         tick._replace(joints=tick.joints._replace(missing=missing), t_s=tick.t_s + 0.005 * k)
         for k, missing in enumerate([("left_eye_tilt",), ("neck_roll",), ("right_upper_lid",), ()])
     ]
-    trace = trace_of(silent)
+    trace = collect_gaze_angles(silent)
     assert np.isnan(trace.left_deg[:, 0]).tolist() == [True, True, False, False]
     assert np.isnan(trace.right_deg[:, 0]).tolist() == [False, True, False, False]
     assert np.isnan(trace.cyclopean_deg[:, 0]).tolist() == [True, True, False, False]
@@ -87,7 +92,7 @@ def test_an_eye_whose_servo_is_silent_is_lost_and_only_that(face: Run) -> None:
 
 def test_fewer_than_two_ticks_are_nothing_to_export(face: Run) -> None:
     with pytest.raises(ValueError, match="fewer than two ticks"):
-        trace_of(face.ticks[:1])
+        collect_gaze_angles(face.ticks[:1])
 
 
 # --- labels
@@ -108,12 +113,12 @@ def test_movements_leave_no_gap_and_do_not_overlap(face: Run) -> None:
 
 
 def test_the_plan_is_moved_by_the_lag_of_the_eyes(face: Run) -> None:
-    assert 0.005 <= lag_of(face.trace) <= 0.03
+    assert 0.005 <= estimate_lag(face.trace) <= 0.03
     seen = face.trace.cyclopean_deg  # what is rolled over the end would be a leap at the start
     later = face.trace._replace(
         cyclopean_deg=np.vstack((np.repeat(seen[:1], 4, axis=0), seen[:-4]))
     )
-    assert lag_of(later) == pytest.approx(lag_of(face.trace) + 0.02, abs=0.0021)
+    assert estimate_lag(later) == pytest.approx(estimate_lag(face.trace) + 0.02, abs=0.0021)
 
 
 def test_amplitudes_are_measured(face: Run) -> None:
@@ -163,12 +168,12 @@ def test_short_movements_are_what_they_are(
 ) -> None:
     """A gaze that stands still has no lag; movements are planned as (what, ticks)."""
     movement = [code for what, ticks in planned for code in [MOVEMENTS.index(what)] * ticks]
-    still = trace_of(face.ticks[: len(movement)])
+    still = collect_gaze_angles(face.ticks[: len(movement)])
     trace = still._replace(
         movement=np.array(movement), blink=np.zeros(len(movement), bool),
         looked_at=np.zeros(len(movement), int), cyclopean_deg=np.zeros((len(movement), 2)),
     )  # fmt: skip
-    stretches = stretches_of(trace, labels_of(trace))
+    stretches = find_intervals(trace, label_samples(trace))
     wanted = found or planned
     assert [s.event for s in stretches] == [what for what, _ in wanted]
     # Each lasts to where the next begins, the last one as long as its ticks, too.
@@ -176,13 +181,13 @@ def test_short_movements_are_what_they_are(
 
 
 def test_a_target_that_changes_under_way_does_not_make_two_saccades(face: Run) -> None:
-    still = trace_of(face.ticks[:100])
+    still = collect_gaze_angles(face.ticks[:100])
     trace = still._replace(
         movement=np.repeat([1, 2, 1], [40, 10, 50]), blink=np.zeros(100, bool),
         looked_at=np.repeat([0, 1, 2], [40, 5, 55]), cyclopean_deg=np.zeros((100, 2)),
         names=tuple(GazeTarget("face 1", part) for part in ("LE", "RE", "N")),
     )  # fmt: skip
-    found = [(s.event, s.looked_at.part) for s in stretches_of(trace, labels_of(trace))]
+    found = [(s.event, s.looked_at.part) for s in find_intervals(trace, label_samples(trace))]
     assert found == [("fixation", "LE"), ("saccade", "RE"), ("fixation", "N")]
 
 
@@ -200,7 +205,7 @@ def test_what_is_near_is_looked_at_without_a_saccade_and_what_is_far_is_not(face
         return tick._replace(target=target, gaze=gaze, t_s=tick.t_s + 0.005 * shift)
 
     ticks = [at(0.0, 1, "LE"), at(0.4, 2, "RE"), at(5.0, 3, "N"), at(5.0, 4, "N", saccades=1)]
-    trace = trace_of(ticks)
+    trace = collect_gaze_angles(ticks)
     assert [trace.names[k].part for k in trace.looked_at] == ["LE", "RE", "RE", "N"]
 
 
@@ -235,7 +240,7 @@ def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
     ticks[200] = ticks[200]._replace(commands=(Jog(()),))
     ticks[300] = ticks[300]._replace(commands=(Stop("hand"),))
     ticks[300:400] = [tick._replace(stopped="hand") for tick in ticks[300:400]]
-    trace = trace_of(ticks)
+    trace = collect_gaze_angles(ticks)
     assert (trace.movement[100:200] == 0).all() and (trace.movement[300:400] == 0).all()
     assert (trace.movement[200:300] > 0).all() and (trace.movement[400:] > 0).all()
     assert [words for _, words in trace.messages if words.startswith("asked: ")] == [
@@ -249,7 +254,7 @@ def test_joints_whose_lead_has_lapsed_are_moved_by_the_models_again(face: Run) -
     ticks = list(face.ticks[1000:1400])
     ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
     ticks[100:200] = [tick._replace(led="somebody: neck_yaw") for tick in ticks[100:200]]
-    known = trace_of(ticks).movement > 0
+    known = collect_gaze_angles(ticks).movement > 0
     assert known[:100].all() and not known[100:200].any() and known[200:].all()
 
 
@@ -275,7 +280,7 @@ def test_a_row_a_sample_with_what_was_measured(face: Run, tables: tuple[Path, ..
     read = rows(tables[0])
     assert tuple(read[0]) == columns(GAZE_JOINTS) and len(read) == len(face.ticks)
     tick, row = face.ticks[2000], read[2000]
-    space = in_space(tick.pose)
+    space = gaze_in_space(tick.pose)
     assert float(row["left_x_deg"]) == pytest.approx(space.left_deg[0], abs=6e-5)
     assert float(row["right_y_deg"]) == pytest.approx(space.right_deg[1], abs=6e-5)
     assert float(row["x_deg"]) == pytest.approx(space.cyclopean_deg[0], abs=6e-5)

@@ -12,8 +12,8 @@ import pytest
 from exported_run import RATE_HZ, Run, seen
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.recording.export_bids import DatasetDescription, label_of, write_bids
-from gazerig.robot.recording.gaze_angles import in_space
+from gazerig.robot.recording.export_bids import DatasetDescription, bids_label, write_bids
+from gazerig.robot.recording.gaze_angles import gaze_in_space
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -69,7 +69,7 @@ def test_a_recording_is_headerless_and_even(face: Run, bids: Path, eye: int, rec
     assert {sidecar[name]["Units"] for name in columns[1:3]} == {"deg"}
     lines = table(stem.with_suffix(".tsv.gz"))
     assert {len(line) for line in lines} == {len(columns)} and len(lines) == len(face.ticks)
-    space = in_space(face.ticks[700].pose)
+    space = gaze_in_space(face.ticks[700].pose)
     assert float(lines[700][1]) == pytest.approx(space[eye - 1][0], abs=6e-5)
 
 
@@ -115,7 +115,7 @@ def test_a_run_is_not_put_into_the_data_set_of_another_program(
     about = tmp_path / "dataset_description.json"
     about.write_text(there if isinstance(there, str) else json.dumps(there))
     before = about.read_bytes()
-    with pytest.raises(SetupError, match="is no data set of gazerig: name another folder"):
+    with pytest.raises(SetupError, match="is not a data set of gazerig: name another folder"):
         write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [about.name]
     write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path, force=True)
@@ -157,7 +157,7 @@ def test_the_same_run_gives_the_same_bytes(face: Run, tmp_path: Path) -> None:
 
 
 def test_labels_are_letters_and_digits() -> None:
-    assert label_of("face-to-face 2") == "facetoface2" and label_of("--") == "unnamed"
+    assert bids_label("face-to-face 2") == "facetoface2" and bids_label("--") == "unnamed"
 
 
 def test_the_official_validator_has_nothing_to_say_against_it(bids: Path) -> None:

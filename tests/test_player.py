@@ -38,10 +38,10 @@ def test_it_stands_at_the_beginning_until_it_is_asked_to_play() -> None:
 def test_another_speed_holds_from_now_on() -> None:
     player = made()
     player.play(0.0)
-    player.go_at(0.25, 2.0)
+    player.set_speed(0.25, 2.0)
     assert at(player, 2.0) == pytest.approx(2.0)
     assert at(player, 6.0) == pytest.approx(3.0)
-    player.go_at(4.0, 6.0)
+    player.set_speed(4.0, 6.0)
     assert at(player, 7.0) == pytest.approx(7.0)
 
 
@@ -50,7 +50,7 @@ def test_a_speed_outside_is_refused_and_changes_nothing(speed: float) -> None:
     player = made()
     player.play(0.0)
     with pytest.raises(ValueError, match="is not between 0.05 and 8"):
-        player.go_at(speed, 1.0)
+        player.set_speed(speed, 1.0)
     assert at(player, 2.0) == pytest.approx(2.0) and player.state(2.0).speed == 1.0
 
 
@@ -101,19 +101,19 @@ def test_no_further_step_says_so_and_stays() -> None:
     player.seek(8.0, 0.0)
     with pytest.raises(ValueError, match="there is no next saccade"):
         player.step("next saccade", 0.0)
-    with pytest.raises(ValueError, match="no step 'sideways'; there is previous saccade"):
+    with pytest.raises(ValueError, match="no step 'sideways'; choose from previous saccade"):
         player.step("sideways", 0.0)
     assert at(player, 0.0) == 8.0
 
 
 def test_what_the_page_asks_for_is_done() -> None:
     player = made()
-    player.obey({"seek_s": 2}, 0.0)
-    player.obey({"speed": 2.0}, 0.0)
-    player.obey({"play": True}, 0.0)
+    player.handle_request({"seek_s": 2}, 0.0)
+    player.handle_request({"speed": 2.0}, 0.0)
+    player.handle_request({"play": True}, 0.0)
     assert player.state(1.0)[:4] == (4.0, 10.0, True, 2.0)
-    player.obey({"play": False}, 1.0)
-    player.obey({"step": "next saccade"}, 1.0)
+    player.handle_request({"play": False}, 1.0)
+    player.handle_request({"step": "next saccade"}, 1.0)
     assert player.state(9.0)[:3] == (7.5, 10.0, False)
 
 
@@ -126,7 +126,7 @@ def test_what_the_page_asks_for_is_done() -> None:
 def test_what_cannot_be_meant_is_refused(asked: object) -> None:
     player = made()
     with pytest.raises(ValueError):
-        player.obey(asked, 1.0)
+        player.handle_request(asked, 1.0)
     assert player.state(5.0) == (0.0, 10.0, False, 1.0, None)
 
 
@@ -148,7 +148,7 @@ def test_whatever_is_asked_it_stays_inside_and_never_runs_backwards_by_itself(as
         assert before.at_s <= after.at_s <= 10.0
         assert after.at_s - before.at_s <= wait_s * before.speed + 1e-6
         try:
-            player.obey(desired, now_s)
+            player.handle_request(desired, now_s)
         except ValueError as error:
             assert str(error).startswith("there is no")
         assert 0.0 <= player.state(now_s).at_s <= 10.0

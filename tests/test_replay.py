@@ -131,7 +131,7 @@ def test_a_guard_that_holds_is_an_event_once(ticks: list[Tick]) -> None:
 
 
 def test_a_recording_without_ticks_says_so() -> None:
-    with pytest.raises(SetupError, match="holds no tick"):
+    with pytest.raises(SetupError, match="contains no tick"):
         SnapshotIndex((), (), RATE_HZ)
 
 
@@ -255,8 +255,8 @@ def test_what_is_recalled_fits_into_a_message(frames: SnapshotIndex, ticks: list
         for k in range(4) for tick in ticks
     ]  # fmt: skip
     whole = SnapshotIndex(long, (), RATE_HZ)
-    assert len(whole.recalled(0, len(whole) - 1)) < MESSAGE_BYTES
-    rows = unpack(whole.recalled(0, len(whole) - 1)).trail
+    assert len(whole.message_with_history(0, len(whole) - 1)) < MESSAGE_BYTES
+    rows = unpack(whole.message_with_history(0, len(whole) - 1)).trail
     assert rows[-1].t_s - rows[0].t_s == pytest.approx(10.0, abs=0.1)
     whole.close()
 
@@ -312,7 +312,7 @@ def test_a_page_that_takes_the_place_of_another_is_told_what_there_is(
     replay = Replay(frames, time_)
     shown(replay, screen, time_, 0.5)
     screen.messages.clear()
-    replay.begin_anew()
+    replay.send_introduction_again()
     shown(replay, screen, time_, 0.5)
     assert ["marks" in state for state in screen.states()].count(True) == 1
 
@@ -322,7 +322,7 @@ def test_requests_are_obeyed_or_refused_in_words(frames: SnapshotIndex) -> None:
     assert replay.handle_request({"replay": {"seek_s": 2.0}}) is None
     assert replay.handle_request({"replay": {"step": "next saccade"}}) is None
     assert "between 0.05 and 8" in (replay.handle_request({"replay": {"speed": 100}}) or "")
-    assert "cannot be meant" in (replay.handle_request({"replay": None}) or "")
+    assert "is invalid" in (replay.handle_request({"replay": None}) or "")
     assert (
         replay.handle_request({"do": "stop", "why": ""})
         == "this is a recording: nothing moves here"

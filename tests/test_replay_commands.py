@@ -15,7 +15,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.control.loop import run
 from gazerig.robot.dashboard.feed.page_process import unpack
-from gazerig.robot.recording.gaze_angles import trace_of
+from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
@@ -57,8 +57,8 @@ def said(*arguments: object) -> tuple[int, str]:
 
 
 def test_a_recording_exports_what_the_run_itself_would(recorded: Path) -> None:
-    from_file = trace_of(RunRecording(recorded).ticks())
-    itself = trace_of(ticks_of(2.0))
+    from_file = collect_gaze_angles(RunRecording(recorded).ticks())
+    itself = collect_gaze_angles(ticks_of(2.0))
     assert len(from_file.time_s) == len(itself.time_s) > 350
     assert np.array_equal(from_file.cyclopean_deg, itself.cyclopean_deg)
     assert np.array_equal(from_file.movement, itself.movement) and from_file.names == itself.names

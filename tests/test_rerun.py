@@ -288,7 +288,7 @@ def test_a_refused_resumption_is_refused_again() -> None:
     assert body.read(0.005) is other
     assert body.read(0.005) is tick.joints
     assert body.read(0.010) is tick.joints  # more readings than there were
-    body.leave_off()
+    body.stop_playback()
     assert body.read(0.015) is not tick.joints
 
 

@@ -48,7 +48,7 @@ from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.record_router import RecordRouter
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of
+from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, read_run_end, read_run_info
 from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.viewer_messages import orientation
 from gazerig.robot.recording.world_info import WorldInfo
@@ -408,10 +408,10 @@ def test_any_percept_comes_back(recorded: Recorded, odd: float) -> None:
 
 def test_info_of_another_version_is_read_as_far_as_it_is_known() -> None:
     info = RunInfo("desk", "robot", "a: 1\n", 0, 200.0, STARTED)
-    assert info_of({**as_text(info), "what_comes_later": "5"}) == info
-    assert end_of({"lost": "3"}) == RunEnd(lost=3)
+    assert read_run_info({**as_text(info), "what_comes_later": "5"}) == info
+    assert read_run_end({"lost": "3"}) == RunEnd(lost=3)
     with pytest.raises(ValueError, match="config_yaml"):
-        info_of({"rig": '"desk"'})
+        read_run_info({"rig": '"desk"'})
 
 
 @pytest.mark.parametrize(
@@ -426,9 +426,9 @@ def test_info_of_another_version_is_read_as_far_as_it_is_known() -> None:
 )  # fmt: skip
 def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: str) -> None:
     text = as_text(info_for())
-    assert info_of(text).seed == 7
+    assert read_run_info(text).seed == 7
     with pytest.raises(ValueError, match="."):
-        info_of({**text, name: nonsense})
+        read_run_info({**text, name: nonsense})
 
 
 @pytest.mark.parametrize(
@@ -438,9 +438,9 @@ def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: str) -> Non
 )  # fmt: skip
 def test_an_end_that_no_run_has_is_refused(name: str, nonsense: str) -> None:
     text = as_text(RunEnd("seconds", 3, 1.5, "ab"))
-    assert end_of(text) == RunEnd("seconds", 3, 1.5, "ab")
+    assert read_run_end(text) == RunEnd("seconds", 3, 1.5, "ab")
     with pytest.raises(ValueError, match="."):
-        end_of({**text, name: nonsense})
+        read_run_end({**text, name: nonsense})
 
 
 def test_the_world_is_written_when_its_beginning_is_known(

@@ -109,8 +109,10 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) ->
         tmp_path / "empty": "is no recording",
         written(tmp_path / "camera", "gazerig-camera-1"): "a recording of a camera, not of a run",
         written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* up to 1: update gazerig",
-        written(tmp_path / "other", "ros2"): r"no recording of gazerig \(its profile is 'ros2'\)",
-        written(tmp_path / "bare", "gazerig-run-1"): "nothing of the run is in it",
+        written(
+            tmp_path / "other", "ros2"
+        ): r"not a recording of gazerig \(its profile is 'ros2'\)",
+        written(tmp_path / "bare", "gazerig-run-1"): "it contains nothing of a run",
     }
     for path, words in wrong.items():
         with pytest.raises(SetupError, match=words) as found:
@@ -137,7 +139,7 @@ def test_a_run_that_never_began_leaves_no_file(tmp_path: Path) -> None:
     path = tmp_path / "never.mcap"
     recorder = Recorder(path, info_for())
     recorder.open()
-    assert recorder.close("fault") == f"nothing was recorded: {path} is not made"
+    assert recorder.close("fault") == f"nothing was recorded: {path} was not created"
     assert not path.exists()
 
 
@@ -168,8 +170,8 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_pa
     last = recorder.close("seconds")
     said += recorder.events()
     assert goes_on == 100
-    assert said == ["recording stopped (File too large); the run goes on without it"]
-    assert last == f"recording in {path} is not whole: File too large"
+    assert said == ["recording stopped (File too large); the run continues without it"]
+    assert last == f"recording in {path} is incomplete: File too large"
     recording = RunRecording(path)
     assert not recording.whole
     assert path.stat().st_size <= 60_000
@@ -192,7 +194,7 @@ def test_an_older_recording_stays_until_a_run_has_begun(tmp_path: Path) -> None:
     recorder = Recorder(path, info_for(), over=True)
     recorder.open()
     assert path.read_bytes() == b"older"
-    assert recorder.close("it could not start") == f"nothing was recorded: {path} is as it was"
+    assert recorder.close("it could not start") == f"nothing was recorded: {path} is unchanged"
     assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
 
     recorder = Recorder(path, info_for(), over=True)
@@ -211,7 +213,7 @@ def test_a_link_to_an_older_recording_stays_a_link(tmp_path: Path) -> None:
     recorder.open()
     recorder.begin()
     assert link.is_symlink() and older.read_bytes() != b"older"
-    assert recorder.close("fault") == f"nothing was recorded: {link} is not made"
+    assert recorder.close("fault") == f"nothing was recorded: {link} was not created"
     assert [path.name for path in tmp_path.iterdir()] == ["newest.mcap"] and link.is_symlink()
 
 
@@ -263,7 +265,7 @@ def test_what_the_queue_cannot_hold_is_lost_and_counted(
     process.send_signal(18)
     said = recorder.close("seconds")
     assert recorder.lost > 0
-    assert f"; {recorder.lost} ticks could not be kept" in said
+    assert f"; {recorder.lost} ticks were not recorded" in said
     recording = RunRecording(path)
     assert recording.end.lost == recorder.lost
     assert f"lacks {recorder.lost} ticks" in recording.note
@@ -284,5 +286,5 @@ def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path: Path) -> 
         made.clock.sleep_until(0.005 * number)
         recorder.record(made.robot.tick(0.005 * number, 0.005))
         said += recorder.events()
-    assert said == ["recording stopped (its writer has died); the run goes on without it"]
-    assert "not whole: its writer has died" in recorder.close("seconds")
+    assert said == ["recording stopped (its writer has died); the run continues without it"]
+    assert "incomplete: its writer has died" in recorder.close("seconds")

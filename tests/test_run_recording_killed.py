@@ -84,7 +84,7 @@ def test_a_killed_rig_leaves_a_recording(tmp_path: Path, both: bool) -> None:
     killed = Killed(path, both)
     recording = RunRecording(path)
     assert recording.whole is not both
-    words = "was not closed" if both else "ends where the program was killed"
+    words = "was not closed" if both else "ends at the time at which the program was killed"
     assert words in recording.note
     times = [tick.t_s for tick in recording.ticks()]
     assert times == [t_s for _, t_s in killed.handed][: len(times)]  # nothing lacks in between

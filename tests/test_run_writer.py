@@ -195,6 +195,6 @@ def test_a_writer_that_does_not_go_on_is_waited_for_once(
     while not taking and not client._queue:
         client.post(writer.TICKS, bytes(50_000))
     client.close()
-    words = "its writer does not end" if taking else "its writer does not go on"
+    words = "its writer does not end" if taking else "its writer does not respond"
     assert client.failed == words and not client.alive and ours.fileno() == -1
     assert waited_s == [15.0] and not client._queue

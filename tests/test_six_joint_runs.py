@@ -24,8 +24,8 @@ from gazerig.robot.dashboard.feed.page_process import unpack
 from gazerig.robot.recording.export_bids import DatasetDescription as Subject
 from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv
-from gazerig.robot.recording.gaze_angles import trace_of
-from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
+from gazerig.robot.recording.gaze_angles import collect_gaze_angles
+from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
 from gazerig.robot.recording.run_format import HEALTH
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
 from gazerig.robot.recording.tick_record import as_json, from_json
@@ -138,9 +138,11 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
         ("six", maker.ticks, ["left_lid", "right_lid", "left_lower_lid", "right_lower_lid"]),
         ("nine", desk.ticks, ["left_lid", "right_lid"]),
     ):
-        trace = trace_of(ticks)
-        labels = labels_of(trace)
-        samples, *_, beside = write_csv(trace, labels, stretches_of(trace, labels), tmp_path / name)
+        trace = collect_gaze_angles(ticks)
+        labels = label_samples(trace)
+        samples, *_, beside = write_csv(
+            trace, labels, find_intervals(trace, labels), tmp_path / name
+        )
         with samples.open(newline="") as file:
             rows = list(csv.DictReader(file))
         assert tuple(rows[0]) == columns(ticks[0].guard_result.joints)
@@ -157,10 +159,10 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
 
 
 def test_a_data_set_says_that_its_gaze_is_estimated(maker: Run, tmp_path: Path) -> None:
-    trace = trace_of(maker.ticks)
-    labels = labels_of(trace)
+    trace = collect_gaze_angles(maker.ticks)
+    labels = label_samples(trace)
     about = Subject("maker", "visitor", 200.0, STARTED, "gazerig")
-    write_bids(trace, labels, stretches_of(trace, labels), about, tmp_path)
+    write_bids(trace, labels, find_intervals(trace, labels), about, tmp_path)
     wanted = {1: ["lid", "lower_lid"], 2: ["lid", "lower_lid"], 3: []}
     for eye, more in wanted.items():
         (path,) = tmp_path.rglob(f"*eye{eye}_physio.json")
@@ -180,7 +182,7 @@ def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
             maker.ticks[100:103], [("eyes_tilt",), ("right_lower_lid",), ()], strict=True
         )
     ]
-    trace = trace_of(silent)
+    trace = collect_gaze_angles(silent)
     for eye in (trace.left_deg, trace.right_deg, trace.cyclopean_deg):
         assert np.isnan(eye[:, 0]).tolist() == [True, False, False]
     assert np.isnan(trace.lower_lids).tolist() == [[False] * 2, [False, True], [False] * 2]

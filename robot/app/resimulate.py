@@ -138,7 +138,7 @@ class _Resimulator:
         if ended is None and end.ran_s is not None:
             self._made.clock.sleep_until(began_s + end.ran_s)
         if self._body is not None:
-            self._body.leave_off()
+            self._body.stop_playback()
         count = LoopCount(self._compared.ticks, 0, ended or end.stopped_by or "seconds")
         leave(self._made, count, lambda line: None)
         if ended is not None:

@@ -114,8 +114,8 @@ def _export(
     from gazerig.robot.control.feedback_basis import ESTIMATED
     from gazerig.robot.recording.export_bids import DatasetDescription, write_bids
     from gazerig.robot.recording.export_csv import csv_files, write_csv
-    from gazerig.robot.recording.gaze_angles import trace_of
-    from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
+    from gazerig.robot.recording.gaze_angles import collect_gaze_angles
+    from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
     from gazerig.robot.recording.read import RunRecording, used
 
     recording = RunRecording(file)
@@ -125,9 +125,9 @@ def _export(
     _warn(recording.note)
     with used(file):
         with _progress("reading", recording.duration_s) as read:
-            trace = trace_of(_with_progress(recording.ticks(), read))
-        labels = labels_of(trace)
-        stretches = stretches_of(trace, labels)
+            trace = collect_gaze_angles(_with_progress(recording.ticks(), read))
+        labels = label_samples(trace)
+        stretches = find_intervals(trace, labels)
     if bids:
         info = recording.info
         about = DatasetDescription(
@@ -200,7 +200,7 @@ def _show(
             if built is not None:
                 page.send(rig_message(LiveRig(rate_hz, built, world=world)))
                 page.send(state_message(RunState({}, "", "", "", (None, None, 0), start_s)))
-            replaying.begin_anew()
+            replaying.send_introduction_again()
         if url is not None and url != urls[-1]:
             urls.append(url)
             say(f"{frames.duration_s:.1f} s of {file} on {url}: Ctrl-C ends")

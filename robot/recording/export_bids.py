@@ -1,9 +1,9 @@
-"""A run as a BIDS data set: eye-tracking recordings as physiological ones (BIDS 1.11.1).
+"""Export of a run as a BIDS data set with physiological eye-tracking recordings (BIDS 1.11.1).
 
-Each of left eye (eye1), right eye (eye2) and cyclopean gaze (eye3) has a table without a
-header and its JSON with the columns' names, beside a table of events; both tables are
-compressed. The data set is one that the official validator accepts. The robot is the
-participant; angles and signs are those of gazerig.robot.recording.gaze_angles.
+The left eye (eye1), the right eye (eye2) and the cyclopean gaze (eye3) each have a table of
+samples without a header, a JSON file with the column names, and a table of events. Both tables
+are compressed. The official validator accepts the data set. The robot is the participant.
+Angles and signs are those of gazerig.robot.recording.gaze_angles.
 """
 
 import gzip
@@ -32,7 +32,7 @@ _EVENT_COLUMNS = (
 )  # fmt: skip
 _MISSING = "n/a"
 _GENERATOR = "gazerig"
-_LARGEST_TEXT = 1_000_000  # bytes; of a data set's own small files
+_LARGEST_TEXT = 1_000_000  # bytes; limit for a data set's own small files
 _METHODS: dict[Basis, str] = {
     "measured": "servo encoders",
     "partly estimated": f"servo encoders, {PARTLY}",
@@ -41,12 +41,14 @@ _METHODS: dict[Basis, str] = {
 
 
 class DatasetDescription(NamedTuple):
-    """What the JSON says of a run.
+    """Metadata of a run.
 
-    subject, task: names, made to letters and digits in file names
-    rate_hz: control rate of the run; started_utc: wall clock at its start, "" where unknown
-    made_by: names and versions of what recorded and wrote it
-    run: number among several of one subject and task, None where there is one alone
+    Attributes:
+        subject, task: Names; file names contain only their letters and digits.
+        rate_hz: Control rate of the run.
+        started_utc: Wall clock at the start of the run, "" if unknown.
+        made_by: Names and versions of the programs that recorded and wrote the run.
+        run: Number among the runs of one subject and task, None for a single run.
     """
 
     subject: str
@@ -58,7 +60,7 @@ class DatasetDescription(NamedTuple):
 
 
 class _RecordedEye(NamedTuple):
-    """One recording: its label, what it is of, its gaze and further columns."""
+    """One recording: its label, the recorded eye, its gaze and further columns."""
 
     label: str
     recorded: str
@@ -74,15 +76,24 @@ def write_bids(
     root: Path,
     force: bool = False,
 ) -> tuple[Path, ...]:
-    """Write the data set, or add this run to the one that is there; give the files.
+    """Write the data set, or add the run to an existing one.
 
-    force: replace the run of this subject and task that is there
+    Args:
+        trace: Gaze angles of the run.
+        labels: Labels of the samples.
+        stretches: Labelled intervals in the order of their onsets.
+        about: Metadata of the run.
+        root: Folder of the data set.
+        force: Replace an existing run of this subject and task.
+
+    Returns:
+        The written files.
 
     Raises:
-        SetupError: the folder holds another data set, or has a run of this
-            subject and task, or cannot be written.
+        SetupError: The folder contains another data set, contains a run of this subject
+            and task, or cannot be written.
     """
-    subject, task = f"sub-{label_of(about.subject)}", label_of(about.task)
+    subject, task = f"sub-{bids_label(about.subject)}", bids_label(about.task)
     folder = root / subject / "beh"
     refuse_foreign(root, force)
     run = "" if about.run is None else f"_run-{about.run:02d}"
@@ -100,10 +111,10 @@ def write_bids(
 
 
 def refuse_foreign(root: Path, force: bool = False) -> None:
-    """Refuse to put a run into another data set, or among files that are none.
+    """Check that a folder is empty or contains a data set written by gazerig.
 
     Raises:
-        SetupError: the folder holds something that gazerig has not made.
+        SetupError: The folder contains other files.
     """
     if force or not root.is_dir() or not any(root.iterdir()):
         return
@@ -115,12 +126,12 @@ def refuse_foreign(root: Path, force: bool = False) -> None:
     except (OSError, ValueError, AttributeError, TypeError):
         pass
     raise SetupError(
-        f"{root} is there and is no data set of gazerig: name another folder, or use --force"
+        f"{root} exists and is not a data set of gazerig: name another folder, or use --force"
     )
 
 
-def generated(made_by: str) -> dict[str, object]:
-    """Return what a description says of a data set's making, by which it is known again."""
+def generated_by(made_by: str) -> dict[str, object]:
+    """Return the entries of a data set's description that identify it as written by gazerig."""
     return {
         "BIDSVersion": BIDS_VERSION,
         "DatasetType": "raw",
@@ -128,8 +139,8 @@ def generated(made_by: str) -> dict[str, object]:
     }
 
 
-def label_of(name: str) -> str:
-    """Return a BIDS label made of a name: its letters and digits."""
+def bids_label(name: str) -> str:
+    """Return the letters and digits of a name as a BIDS label."""
     return re.sub(r"[^A-Za-z0-9]", "", name) or "unnamed"
 
 
@@ -149,7 +160,7 @@ def _eyes(trace: GazeAngles) -> tuple[_RecordedEye, ...]:
 
 
 def _lids(trace: GazeAngles, side: str, k: int) -> tuple[tuple[str, str, str, Floats], ...]:
-    """Return the columns of one eye's lids, those that are there."""
+    """Return the columns of one eye's lids that the rig has."""
     every = (
         ("lid", "upper", trace.lids[:, k]),
         ("lower_lid", "lower", trace.lower_lids[:, k]),
@@ -162,20 +173,20 @@ def _lids(trace: GazeAngles, side: str, k: int) -> tuple[tuple[str, str, str, Fl
 
 
 def _write_frame(root: Path, subject: str, about: DatasetDescription) -> Iterator[Path]:
-    """Write what a data set has beside its recordings; what is there of it stays."""
+    """Write the files of a data set that describe it; existing ones stay."""
     description = {
         "Name": "Gaze of an animatronic head",
-        **generated(about.made_by),
+        **generated_by(about.made_by),
     }
     readme = (
-        "# Gaze of an animatronic head\n\nThe participants are robots. What an eye tracker would\n"
-        "have measured is taken from the angles of their servos: lines of sight in space, x + to\n"
-        "the robot's own left and y + up, in degrees. Events are what the robot's models did, as\n"
-        "they say themselves, moved by the lag of its eyes; amplitudes and speeds are those of\n"
-        "the samples. GazeBasis tells samples that were measured from those that were estimated\n"
-        "from commands, as the servos of some robots tell nothing.\n"
+        "# Gaze of an animatronic head\n\nThe participants are robots. The samples are computed\n"
+        "from the angles of their servos: lines of sight in space, x + to the robot's own left\n"
+        "and y + up, in degrees. Events are the movements that the robot's models report,\n"
+        "shifted by the lag of its eyes. Amplitudes and speeds are those of the samples.\n"
+        "GazeBasis distinguishes measured samples from samples that were estimated from\n"
+        "commands, as the servos of some robots report no position.\n"
     )
-    columns = {"species": {"Description": "what the participant is"}}
+    columns = {"species": {"Description": "species of the participant"}}
     for path, text in (
         (root / "dataset_description.json", _json(description)),
         (root / "README.md", readme),
@@ -226,7 +237,7 @@ def _write_eye(
         "x_coordinate": {
             "LongName": "Gaze, horizontal",
             "Description": "yaw of the line of sight in space, + to the robot's own left; "
-            "n/a where a servo gave no fresh answer",
+            "n/a if a servo did not answer",
             "Units": "deg",
         },
         "y_coordinate": {
@@ -241,9 +252,9 @@ def _write_eye(
 
 
 def _even_rows(values: Floats, rate_hz: float) -> Iterator[list[str]]:
-    """Return one row a slot of the control loop: n/a in slots that it missed.
+    """Return one row per slot of the control loop, n/a in missed slots.
 
-    A physiological recording is sampled evenly; readers go by the number of a row.
+    A physiological recording is sampled evenly: readers compute a row's time from its number.
     """
     before = float(values[0, 0])
     for time_s, *rest in values.tolist():
@@ -286,13 +297,13 @@ def _events_sidecar(labels: Labels, task: str) -> dict[str, object]:
         "TaskName": task,
         "Columns": list(_EVENT_COLUMNS),
         "OnsetSource": "timestamp",
-        "Description": "What the models of gaze did, the same for all eyes, moved by the lag of "
-        f"the eyes ({1e3 * labels.lag_s:.0f} ms); blinks overlap what the eyes do. Messages are "
-        "what the machine said and what people asked for.",
+        "Description": "Movements of the gaze models, the same for all eyes, shifted by the lag "
+        f"of the eyes ({1e3 * labels.lag_s:.0f} ms). Blinks overlap movements. Messages are "
+        "those of the machine and commands from people.",
         "onset": {"Description": "in the time of the column timestamp", "Units": "s"},
         "duration": {"Units": "s"},
         "trial_type": {
-            "Description": "kind of event, n/a of a message",
+            "Description": "kind of event, n/a for a message",
             "Levels": {
                 "fixation": "the gaze rests on a still target",
                 "saccade": "the gaze jumps",
@@ -302,12 +313,12 @@ def _events_sidecar(labels: Labels, task: str) -> dict[str, object]:
         },
         "amplitude": {"Description": "great circle from first to last sample", "Units": "deg"},
         "peak_velocity": {"Description": "fastest angular speed", "Units": "deg/s"},
-        "target": {"Description": "what the gaze is on, or goes to: kind and number"},
+        "target": {"Description": "target of the gaze or of the saccade: kind and number"},
         "part": {
             "Description": "part of a face; left and right are the face's owner's",
             "Levels": dict(PART_NAMES),
         },
-        "message": {"Description": "words of the machine, or what it was asked for"},
+        "message": {"Description": "message of the machine, or a command to it"},
     }
 
 
@@ -317,7 +328,7 @@ def _pair(
     table, beside = Path(f"{stem}.tsv.gz"), Path(f"{stem}.json")
     with (
         output_file(table, force) as raw,
-        # Without name and time inside, the same run gives the same bytes.
+        # Without a name and a time in the header, the same run gives the same bytes.
         gzip.GzipFile("", "wb", 6, raw, mtime=0) as packed,
         io.TextIOWrapper(packed, encoding="utf-8", newline="") as text,
     ):

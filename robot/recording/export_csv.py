@@ -1,8 +1,7 @@
-"""A run as CSV that eye-tracking tools and spreadsheets open: samples, events, fixations.
+"""Export of a run as CSV for eye-tracking tools and spreadsheets: samples, events, fixations.
 
-Angles and signs are those of gazerig.robot.recording.gaze_angles; an empty cell is a lost eye.
-Beside
-the samples stands what they rest on, as JSON: servos that measured, or such as tell nothing.
+Angles and signs are those of gazerig.robot.recording.gaze_angles. An empty cell is a lost eye.
+A JSON file next to the samples lists which of them were measured and which were estimated.
 """
 
 import csv
@@ -32,7 +31,7 @@ _LABELS = ("event", "movement", "target", "part")
 
 EVENTS = ("onset_s", "duration_s", "event", "amplitude_deg", "peak_deg_s", "target", "part")
 FIXATIONS = ("start_s", "duration_s", "part", "target")
-"""As `gazerig fit-scanpath` reads them; a pursued part is a fixated one here."""
+"""Columns that `gazerig fit-scanpath` reads; a pursued part counts as a fixated one."""
 
 
 def write_csv(
@@ -42,12 +41,17 @@ def write_csv(
     stem: Path,
     force: bool = False,
 ) -> tuple[Path, ...]:
-    """Write STEM_samples.csv, _events.csv, _fixations.csv and _samples.json; give their paths.
+    """Write STEM_samples.csv, _events.csv, _fixations.csv and _samples.json; return their paths.
 
-    force: replace files that are there
+    Args:
+        trace: Gaze angles of the run.
+        labels: Labels of the samples.
+        stretches: Labelled intervals in the order of their onsets.
+        stem: Path and first part of the file names.
+        force: Replace existing files.
 
     Raises:
-        SetupError: one already exists or cannot be written.
+        SetupError: A file exists or cannot be written.
     """
     refuse_existing(*csv_files(stem), force=force)
     made = (
@@ -60,7 +64,7 @@ def write_csv(
         for kind, names, rows in made
     )
     beside = stem.with_name(f"{stem.name}_samples.json")
-    write_file(beside, json.dumps(_rests_on(trace), indent=2) + "\n", force)
+    write_file(beside, json.dumps(_basis_by_column(trace), indent=2) + "\n", force)
     return (*tables, beside)
 
 
@@ -73,15 +77,16 @@ def csv_files(stem: Path) -> tuple[Path, ...]:
 def columns(joints: Collection[str]) -> tuple[str, ...]:
     """Return the columns of the samples of a rig with these joints.
 
-    x_deg, y_deg: the cyclopean gaze; lids: 0 shut .. 1 open; event: blink, else the movement;
-    target, part: what the eyes are on, and in a saccade what they go to
+    ``x_deg`` and ``y_deg`` are the cyclopean gaze. Lids are 0 shut .. 1 open. ``event`` is
+    "blink" during a blink, else the movement. ``target`` and ``part`` are the fixated object,
+    and during a saccade its destination.
     """
     there = [name for joint, name in (_HEAD | _LIDS).items() if joint in joints]
     return (*_GAZE, *there, *_LABELS)
 
 
-def _rests_on(trace: GazeAngles) -> dict[str, object]:
-    """Return for each group of columns whether it was measured."""
+def _basis_by_column(trace: GazeAngles) -> dict[str, object]:
+    """Return for each group of columns whether it was measured or estimated."""
     gaze = {"x_deg y_deg": "cyclopean", "left_*_deg": "left", "right_*_deg": "right"}
     more = {"head_*_deg": ("head", _HEAD), "*_lid": ("lids", _LIDS)}
     there = {
@@ -97,7 +102,7 @@ def _rests_on(trace: GazeAngles) -> dict[str, object]:
 
 
 def number(value: float | None, decimals: int = 4) -> str:
-    """Write a number, "" where there is none."""
+    """Format a number, "" for None, NaN and infinity."""
     return "" if value is None or not isfinite(value) else f"{value:.{decimals}f}"
 
 
@@ -140,7 +145,7 @@ def _event_row(stretch: LabelledInterval) -> list[str]:
 
 
 def _fixation_rows(stretches: Sequence[LabelledInterval]) -> Iterator[list[str]]:
-    """Return one row a stay: fixation and pursuit of one part without a saccade are one."""
+    """Return one row per fixation, joined with pursuits of the same part up to a saccade."""
     stay: LabelledInterval | None = None
     for s in (s for s in stretches if s.event != "blink"):
         rests = s.event in ("fixation", "pursuit")

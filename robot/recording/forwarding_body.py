@@ -1,4 +1,4 @@
-"""A body that stands before another one."""
+"""A body that wraps another one."""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,21 +9,21 @@ from gazerig.robot.model.types import JointAngles
 
 
 class ForwardingBody(Body):
-    """Forwards every call to the body behind it; subclasses add to that."""
+    """A body that forwards every call to the wrapped body."""
 
     def __init__(self, body: Body) -> None:
-        # Not set up as a body of its own: it has no joints, only the other's.
+        # The initializer of Body is not called: the joints are those of the wrapped body.
         self.bus, self.names = body.bus, body.names
         self._body = body
 
     def retune(
         self, joints: Mapping[str, JointParams], gentle_deg_s: float
     ) -> dict[int, tuple[float, float]]:
-        """Count angles otherwise from now on."""
+        """Apply new joint parameters."""
         return self._body.retune(joints, gentle_deg_s)
 
     def reach(self) -> tuple[JointLimit, ...]:
-        """Return the ranges and speeds that servos keep to as they were set up."""
+        """Return the ranges and speeds that the servos are configured to keep."""
         return self._body.reach()
 
     def write(self, command_rad: JointAngles) -> None:
@@ -35,13 +35,13 @@ class ForwardingBody(Body):
         return self._body.angles(steps)
 
     def disable_torque(self) -> None:
-        """Torque off at once.
+        """Switch the torque off immediately.
 
         Raises:
-            BusLost: the port is gone.
+            BusLost: The port is gone.
         """
         self._body.disable_torque()
 
     def stop(self) -> tuple[str, ...]:
-        """Torque off and close the bus; return what the bus says of it."""
+        """Switch the torque off and close the bus; return the bus's messages."""
         return self._body.stop()

@@ -1,15 +1,15 @@
-"""Ticks of a run -> what an eye tracker would have measured: angles in degrees, a column each.
+"""Gaze angles of a run in degrees, one column each, as an eye tracker would measure them.
 
-One definition for all exports. Angles are of lines of sight in space, not in the head:
+All exports use this definition. Angles are those of lines of sight in space, not in the head:
 
-x  yaw, the turn about the upright axis of the world, + to the robot's own left
-y  pitch above the level, + up
+x  yaw, the rotation about the vertical axis of the world, + to the robot's own left
+y  pitch above the horizontal, + up
 
-0, 0 is level and straight ahead of the base. The cyclopean gaze is the mean of both eyes'
-unit lines of sight. These are angles of Fick: a turn in x of 1 deg moves the gaze by
-cos(y) deg. Where a servo that an angle rests on gave no fresh answer in a tick, the angle is
-NaN: the eye was lost, as an eye tracker says it. So is what the rig has no joint for. Angles of
-servos that tell nothing are estimated: their goals, moved by the speeds they are known to have.
+0, 0 is horizontal and straight ahead of the base. The cyclopean gaze is the mean of both eyes'
+unit lines of sight. These are Fick angles: a rotation in x of 1 deg moves the gaze by cos(y) deg.
+An angle is NaN (the eye tracker's "lost") in a tick in which one of its servos did not answer,
+and in all ticks if the rig lacks the joint. Angles of servos without feedback are estimated:
+their goals, moved at the servos' known speeds.
 """
 
 from array import array
@@ -30,24 +30,24 @@ from gazerig.robot.model.commands import REPEATED, Command, Jog, Stop
 Ints = NDArray[np.int64]
 
 MOVEMENTS = ("", "fixation", "saccade", "pursuit")
-"""What eyes do; "" if unknown, as they were moved by hand or stood without torque."""
+"""Movements of the eyes; "" if unknown: they were moved by hand or had no torque."""
 
 _CODE = {"fixate": 1, "saccade": 2, "pursue": 3}
-_ARRIVED_RAD = 0.009  # half a degree: nearer than that a new target needs no saccade
+_ARRIVED_RAD = 0.009  # half a degree: a new target within this distance needs no saccade
 _NECK_AXES = ("neck_yaw", "neck_pitch", "neck_roll")
 _LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
 _NECK = frozenset(_NECK_AXES)
 _BOTH = _NECK | {"eyes_pan", "eyes_tilt"}
 _LEFT = _BOTH | {"left_eye_pan", "left_eye_tilt"}
 _RIGHT = _BOTH | {"right_eye_pan", "right_eye_tilt"}
-_RESTS_ON = {
+_JOINTS_OF = {
     "left": _LEFT, "right": _RIGHT, "cyclopean": _LEFT | _RIGHT, "head": _NECK,
     "lids": frozenset(_LIDS),
 }  # fmt: skip
 _LOST: Angles2 = (nan, nan)
 
 
-class InSpace(NamedTuple):
+class GazeDirections(NamedTuple):
     """Lines of sight in space: (x, y) each, degrees, + left and + up."""
 
     left_deg: Angles2
@@ -56,24 +56,28 @@ class InSpace(NamedTuple):
 
 
 class GazeTarget(NamedTuple):
-    """What the gaze rests on or goes to: kind and id, and the part of a face, "" elsewhere."""
+    """A target of the gaze: kind and id, and the part of a face, "" for other targets."""
 
     target: str
     part: str
 
 
 class GazeAngles(NamedTuple):
-    """One run as columns of n ticks.
+    """The columns of a run of n ticks.
 
-    start_s: clock of the rig at the first tick; time_s: (n,) since then
-    left_deg, right_deg, cyclopean_deg: (n, 2) x and y as the servos have them, NaN where lost
-    head_deg: (n, 3) yaw + left, pitch + up, roll + right ear down, NaN without such a joint
-    lids, lower_lids: (n, 2) left and right, 0 shut .. 1 open, NaN without such a joint
-    planned_deg: (n, 2) cyclopean x and y that were desired
-    movement: (n,) index in MOVEMENTS, as planned; blink: (n,) whether one was planned
-    looked_at: (n,) index in names, as planned
-    messages: what happened and was asked for, (time_s, words) in command
-    joints: names of the rig's joints; estimated: those whose servos tell nothing
+    Attributes:
+        start_s: Clock of the rig at the first tick.
+        time_s: (n,) Time since the first tick.
+        left_deg, right_deg, cyclopean_deg: (n, 2) x and y at the servos' positions, NaN if lost.
+        head_deg: (n, 3) Yaw + left, pitch + up, roll + right ear down, NaN without such a joint.
+        lids, lower_lids: (n, 2) Left and right, 0 shut .. 1 open, NaN without such a joint.
+        planned_deg: (n, 2) Desired cyclopean x and y.
+        movement: (n,) Planned movement as an index in MOVEMENTS.
+        blink: (n,) Whether a blink was planned.
+        looked_at: (n,) Planned target as an index in ``names``.
+        messages: Events and commands in order, (time_s, text).
+        joints: Names of the rig's joints.
+        estimated: Names of the joints whose servos have no feedback.
     """
 
     start_s: float
@@ -95,25 +99,25 @@ class GazeAngles(NamedTuple):
 
     @property
     def rate_hz(self) -> float:
-        """Return the usual rate of the ticks."""
+        """Return the median rate of the ticks."""
         return 1.0 / float(np.median(np.diff(self.time_s)))
 
     def basis(self, of: str) -> Basis:
         """Return whether "left", "right" or "cyclopean" gaze, "head" or "lids" are measured."""
-        return basis_of(self.joints, self.estimated, _RESTS_ON[of].__contains__)
+        return basis_of(self.joints, self.estimated, _JOINTS_OF[of].__contains__)
 
 
-def in_space(pose: GazeState) -> InSpace:
-    """Return where both eyes and the cyclopean gaze point in space."""
+def gaze_in_space(pose: GazeState) -> GazeDirections:
+    """Return the directions of both eyes and of the cyclopean gaze in space."""
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
-    return InSpace(_degrees(left), _degrees(right), _degrees(add(left, right)))
+    return GazeDirections(_degrees(left), _degrees(right), _degrees(add(left, right)))
 
 
-def trace_of(ticks: Iterable[Tick]) -> GazeAngles:
-    """Gather the columns of a run.
+def collect_gaze_angles(ticks: Iterable[Tick]) -> GazeAngles:
+    """Collect the columns of a run.
 
     Raises:
-        ValueError: there are fewer than two ticks.
+        ValueError: There are fewer than two ticks.
     """
     tracing = GazeAnglesBuilder()
     for tick in ticks:
@@ -122,7 +126,7 @@ def trace_of(ticks: Iterable[Tick]) -> GazeAngles:
 
 
 class GazeAnglesBuilder:
-    """Gathers one run, tick by tick; some 200 bytes a tick."""
+    """A builder of one run's columns, tick by tick; it needs about 200 bytes per tick."""
 
     def __init__(self) -> None:
         self._angles = array("d")
@@ -142,7 +146,7 @@ class GazeAnglesBuilder:
         if self._start_s is None:
             self._start_s = tick.t_s
         pose, missing = tick.pose, tick.joints.missing
-        left, right, cyclopean = in_space(pose)
+        left, right, cyclopean = gaze_in_space(pose)
         planned = _degrees(sub(tick.gaze.gaze_point_world_m, pose.p_world_head_m))
         lids = (pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right)
         head = tuple(map(degrees, head_in_space(pose)))
@@ -163,10 +167,10 @@ class GazeAnglesBuilder:
         self._codes.extend((movement, tick.gaze.blink and known, self._number(tick)))
 
     def trace(self) -> GazeAngles:
-        """Return the columns so far.
+        """Return the columns of the ticks added up to now.
 
         Raises:
-            ValueError: there are fewer than two ticks.
+            ValueError: There are fewer than two ticks.
         """
         a = np.array(self._angles).reshape(-1, 16)
         codes = np.array(self._codes, np.int64).reshape(-1, 3)
@@ -192,15 +196,15 @@ class GazeAnglesBuilder:
                 self._jogged = bool(command.angles_rad)
             elif isinstance(command, Stop):
                 self._jogged = False
-        if self._led and not tick.led:  # by a lapse, which no command tells
+        if self._led and not tick.led:  # a timeout, for which there is no command
             self._jogged = False
         self._led = tick.led
 
     def _number(self, tick: Tick) -> int:
-        """Return the number of what the eyes are on, which a new target is only once they go there.
+        """Return the number of the target that the eyes are on or move to.
 
-        The gaze goes to a new target with a saccade, after its latency; without one only
-        where the new target is so near that it needs none.
+        The gaze moves to a new target with a saccade, after its latency. A new target within
+        half a degree needs no saccade.
         """
         target, fixated = tick.target, self._fixated
         if fixated is None or tick.gaze.saccades != self._saccades:

@@ -1,8 +1,7 @@
-"""What the eyes did, sample by sample and stretch by stretch: saccade, fixation, pursuit, blink.
+"""Labels of samples and intervals of a run: saccade, fixation, pursuit, blink.
 
-Nothing is detected: the models know what they do, and say so in every tick. The servos
-follow a little later, so the plan is moved by the lag at which it fits the measured gaze
-best.
+The labels are not detected: the models report their movement in every tick. The servos follow
+the plan with a lag, so the plan is shifted by the lag at which it best fits the measured gaze.
 Amplitudes and speeds are measured.
 """
 
@@ -16,17 +15,18 @@ from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles, GazeTarge
 
 LONGEST_LAG_S = 0.1
 SHORTEST_PURSUIT_S = 0.1
-"""A target's velocity flickers about the smallest that counts as motion; what is shorter than
-this is taken as part of what is around it."""
+"""A target's velocity fluctuates about the motion threshold; a shorter pursuit is part of the
+movements around it."""
 
 _LAGS_S = np.arange(0.0, LONGEST_LAG_S, 0.001)
 _FIXATION, _SACCADE, _PURSUIT = 1, 2, 3
 
 
 class Labels(NamedTuple):
-    """What the measured samples show; columns as in Trace, moved by the lag.
+    """Labels of the measured samples: the columns of GazeAngles, shifted by the lag.
 
-    lag_s: from the plan to its measured motion
+    Attributes:
+        lag_s: Time from the plan to its measured motion.
     """
 
     lag_s: float
@@ -35,7 +35,7 @@ class Labels(NamedTuple):
     looked_at: Ints
 
     def event(self) -> list[str]:
-        """Return one word a sample: "blink" under a blink, else what the eyes do."""
+        """Return one word per sample: "blink" during a blink, else the movement."""
         labels = np.array(MOVEMENTS, dtype=object)[self.movement]
         return list(np.where(self.blink, "blink", labels))
 
@@ -43,10 +43,12 @@ class Labels(NamedTuple):
 class LabelledInterval(NamedTuple):
     """One saccade, fixation, pursuit or blink.
 
-    onset_s: since the first tick
-    amplitude_deg: great circle from its first to its last sample, peak_deg_s: the fastest in it,
-        both of the cyclopean gaze as measured, None where it was lost, and of a blink
-    looked_at: where a saccade goes, else what the eyes are on
+    Attributes:
+        onset_s: Time since the first tick.
+        amplitude_deg: Great circle from the first to the last sample of the measured cyclopean
+            gaze, None if it was lost and for a blink.
+        peak_deg_s: Highest speed of the measured cyclopean gaze, None as for the amplitude.
+        looked_at: Destination of a saccade, else the target that the eyes are on.
     """
 
     onset_s: float
@@ -57,20 +59,21 @@ class LabelledInterval(NamedTuple):
     looked_at: GazeTarget
 
 
-def labels_of(trace: GazeAngles) -> Labels:
-    """Label a trace's samples."""
-    lag_s = lag_of(trace)
+def label_samples(trace: GazeAngles) -> Labels:
+    """Label the samples of a run."""
+    lag_s = estimate_lag(trace)
     source = np.searchsorted(trace.time_s, trace.time_s - lag_s + 1e-9, side="right") - 1
     source = np.maximum(source, 0)
-    movement = _steadied(trace.movement[source], trace.time_s)
+    movement = _relabel_short(trace.movement[source], trace.time_s)
     return Labels(lag_s, movement, trace.blink[source], trace.looked_at[source])
 
 
-def lag_of(trace: GazeAngles) -> float:
+def estimate_lag(trace: GazeAngles) -> float:
     """Return the lag of the measured gaze behind the planned one, 0 .. LONGEST_LAG_S.
 
-    That at which the speeds of both correlate best during saccades and just after: speeds,
-    as the gaze may be off by a constant, and saccades, as at rest all lags fit alike.
+    It is the lag at which the speeds of both correlate best during and just after saccades.
+    Speeds are compared because the gaze may have a constant offset. Saccades are compared
+    because all lags fit a gaze at rest equally well.
     """
     jumps = trace.movement == _SACCADE
     if not jumps.any():
@@ -85,32 +88,32 @@ def lag_of(trace: GazeAngles) -> float:
     fits = []
     for lag in _LAGS_S:
         moved = np.interp(t[near] - lag, t, planned)
-        # A plan that stands still in all samples has no correlation.
+        # A constant plan has no correlation.
         fits.append(np.corrcoef(moved, seen[near])[0, 1] if np.ptp(moved) > 0.0 else -1.0)
     return float(_LAGS_S[int(np.argmax(fits))])
 
 
-def stretches_of(trace: GazeAngles, labels: Labels) -> tuple[LabelledInterval, ...]:
-    """Return all stretches in the order of their onsets; a blink overlaps what the eyes do."""
+def find_intervals(trace: GazeAngles, labels: Labels) -> tuple[LabelledInterval, ...]:
+    """Return all intervals in the order of their onsets; blinks overlap movements."""
     key = labels.movement * len(trace.names) + labels.looked_at
-    # A target that changes under way does not make two saccades of one.
+    # A target that changes during a saccade does not split the saccade.
     key = np.where(labels.movement == _SACCADE, -1, key)
     speed = speed_deg_s(trace.time_s, trace.cyclopean_deg)
     found = [
-        _stretch(trace, labels, speed, first, last)
+        _movement_interval(trace, labels, speed, first, last)
         for first, last in _runs(key)
         if labels.movement[first]
     ]
     found += [
-        _blink(trace, labels, first, last)
+        _blink_interval(trace, labels, first, last)
         for first, last in _runs(labels.blink.astype(np.int64))
         if labels.blink[first]
     ]
     return tuple(sorted(found, key=lambda s: (s.onset_s, s.event)))
 
 
-def _steadied(movement: Ints, time_s: Floats) -> Ints:
-    """Relabel short pursuits as fixations, and short fixations inside a pursuit as pursuit."""
+def _relabel_short(movement: Ints, time_s: Floats) -> Ints:
+    """Relabel short pursuits as fixations, and short fixations within a pursuit as pursuit."""
     out = movement.copy()
     for wanted, other in ((_PURSUIT, _FIXATION), (_FIXATION, _PURSUIT)):
         for first, last in _runs(out):
@@ -130,14 +133,14 @@ def _runs(key: Ints) -> list[tuple[int, int]]:
     return list(zip(firsts, [*(b - 1 for b in breaks.tolist()), len(key) - 1], strict=True))
 
 
-def _stretch(
+def _movement_interval(
     trace: GazeAngles, labels: Labels, speed: Floats, first: int, last: int
 ) -> LabelledInterval:
-    amplitude = _apart_deg(trace.cyclopean_deg[first], trace.cyclopean_deg[last])
+    amplitude = _great_circle_deg(trace.cyclopean_deg[first], trace.cyclopean_deg[last])
     peak = float(np.max(speed[first : last + 1]))
     return LabelledInterval(
         float(trace.time_s[first]),
-        _until(trace, last) - float(trace.time_s[first]),
+        _end_of_interval(trace, last) - float(trace.time_s[first]),
         MOVEMENTS[labels.movement[first]],
         amplitude if np.isfinite(amplitude) else None,
         peak if np.isfinite(peak) else None,
@@ -145,30 +148,30 @@ def _stretch(
     )
 
 
-def _blink(trace: GazeAngles, labels: Labels, first: int, last: int) -> LabelledInterval:
+def _blink_interval(trace: GazeAngles, labels: Labels, first: int, last: int) -> LabelledInterval:
     onset_s = float(trace.time_s[first])
-    duration_s = _until(trace, last) - onset_s
+    duration_s = _end_of_interval(trace, last) - onset_s
     return LabelledInterval(
         onset_s, duration_s, "blink", None, None, trace.names[labels.looked_at[first]]
     )
 
 
-def _until(trace: GazeAngles, last: int) -> float:
-    """Return when the sample after the last one of a stretch was taken."""
+def _end_of_interval(trace: GazeAngles, last: int) -> float:
+    """Return the time of the sample after the last one of an interval."""
     if last + 1 < len(trace.time_s):
         return float(trace.time_s[last + 1])
     return float(trace.time_s[last]) + 1.0 / trace.rate_hz
 
 
 def speed_deg_s(time_s: Floats, gaze_deg: Floats) -> Floats:
-    """Return the angular speed (n,) of a gaze (n, 2) over two samples each."""
+    """Return the angular speed (n,) of a gaze (n, 2), each over two sample intervals."""
     x, y = gaze_deg.T
     dx, dy = np.gradient(x, time_s), np.gradient(y, time_s)
     speed: Floats = np.hypot(dx * np.cos(np.radians(y)), dy)
     return speed
 
 
-def _apart_deg(a_deg: Floats, b_deg: Floats) -> float:
+def _great_circle_deg(a_deg: Floats, b_deg: Floats) -> float:
     """Return the great-circle angle between two directions (x, y)."""
     (xa, ya), (xb, yb) = np.radians(a_deg), np.radians(b_deg)
     # Haversine: exact for small angles.

@@ -1,7 +1,7 @@
-"""Listens to the machine: notes what enters a run beside the reading of every tick.
+"""Recording of the servos' inputs to a run other than the reading of each tick.
 
-The goals at torque-on, a second reading in one tick and a refusal are decisions' food as
-well; with them a recorded run can be done again to the bit.
+The goals at torque-on, a second reading in one tick and a refused torque also affect
+decisions. With them a recorded run can be repeated bit for bit.
 """
 
 from collections.abc import Callable
@@ -19,30 +19,30 @@ from gazerig.robot.recording.tick_record import (
 
 
 class JointRecorder(ForwardingBody):
-    """A body before a body: every call goes on to it, and what it gives is noted."""
+    """A body that forwards every call and records the results."""
 
     def __init__(self, body: Body, note: Callable[[BodyRecord], None]) -> None:
         super().__init__(body)
         self._note = note
 
     def start(self) -> JointAngles:
-        """Start the machine; note the goals."""
+        """Start the machine and record the goals."""
         goals = self._body.start()
         self._note(TorqueEnabled(goals))
         return goals
 
     def read(self, t_s: float) -> JointState:
-        """Read all joints; note them."""
+        """Read all joints and record them."""
         joints = self._body.read(t_s)
         self._note(MeasuredJoints(t_s, joints))
         return joints
 
     def enable_torque(self) -> JointAngles:
-        """Torque on again; note the goals, or why there are none.
+        """Switch the torque on again and record the goals or the refusal.
 
         Raises:
-            SetupError: a servo does not answer, refuses or has latched a fault.
-            BusLost: the port is gone.
+            SetupError: A servo does not answer, refuses or has latched a fault.
+            BusLost: The port is gone.
         """
         try:
             goals = self._body.enable_torque()

@@ -1,6 +1,7 @@
-"""Where a recording is being looked at: play, pause, speed, seek, step. Time is an argument.
+"""Playback position of a recording: play, pause, speed, seek, step.
 
-``now_s`` is the watcher's clock, ``at_s`` seconds since the recording's first tick.
+``now_s`` is the viewer's clock and always an argument; ``at_s`` are seconds since the
+recording's first tick.
 """
 
 from bisect import bisect_left, bisect_right
@@ -14,7 +15,7 @@ _SAME_S = 1e-6
 
 
 class Mark(NamedTuple):
-    """Something to step to: kind is "saccade", "blink" or "event", words say what."""
+    """A position to step to: kind is "saccade", "blink" or "event", words describe it."""
 
     at_s: float
     kind: str
@@ -25,9 +26,10 @@ STEPS = tuple(f"{way} {kind}" for kind in MARK_KINDS for way in ("previous", "ne
 
 
 class PlaybackState(NamedTuple):
-    """Where a player stands.
+    """The state of a player.
 
-    sought_s: the place that was last asked for, None before
+    Attributes:
+        sought_s: Last requested position, None before the first request.
     """
 
     at_s: float
@@ -38,7 +40,7 @@ class PlaybackState(NamedTuple):
 
 
 class PlaybackClock:
-    """Plays one recording; begins at its beginning, standing still."""
+    """The clock of one recording's playback; it starts paused at the beginning."""
 
     def __init__(self, duration_s: float, marks: Sequence[Mark] = ()) -> None:
         self._duration_s = duration_s
@@ -48,51 +50,51 @@ class PlaybackClock:
         self._sought_s: float | None = None
 
     def state(self, now_s: float) -> PlaybackState:
-        """Return where it stands; at the end it stops."""
+        """Return the present state; playback pauses at the end."""
         at_s = self._from_s
         if self._playing:
             at_s += (now_s - self._since_s) * self._speed
             if at_s >= self._duration_s:
-                self._stand(self._duration_s, now_s)
+                self._set_position(self._duration_s, now_s)
                 self._playing, at_s = False, self._duration_s
         return PlaybackState(at_s, self._duration_s, self._playing, self._speed, self._sought_s)
 
     def play(self, now_s: float) -> None:
-        """Go on; from the end it starts again."""
+        """Play; at the end, start again from the beginning."""
         at_s = self.state(now_s).at_s
-        self._stand(0.0 if at_s >= self._duration_s - _SAME_S else at_s, now_s)
+        self._set_position(0.0 if at_s >= self._duration_s - _SAME_S else at_s, now_s)
         self._playing = True
 
     def pause(self, now_s: float) -> None:
-        """Stand still."""
-        self._stand(self.state(now_s).at_s, now_s)
+        """Pause at the present position."""
+        self._set_position(self.state(now_s).at_s, now_s)
         self._playing = False
 
     def seek(self, at_s: float, now_s: float) -> None:
-        """Go to a place, the nearer end where it is outside; playing goes on from there."""
-        self.state(now_s)  # at the end it has stopped
+        """Move to a position, limited to the recording; playback continues from there."""
+        self.state(now_s)  # pauses a playback that has reached the end
         self._sought_s = at_s
-        self._stand(min(max(at_s, 0.0), self._duration_s), now_s)
+        self._set_position(min(max(at_s, 0.0), self._duration_s), now_s)
 
-    def go_at(self, speed: float, now_s: float) -> None:
-        """Play at another speed from now on.
+    def set_speed(self, speed: float, now_s: float) -> None:
+        """Set the playback speed.
 
         Raises:
-            ValueError: it is outside of what there is.
+            ValueError: The speed is outside of SPEEDS.
         """
         if not SPEEDS[0] <= speed <= SPEEDS[-1]:
             raise ValueError(f"speed {speed:g} is not between {SPEEDS[0]:g} and {SPEEDS[-1]:g}")
-        self._stand(self.state(now_s).at_s, now_s)
+        self._set_position(self.state(now_s).at_s, now_s)
         self._speed = speed
 
     def step(self, where: str, now_s: float) -> None:
-        """Stand still at the next or previous saccade, blink or event.
+        """Pause at the next or previous saccade, blink or event.
 
         Raises:
-            ValueError: there is none, or no such step; the message lists what there is.
+            ValueError: There is no further one, or ``where`` is not in STEPS.
         """
         if where not in STEPS:
-            raise ValueError(f"no step {where!r}; there is {', '.join(STEPS)}")
+            raise ValueError(f"no step {where!r}; choose from {', '.join(STEPS)}")
         way, kind = where.split()
         at_s, times = self.state(now_s).at_s, self._marks[kind]
         if way == "next":
@@ -101,32 +103,32 @@ class PlaybackClock:
             i = bisect_left(times, at_s - _SAME_S) - 1
         if not 0 <= i < len(times):
             raise ValueError(f"there is no {where}")
-        self._stand(times[i], now_s)
+        self._set_position(times[i], now_s)
         self._playing = False
 
-    def obey(self, asked: object, now_s: float) -> None:
-        """Do what the page asks for: play (true or false), seek_s, speed or step.
+    def handle_request(self, request: object, now_s: float) -> None:
+        """Apply a request of the page: play (true or false), seek_s, speed or step.
 
         Raises:
-            ValueError: it cannot be done; the message says why.
+            ValueError: The request is invalid; the message gives the reason.
         """
-        match asked:
+        match request:
             case {"play": bool(play), **rest} if not rest:
                 (self.play if play else self.pause)(now_s)
             case {"seek_s": int() | float() as at_s, **rest} if not rest and _real(at_s):
                 self.seek(float(at_s), now_s)
             case {"speed": int() | float() as speed, **rest} if not rest and _real(speed):
-                self.go_at(float(speed), now_s)
+                self.set_speed(float(speed), now_s)
             case {"step": str(where), **rest} if not rest:
                 self.step(where, now_s)
             case _:
                 raise ValueError(
-                    f"{asked!r:.80} cannot be meant: a replay takes one of play (true or false), "
+                    f"{request!r:.80} is invalid: a replay takes one of play (true or false), "
                     "seek_s (seconds), speed and step"
                 )
 
-    def _stand(self, at_s: float, now_s: float) -> None:
-        """Count from this place and this time on."""
+    def _set_position(self, at_s: float, now_s: float) -> None:
+        """Set the position at a time."""
         self._from_s, self._since_s = at_s, now_s
 
 

@@ -1,4 +1,4 @@
-"""The machine of a recorded run: gives the models what the real one gave them, in order."""
+"""Body, perception and camera of a recorded run: they return the recorded values in order."""
 
 from collections import deque
 from typing import TypeVar
@@ -25,38 +25,38 @@ H = TypeVar("H", bound=BodyRecord)
 
 
 class PlaybackBody(ForwardingBody):
-    """A body that follows commands, and reports what the recorded one reported.
+    """A body that forwards commands and returns the recorded readings.
 
-    The body behind it sees every call, so that its bus carries the bytes of the first run.
+    The wrapped body receives every call, so that its bus carries the bytes of the first run.
     """
 
     def __init__(self, body: Body) -> None:
         super().__init__(body)
-        self._moment: TickRecord | None = None
-        self._said: deque[BodyRecord] = deque()
+        self._record: TickRecord | None = None
+        self._records: deque[BodyRecord] = deque()
         self._newest: JointState | None = None
 
     def play(self, moment: TickRecord) -> None:
-        """Set what is returned until the end of a tick; once for each tick."""
-        if moment is not self._moment:
-            self._moment = moment
-            self._said = deque(
+        """Set the values that are returned until the end of a tick; call once per tick."""
+        if moment is not self._record:
+            self._record = moment
+            self._records = deque(
                 (*moment.before, MeasuredJoints(moment.tick.t_s, moment.tick.joints))
             )
 
-    def leave_off(self) -> None:
-        """Return from now on what the wrapped body returns."""
-        self._said.clear()
+    def stop_playback(self) -> None:
+        """Return the values of the wrapped body from now on."""
+        self._records.clear()
         self._newest = None
 
     def start(self) -> JointAngles:
-        """Start the body behind; give the recorded goals."""
+        """Start the wrapped body; return the recorded goals."""
         goals = self._body.start()
         said = self._next(TorqueEnabled)
         return said.goals_rad if said is not None else goals
 
     def read(self, t_s: float) -> JointState:
-        """Return the recorded joints; a reading more than there were gives the newest again."""
+        """Return the recorded joints; a further reading returns the newest again."""
         joints = self._body.read(t_s)
         said = self._next(MeasuredJoints)
         if said is not None:
@@ -64,33 +64,34 @@ class PlaybackBody(ForwardingBody):
         return self._newest if self._newest is not None else joints
 
     def enable_torque(self) -> JointAngles:
-        """Torque on again; give the recorded goals.
+        """Switch the torque on again; return the recorded goals.
 
         Raises:
-            SetupError: it was refused then.
+            SetupError: The recorded body refused.
         """
-        refused = next((one for one in self._said if isinstance(one, TorqueRefused)), None)
+        refused = next((one for one in self._records if isinstance(one, TorqueRefused)), None)
         if refused is not None:
-            self._said.remove(refused)
+            self._records.remove(refused)
             raise SetupError(refused.why)
         goals = self._body.enable_torque()
         said = self._next(TorqueEnabled)
         return said.goals_rad if said is not None else goals
 
     def _next(self, kind: type[H]) -> H | None:
-        """Return the next thing of a kind; what comes before it was not asked for."""
-        if not any(isinstance(one, kind) for one in self._said):
+        """Return the next record of a kind and drop the unread ones before it."""
+        if not any(isinstance(one, kind) for one in self._records):
             return None
         while True:
-            one = self._said.popleft()
+            one = self._records.popleft()
             if isinstance(one, kind):
                 return one
 
 
 class PlaybackPerception(Perception):
-    """Sees what was seen, placed in the world as it was then.
+    """A perception that returns the recorded percept.
 
-    percept: in force from now on
+    Attributes:
+        percept: The percept to return.
     """
 
     def __init__(self, mount: CameraMount, horizontal_field_deg: float) -> None:
@@ -103,10 +104,10 @@ class PlaybackPerception(Perception):
 
 
 class NoCamera:
-    """A camera that sees nothing: what was seen is known."""
+    """A camera without frames: the recording contains the percepts."""
 
     def open(self) -> None:
-        """Start looking."""
+        """Open nothing."""
 
     def latest(self, now_s: float) -> Detections | None:
         """Return nothing."""
@@ -117,4 +118,4 @@ class NoCamera:
         return ()
 
     def close(self) -> None:
-        """Stop looking."""
+        """Close nothing."""

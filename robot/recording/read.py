@@ -1,4 +1,4 @@
-"""A recorded run, read as it was; what a killed program left counts up to its end."""
+"""Reader of a recorded run; the recording of a killed program is read as far as it is complete."""
 
 import base64
 import struct
@@ -22,34 +22,41 @@ from gazerig.drivers.files.mcap_file import MAGIC, open_mcap
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import run_format as fmt
-from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, unpacked
-from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
+from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, decompress_chunk
+from gazerig.robot.recording.run_info import (
+    FORMAT,
+    PROFILE,
+    RunEnd,
+    RunInfo,
+    read_run_end,
+    read_run_info,
+)
 from gazerig.robot.recording.tick_record import TickRecord, from_json, percept_from_json
-from gazerig.robot.recording.world_info import WorldInfo, world_of
+from gazerig.robot.recording.world_info import WorldInfo, read_world_info
 
 _CURE = "make one with gazerig run --record"
 _CAMERA = "gazerig-camera-"
 _RUN = PROFILE.rstrip("0123456789")
-_HEAD = 9  # bytes of a record before its content: kind and length
+_HEAD = 9  # bytes of a record's header: kind and length
 _LARGEST = LARGEST_BYTES + 1000  # bytes of a record; more is damage
 _CRC_PIECE = 1 << 20
 _LONGEST_GAP_S = 3600.0  # between two ticks; more is damage
 _FIXED = 22  # bytes of a message before its data: channel, sequence, two times
-_PERCEPTS_KEPT = 8  # a tick goes by the newest, or by the one before
+_PERCEPTS_KEPT = 8  # a tick refers to the newest one or the one before it
 _KINDS = frozenset(value for name, value in vars(Opcode).items() if name.isupper())
 DAMAGE = (
     McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error, ZstdError,
     AttributeError, ArithmeticError, RecursionError, MemoryError,
 )  # fmt: skip
-"""What a file leads to that holds something else than a run."""
+"""Errors caused by a file with damaged or impossible contents."""
 
 
 class BadRecording(SetupError):
-    """A file is no recording of a run, or cannot be read further."""
+    """A file that is not a recording of a run, or cannot be read further."""
 
 
 class _ChunkIndex(NamedTuple):
-    """Where a chunk's content lies in the file, and the times of its messages."""
+    """Position of a chunk's content in the file, and the times of its messages."""
 
     offset: int
     length: int
@@ -58,20 +65,22 @@ class _ChunkIndex(NamedTuple):
 
 
 class RunRecording:
-    """A recording made by ``gazerig run --record``; reading starts again with every call.
+    """A recording made by ``gazerig run --record``; each call reads from the beginning.
 
-    path: the file
-    info: the run as it was started; end: how it ended
-    world: the simulated world that it was in, None without one and in older recordings
-    whole: the file was closed properly; else it ends where its writer was killed
-    duration_s: from the first to the last message
+    Attributes:
+        path: The file.
+        info: Settings at the start of the run.
+        end: Record of the end of the run.
+        world: The run's simulated world, None without one and in older recordings.
+        whole: Whether the file was closed properly; if not, its writer was killed.
+        duration_s: Time from the first to the last message.
     """
 
     def __init__(self, path: Path | str) -> None:
-        """Find out what the file holds; its ticks are read when they are asked for.
+        """Read the file's index; ticks are read by ``ticks`` and ``moments``.
 
         Raises:
-            BadRecording: it is absent, no recording of a run, or of a newer format.
+            BadRecording: The file is missing, not a recording of a run, or of a newer format.
         """
         self.path = Path(path)
         self.whole = False
@@ -82,23 +91,23 @@ class RunRecording:
         with open_mcap(self.path, BadRecording, _CURE) as file:
             for kind, offset, length in self._records(file):
                 if kind == Opcode.HEADER:
-                    with _damage(self.path):
+                    with _damage_errors(self.path):
                         profile = Header.read(_content(file, offset, length)).profile
-                    self._judge(profile)
+                    self._check_profile(profile)
                 elif kind == Opcode.CHUNK:
-                    with _damage(self.path):
+                    with _damage_errors(self.path):
                         first_ns, last_ns = struct.unpack("<QQ", _bytes(file, offset, 16))
                     self._chunks.append(_ChunkIndex(offset, length, first_ns, last_ns))
                 elif kind == Opcode.METADATA:
-                    with _damage(self.path):
+                    with _damage_errors(self.path):
                         record = Metadata.read(_content(file, offset, length))
-                    found = self._meet(record) or found
+                    found = self._read_metadata(record) or found
                 elif kind == Opcode.DATA_END:
                     self._check_sum(file, offset, length)
                 elif kind == Opcode.FOOTER:
                     self.whole = True
         if found is None:
-            raise BadRecording(f"{self.path} ends before it begins: nothing of the run is in it")
+            raise BadRecording(f"{self.path} is empty: it contains nothing of a run")
         self.info = found
         chunks = self._chunks
         self.duration_s = (
@@ -109,32 +118,32 @@ class RunRecording:
 
     @property
     def note(self) -> str:
-        """Return what is wrong with the recording, "" if nothing is."""
+        """Return a description of the recording's defect, "" if it has none."""
         name, lost = self.path.name, self.end.lost
         if not self.whole:
-            return f"{name} was not closed: what its writer had put on the disk is there"
+            return f"{name} was not closed: it contains what its writer had put on the disk"
         if not self.end.stopped_by:
-            return f"{name} ends where the program was killed"
+            return f"{name} ends at the time at which the program was killed"
         return f"{name} lacks {lost} ticks that could not be kept" if lost else ""
 
     def ticks(self) -> Iterator[Tick]:
-        """Return the ticks, bit for bit, but for detections and frames (``detections=None``).
+        """Return the ticks, bit for bit, without detections and frames (``detections=None``).
 
         Raises:
-            BadRecording: the file is damaged.
+            BadRecording: The file is damaged.
         """
         return (moment.tick for moment in self.moments())
 
     def moments(self) -> Iterator[TickRecord]:
-        """Return the ticks with what else entered them.
+        """Return the ticks with their further inputs.
 
         Raises:
-            BadRecording: the file is damaged.
+            BadRecording: The file is damaged.
         """
         percepts: dict[int, Percept] = {}
         before_s: float | None = None
         for topic, data in self._messages({fmt.TICK, fmt.PERCEPT}):
-            with _damage(self.path):
+            with _damage_errors(self.path):
                 message = orjson.loads(data)
                 if topic == fmt.PERCEPT:
                     number, percept = percept_from_json(message)
@@ -143,7 +152,7 @@ class RunRecording:
                         del percepts[next(iter(percepts))]
                     continue
                 moment = from_json(message, percepts)
-                _refuse_leap(before_s, moment.tick.t_s)
+                _check_time(before_s, moment.tick.t_s)
                 before_s = moment.tick.t_s
             yield moment
 
@@ -151,22 +160,22 @@ class RunRecording:
         """Return the camera's frames: time of the exposure and JPEG.
 
         Raises:
-            BadRecording: the file is damaged.
+            BadRecording: The file is damaged.
         """
         for _, data in self._messages({fmt.FRAME}):
-            with _damage(self.path):
+            with _damage_errors(self.path):
                 message = orjson.loads(data)
                 frame = float(message["captured_s"]), base64.b64decode(message["data"])
             yield frame
 
     def health(self) -> Iterator[dict[str, Any]]:
-        """Return the bus counts and the servos' figures, as recorded once a second.
+        """Return the bus counts and the servos' readings, as recorded once a second.
 
         Raises:
-            BadRecording: the file is damaged.
+            BadRecording: The file is damaged.
         """
         for _, data in self._messages({fmt.HEALTH}):
-            with _damage(self.path):
+            with _damage_errors(self.path):
                 message: dict[str, Any] = orjson.loads(data)
             yield message
 
@@ -175,28 +184,28 @@ class RunRecording:
         topics: dict[int, str] = {}
         with open_mcap(self.path, BadRecording, _CURE) as file:
             for place in self._chunks:
-                with _damage(self.path):
+                with _damage_errors(self.path):
                     chunk = Chunk.read(_content(file, place.offset, place.length))
-                    records = memoryview(unpacked(chunk))
-                    found = list(_wanted(records, topics, wanted))
+                    records = memoryview(decompress_chunk(chunk))
+                    found = list(_select_messages(records, topics, wanted))
                 yield from found
 
-    def _meet(self, record: Metadata) -> RunInfo | None:
-        """Read a metadata record; give the run's beginning where it is that."""
-        with _damage(self.path):
+    def _read_metadata(self, record: Metadata) -> RunInfo | None:
+        """Read a metadata record; return the run's settings if it contains them."""
+        with _damage_errors(self.path):
             if record.name == fmt.END:
-                self.end = end_of(record.metadata)
+                self.end = read_run_end(record.metadata)
             if record.name == fmt.WORLD:
-                self.world = world_of(record.metadata)
-            return info_of(record.metadata) if record.name == fmt.RUN else None
+                self.world = read_world_info(record.metadata)
+            return read_run_info(record.metadata) if record.name == fmt.RUN else None
 
-    def _judge(self, profile: str) -> None:
-        """Refuse what is not a recording of a run."""
+    def _check_profile(self, profile: str) -> None:
+        """Refuse a file that is not a recording of a run."""
         if profile == PROFILE:
             return
         if profile.startswith(_CAMERA):
             raise BadRecording(
-                f"{self.path} is a recording of a camera, not of a run: look at it with "
+                f"{self.path} is a recording of a camera, not of a run: play it with "
                 "gazerig run --camera-recording"
             )
         if profile.startswith(_RUN):
@@ -205,27 +214,27 @@ class RunRecording:
                 f"{FORMAT}: update gazerig"
             )
         raise BadRecording(
-            f"{self.path} is no recording of gazerig (its profile is {profile!r}): make one with "
+            f"{self.path} is not a recording of gazerig (its profile is {profile!r}): make one with "
             "gazerig run --record"
         )
 
     def _check_sum(self, file: BinaryIO, offset: int, length: int) -> None:
-        """Refuse a file of which any byte before its end is another one than was written."""
-        with _damage(self.path):
+        """Refuse a file whose bytes do not match its checksum."""
+        with _damage_errors(self.path):
             wanted = DataEnd.read(_content(file, offset, length)).data_section_crc
-        if not wanted:  # of a version that wrote none
+        if not wanted:  # an earlier version wrote none
             return
         file.seek(0)
         left, found = offset - _HEAD, 0
         while left > 0 and (piece := file.read(min(left, _CRC_PIECE))):
             found, left = zlib.crc32(piece, found), left - len(piece)
         if found != wanted:
-            raise BadRecording(f"{self.path} is damaged (wrong check sum): copy it again")
+            raise BadRecording(f"{self.path} is damaged (wrong checksum): copy it again")
 
     def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
-        """Walk over the records that are whole: kind, offset and length of each."""
+        """Return kind, offset and length of each complete record."""
         end = file.seek(0, 2)
-        # The program that wrote these bytes had written all that comes before.
+        # A file with this magic number at its end was written completely.
         closed = end > 2 * len(MAGIC) and _bytes(file, end - len(MAGIC), len(MAGIC)) == MAGIC
         offset = len(MAGIC)
         while offset + _HEAD <= end:
@@ -244,16 +253,16 @@ class RunRecording:
             raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it again")
 
 
-def _refuse_leap(before_s: float | None, t_s: float) -> None:
-    """Refuse times that no run has: exports fill gaps, and would fill years."""
+def _check_time(before_s: float | None, t_s: float) -> None:
+    """Refuse impossible times: exports fill gaps, and would fill years."""
     if not isfinite(t_s) or (before_s is not None and not 0.0 <= t_s - before_s < _LONGEST_GAP_S):
         raise ValueError(f"a tick at {t_s} s after {before_s} s")
 
 
-def _wanted(
+def _select_messages(
     records: memoryview, topics: dict[int, str], wanted: set[str]
 ) -> Iterator[tuple[str, memoryview]]:
-    """Return topic and data of the wanted messages of an unpacked chunk; learn its channels."""
+    """Return topic and data of a chunk's wanted messages; add its channels to ``topics``."""
     at = 0
     while at < len(records):
         kind, length = records[at], int.from_bytes(records[at + 1 : at + _HEAD], "little")
@@ -272,10 +281,11 @@ def _wanted(
 def used(path: Path) -> Iterator[None]:
     """Turn errors caused by impossible contents of a recording into one line.
 
-    To be put around what is made of it, as a file may be well-formed and still hold nonsense.
+    Use it around code that processes a recording: a well-formed file may contain impossible
+    values.
 
     Raises:
-        BadRecording: something that follows from damage, or from a manual edit.
+        BadRecording: The contents are damaged or were edited by hand.
     """
     try:
         yield
@@ -283,12 +293,12 @@ def used(path: Path) -> Iterator[None]:
         raise
     except DAMAGE as error:
         what = f"{type(error).__name__}: {' '.join(str(error).split())[:80]}"
-        raise BadRecording(f"{path} holds what no run gives ({what}): record again") from error
+        raise BadRecording(f"{path} contains impossible values ({what}): record again") from error
 
 
 @contextmanager
-def _damage(path: Path) -> Iterator[None]:
-    """Turn what a damaged file leads to into one line."""
+def _damage_errors(path: Path) -> Iterator[None]:
+    """Turn errors of a damaged file into one line."""
     try:
         yield
     except BadRecording:
@@ -304,5 +314,5 @@ def _bytes(file: BinaryIO, offset: int, length: int) -> bytes:
 
 
 def _content(file: BinaryIO, offset: int, length: int) -> ReadDataStream:
-    """Read a record's content."""
+    """Return a stream of a record's content."""
     return ReadDataStream(BytesIO(_bytes(file, offset, length)))

@@ -1,4 +1,4 @@
-"""Turns what the control loop hands over into the messages of a recording."""
+"""Conversion of the control loop's data into the messages of a recording."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ _VIEWED_EVERY_S = 0.0399  # a little under 40 ms, so that rounding does not turn
 
 
 class RecordRouter:
-    """Writes one run, in the order of the calls."""
+    """A writer of one run's messages in the order of the calls."""
 
     def __init__(self, writer: RunWriter) -> None:
         self._writer = writer
@@ -43,7 +43,7 @@ class RecordRouter:
             self._tick(row)
 
     def _tick(self, row: list[Any]) -> None:
-        """Write a tick, and from time to time what viewers draw."""
+        """Write a tick, and about every 40 ms the messages for viewers."""
         data = as_json(row, self._finite)
         if self._first_s is None:
             self._first_s = data["t_s"]
@@ -64,7 +64,7 @@ class RecordRouter:
         self._add(fmt.PERCEPT, data)
 
     def frame(self, captured_s: float, image: ImageArray) -> None:
-        """Write an image of the camera as JPEG."""
+        """Write a camera image as JPEG."""
         from gazerig.robot.dashboard.feed.camera_overlay import encode  # loads OpenCV
 
         first_s = self._first_s if self._first_s is not None else captured_s
@@ -72,7 +72,7 @@ class RecordRouter:
         self._add(fmt.FRAME, viewers.image(encode(image), captured_s, exposed_ns))
 
     def health(self, bus: BusHealth, lost: int) -> None:
-        """Write the counts of the bus and the servos' figures of the newest tick."""
+        """Write the bus counts and the servos' readings of the newest tick."""
         joints = JointState(*self._newest[_JOINTS]) if self._newest is not None else None
         servos = (
             {
@@ -90,7 +90,7 @@ class RecordRouter:
         return self._writer.time_ns(self._at_s)
 
     def _show(self, row: TickRow) -> None:
-        """Write what viewers draw of the newest tick."""
+        """Write the messages for viewers."""
         now_ns = self._now_ns
         joints, names = JointState(*row.joints), GuardResult(*row.guard_result).joints
         pose, gaze = GazeState(*row.pose), GazeCommand(*row.gaze)

@@ -1,8 +1,8 @@
-"""Records a run without ever making the control loop wait.
+"""Recorder of a run that never makes the control loop wait.
 
-A process of its own writes the file (gazerig.robot.recording.writer_process); ticks are handed
-over as they are, some at a time, and the loop goes on at once. The process outlives this program
-by as long as it takes to close the file.
+A separate process writes the file (gazerig.robot.recording.writer_process). The loop sends it
+ticks in batches and continues immediately. The process outlives this program until it has
+closed the file.
 """
 
 import os
@@ -31,7 +31,7 @@ from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
-from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, plain
+from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, body_record_to_plain
 from gazerig.robot.recording.world_info import WorldInfo
 from gazerig.robot.recording.writer_client import WriterClient
 
@@ -40,10 +40,11 @@ _NOTHING: Before = ()
 
 
 class Recorder:
-    """A recording of one run as the control loop sees it.
+    """A recording of one run, fed by the control loop.
 
-    lost: ticks that could not be kept
-    stream: hands the ticks on; whoever else wants them in another process joins it
+    Attributes:
+        lost: Number of ticks that were not recorded.
+        stream: Stream of the ticks to other processes; further receivers may be added.
     """
 
     def __init__(
@@ -53,10 +54,13 @@ class Recorder:
         over: bool = False,
         patient: bool = False,
     ) -> None:
-        """Prepare a recording; nothing is touched yet.
+        """Prepare a recording without creating the file.
 
-        over: an existing file is written over
-        patient: wait for the writer where it is behind, as a run in simulated time may
+        Args:
+            path: The file.
+            info: Settings of the run.
+            over: Overwrite an existing file.
+            patient: Wait for a slow writer, as a run in simulated time may.
         """
         self._path, self._target = path, Path(os.path.realpath(path))
         self._info = info
@@ -71,20 +75,20 @@ class Recorder:
         self._last_s: float | None = None
         self._seconds: float | None = None
         self._checked_s = -inf
-        self._beside: Path | None = None
-        self._opened = self._said = False
+        self._temporary: Path | None = None
+        self._opened = self._failure_reported = False
         self.lost = 0
 
     def open(self) -> None:
-        """Create the file and start the process that writes it; returns at once.
+        """Create the file and start the process that writes it, without waiting.
 
         Raises:
-            SetupError: the file exists or cannot be made.
+            SetupError: The file exists or cannot be created.
         """
         if self._over and self._path.is_file():
             beside = f".{self._target.name[:80]}-{secrets.token_hex(4)}"
-            self._beside = self._target.with_name(beside)
-        file_fd = _created(self._beside or self._path, self._over)
+            self._temporary = self._target.with_name(beside)
+        file_fd = _create(self._temporary or self._path, self._over)
         self._opened = True
         try:
             self._link.open(file_fd)
@@ -93,24 +97,24 @@ class Recorder:
         self._link.post(writer.BEGIN, encode((as_text(self._info), started_ns(self._info))))
 
     def begin(self) -> None:
-        """Replace an older recording, now that the run has begun.
+        """Replace an older recording; call it when the run has started.
 
         Raises:
-            OSError: that is refused; the older one stays.
+            OSError: The replacement failed; the older recording stays.
         """
-        if self._beside is None:
+        if self._temporary is None:
             return
-        shutil.copymode(self._target, self._beside)
-        os.replace(self._beside, self._target)
-        self._beside = None
+        shutil.copymode(self._target, self._temporary)
+        os.replace(self._temporary, self._target)
+        self._temporary = None
 
     def recorded(self, body: Body) -> Body:
-        """Return a body to take the place of a robot's, so that all it says is recorded."""
+        """Return a body that wraps a robot's and records its readings."""
         self._health = body.bus.health
         return JointRecorder(body, self._body_records.append)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
-        """Return a loop's ``stop`` that notes the time since the loop began."""
+        """Return a loop's ``stop`` that records the time since the loop started."""
 
         def noted(seconds: float) -> str | None:
             self._seconds = seconds
@@ -119,7 +123,7 @@ class Recorder:
         return noted
 
     def record_world(self, world: WorldInfo) -> None:
-        """Record the surroundings of the run; once, after ``open``."""
+        """Record the simulated world of the run; call it once, after ``open``."""
         self._link.post(writer.WORLD, encode(as_text(world)))
 
     def record(self, tick: Tick) -> None:
@@ -138,7 +142,7 @@ class Recorder:
             self._link.listen()
 
     def _before(self, tick: Tick) -> Before:
-        """Return what else the machine said since the last tick."""
+        """Return the body's records since the last tick, without the tick's own joints."""
         records = self._body_records
         if (
             len(records) == 1
@@ -148,7 +152,7 @@ class Recorder:
             records.clear()
             return _NOTHING
         before = [
-            plain(one)
+            body_record_to_plain(one)
             for one in records
             if not (type(one) is MeasuredJoints and one.joints is tick.joints)
         ]
@@ -156,66 +160,68 @@ class Recorder:
         return before
 
     def _take(self, batch: TickBatch) -> bool:
-        """Hand ticks to the writer; False where they are lost."""
+        """Send ticks to the writer; return False if they are lost."""
         if not self._link.alive or self._link.failed:
-            return True  # which is told; there is none to lose a percept
+            return True  # the failure is reported; no receiver is left that could miss a percept
         if self._link.post(writer.TICKS, batch.data):
             return True
         self.lost += batch.ticks
         return False
 
     def _post_frame(self, found: Detections | None) -> None:
-        """Hand the frame to the writer, after the ticks so far."""
+        """Send the frame to the writer, after the ticks before it."""
         self.stream.flush()
         if found is None or found.image is None or self._link.failed:
             return
         try:
             image = copied(found.image)
-        except OSError:  # no memory for it, or no file descriptor: the run is what counts
+        except OSError:  # no memory or no file descriptor: the run has priority
             return
         about = encode((found.captured_s, image.shape, image.dtype))
         self._link.post_image(about, image.fd, found.image.nbytes)
 
     def events(self) -> tuple[str, ...]:
-        """Return, once, the events that the recording, or who shares its ticks, cannot go on."""
+        """Return once that the recording, or another receiver of its ticks, has stopped."""
         if self._messages:
             return (self._messages.popleft(),)
-        if self._said or not self._link.failed:
+        if self._failure_reported or not self._link.failed:
             return ()
-        self._said = True
-        return (f"recording stopped ({self._link.failed}); the run goes on without it",)
+        self._failure_reported = True
+        return (f"recording stopped ({self._link.failed}); the run continues without it",)
 
     def close(self, stopped_by: str = "", tx_sha256: str | None = None) -> str:
-        """End the recording, wait for its file, and say in one line what is in it.
+        """End the recording and wait for its file; return a summary of one line.
 
-        To be called when the torque is off: on a slow disk it takes seconds. Where the run
-        did not come as far as a tick, no file is left.
+        Call it when the torque is off: on a slow disk it takes seconds. A run without a tick
+        leaves no file.
 
-        stopped_by: what ended the run; tx_sha256: of all bytes on an emulated bus
+        Args:
+            stopped_by: Reason for the end of the run.
+            tx_sha256: Hash of all bytes sent on an emulated bus.
         """
         self.stream.flush()
-        self._link.drain()  # there is always room for how it ended
+        self._link.drain()  # makes room for the record of the end
         end = RunEnd(stopped_by, self.lost, self._seconds, tx_sha256 or "")
         self._link.post(writer.END, encode({name: getattr(end, name) for name in RunEnd.__slots__}))
         self._link.close()
         if self._last_s is None:
-            if self._beside is not None:
-                self._beside.unlink(missing_ok=True)
-                return f"nothing was recorded: {self._path} is as it was"
+            if self._temporary is not None:
+                self._temporary.unlink(missing_ok=True)
+                return f"nothing was recorded: {self._path} is unchanged"
             if self._opened and self._target.is_file():  # else another program's, or a device
                 self._target.unlink()
-            return f"nothing was recorded: {self._path} is not made"
+            return f"nothing was recorded: {self._path} was not created"
         done = self._link.done
         if done is None:
-            return f"recording in {self._path} is not whole: {self._link.failed}"
+            return f"recording in {self._path} is incomplete: {self._link.failed}"
         frames = f", {done.frames} frames" if done.frames else ""
-        lost = f"; {self.lost} ticks could not be kept" if self.lost else ""
+        lost = f"; {self.lost} ticks were not recorded" if self.lost else ""
         size_mb = done.size / 1e6
         return f"{done.ticks} ticks{frames} ({size_mb:.1f} MB) recorded in {self._path}{lost}"
 
     @property
     def unwritten(self) -> Path | None:
-        """Return the file that is not as it was asked for, None where all is well."""
+        """Return the incomplete file, None if the recording is complete."""
         return self._path if self._opened and self._link.failed else None
 
 
@@ -223,11 +229,11 @@ def _no_counts() -> BusHealth:
     return BusHealth(0, 0, {})
 
 
-def _created(path: Path, over: bool) -> int:
-    """Create the file to be written.
+def _create(path: Path, over: bool) -> int:
+    """Create the file and return its descriptor.
 
     Raises:
-        SetupError: it exists or cannot be made.
+        SetupError: The file exists or cannot be created.
     """
     refuse_existing(path, force=over)
     flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if over else os.O_EXCL)

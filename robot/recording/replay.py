@@ -1,4 +1,4 @@
-"""Shows a recording on the page: what the player says, as snapshots, frames and a slider."""
+"""Replay of a recording on the page: snapshots, frames and a slider at the player's position."""
 
 import json
 import threading
@@ -11,30 +11,30 @@ from gazerig.robot.recording.playback_clock import Mark, PlaybackClock, Playback
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
 ROUND_S = 0.04
-_SLIDE_S = 0.1  # how often the slider moves by itself
+_SLIDE_S = 0.1  # interval of slider updates during playback
 _BEAT_S = 0.2
-"""The page takes a second without news for a rig that has gone silent."""
-_MOST_FRAMES = 20  # of one round: eightfold speed needs 16, a round that came late more
+"""Interval of updates while paused; after 1 s without one the page shows the rig as silent."""
+_MOST_FRAMES = 20  # per round: eightfold speed needs 16, a late round more
 _REST_ROUNDS = 5
-_DRAWN_ROUNDS = 35  # of a page's panels those that are drawn least often wait 25
+_DRAWN_ROUNDS = 35  # the page's slowest panels wait 25 rounds
 _MARKS = 170
-_MOST_EVENTS = 800  # of 150 characters each they fit in one message
+_MOST_EVENTS = 800  # with 150 characters each they fit in one message
 _MOST_WORDS = 150
 
 
 class Screen(Protocol):
-    """What shows the messages, as gazerig.robot.dashboard.feed.page_process.PageProcess does."""
+    """A receiver of messages, such as gazerig.robot.dashboard.feed.page_process.PageProcess."""
 
     def send(self, message: bytes) -> bool:
-        """Hand over a message; False where it is not taken now."""
+        """Send a message; return False if it is not accepted now."""
         ...
 
 
 class Replay:
-    """Plays frames on a screen."""
+    """A player of recorded frames on a screen."""
 
     def __init__(self, frames: SnapshotIndex, clock: Clock) -> None:
-        """Stand at the beginning."""
+        """Start at the beginning, paused."""
         self._frames = frames
         self._clock = clock
         self._player = PlaybackClock(frames.duration_s, frames.marks)
@@ -46,7 +46,7 @@ class Replay:
         self._sent_s, self._introduced = 0.0, False
 
     def handle_request(self, data: Mapping[str, object]) -> str | None:
-        """Do what a person at the page asks for; give the refusal. From any thread."""
+        """Apply a request of the page; return the refusal if it is invalid. Thread-safe."""
         if "replay" not in data:
             return "this is a recording: nothing moves here"
         try:
@@ -55,17 +55,17 @@ class Replay:
             return str(error)
         return None
 
-    def ask(self, asked: object) -> None:
-        """Do one thing that can be asked of a player. From any thread.
+    def ask(self, request: object) -> None:
+        """Apply a request to the player. Thread-safe.
 
         Raises:
-            ValueError: it cannot be done; the message says why.
+            ValueError: The request is invalid; the message gives the reason.
         """
         with self._lock:
-            self._player.obey(asked, self._clock.now_s())
+            self._player.handle_request(request, self._clock.now_s())
 
     def run(self, screen: Screen, over: Callable[[PlaybackState], bool]) -> None:
-        """Show until ``over`` says so, looking every 40 ms."""
+        """Update the screen every 40 ms until ``over`` returns True."""
         while True:
             now_s = self._clock.now_s()
             state = self.show(screen, now_s)
@@ -74,44 +74,44 @@ class Replay:
             self._clock.sleep_until(now_s + ROUND_S)
 
     def show(self, screen: Screen, now_s: float) -> PlaybackState:
-        """Send what is new since the last call; give where the recording stands."""
+        """Send the changes since the last call; return the player's state."""
         with self._lock:
             state = self._player.state(now_s)
         self._show_frames(screen, self._frames.at(state.at_s))
         self._show_frame(screen, state.at_s)
         if self._due(state, now_s):
-            self._tell(screen, state, now_s)
+            self._send_state(screen, state, now_s)
         return state
 
     def _show_frames(self, screen: Screen, number: int) -> None:
-        """Send the frames up to this one; after a leap only this one."""
+        """Send the frames up to this one; after a jump only this one."""
         passed = number - self._number
         if passed == 0:
-            self._stand(screen)
+            self._repeat_frame(screen)
         elif 0 < passed <= 4 * _MOST_FRAMES:
             step = max(1, -(-passed // _MOST_FRAMES))
             for between in range(self._number + 1, number, step):
                 screen.send(self._frames.message(between))
             if screen.send(self._frames.message(number)):
                 self._number, self._still, self._missing = number, 0, None
-        elif screen.send(self._frames.bare(number)):
-            # Backwards the page starts again: it knows of nothing that was before.
+        elif screen.send(self._frames.message_without_history(number)):
+            # After a backward jump the page starts again without its history.
             first = self._number + 1 if passed > 0 else 0
             self._missing = first if self._missing is None else min(first, self._missing)
             self._number, self._still = number, 0
 
-    def _stand(self, screen: Screen) -> None:
-        """Send the same frame again for a while: a page draws its panels by turns.
+    def _repeat_frame(self, screen: Screen) -> None:
+        """Send the same frame again for some rounds, as a page draws its panels alternately.
 
-        When the slider has come to rest the page is also told what a leap passed over, so
-        that traces and figures show what has led to the place.
+        When the slider is at rest, also send the frames that a jump has skipped, so that traces
+        and figures show the time before the position.
         """
         self._still += 1
         if self._still > _DRAWN_ROUNDS:
             return
         if self._missing is None or self._still < _REST_ROUNDS:
-            screen.send(self._frames.bare(self._number))
-        elif screen.send(self._frames.recalled(self._missing, self._number)):
+            screen.send(self._frames.message_without_history(self._number))
+        elif screen.send(self._frames.message_with_history(self._missing, self._number)):
             self._missing = None
 
     def _show_frame(self, screen: Screen, at_s: float) -> None:
@@ -122,18 +122,18 @@ class Replay:
             self._frame = number
 
     def _due(self, state: PlaybackState, now_s: float) -> bool:
-        """Return whether the page is to know: at once what a person changed, else now and then."""
+        """Return whether to send the state: changes immediately, else at intervals."""
         sent = self._sent
         if sent is None or state._replace(at_s=sent.at_s) != sent:
             return True
         leapt = state.at_s != sent.at_s and not state.playing
         return leapt or now_s - self._sent_s >= (_SLIDE_S if state.playing else _BEAT_S)
 
-    def begin_anew(self) -> None:
-        """Introduce the recording again: the page that knew it has died, and another is there."""
+    def send_introduction_again(self) -> None:
+        """Send the introduction again, to a new page process."""
         self._introduced = False
 
-    def _tell(self, screen: Screen, state: PlaybackState, now_s: float) -> None:
+    def _send_state(self, screen: Screen, state: PlaybackState, now_s: float) -> None:
         more = {} if self._introduced else introduction(self._frames)
         message = REPLAY + json.dumps({**state._asdict(), **more}).encode()
         if screen.send(message):
@@ -141,7 +141,7 @@ class Replay:
 
 
 def introduction(frames: SnapshotIndex) -> dict[str, object]:
-    """Return what a page needs to know of a recording once: marks, events, if it has pictures."""
+    """Return what a page needs once per recording: marks, events, whether it has pictures."""
     events = [m for m in frames.marks if m.kind == "event"]
     return {
         "marks": {
@@ -154,7 +154,7 @@ def introduction(frames: SnapshotIndex) -> dict[str, object]:
 
 
 def counts(marks: Sequence[Mark], duration_s: float) -> list[int]:
-    """Count the marks in equal shares of the recording."""
+    """Count the marks in equal parts of the recording."""
     found = [0] * _MARKS
     for mark in marks:
         share = mark.at_s / duration_s if duration_s > 0.0 else 0.0

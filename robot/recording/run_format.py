@@ -1,7 +1,7 @@
-"""Topics and schemas of a recorded run: JSON that describes itself, MCAP (mcap.dev/spec).
+"""Topics and schemas of a recorded run: JSON with schemas in MCAP (mcap.dev/spec).
 
-/rig/tick and /rig/percept hold everything, exactly; the other topics say parts of it
-again in the shapes that viewers draw (Foxglove documentation, message schemas).
+/rig/tick and /rig/percept contain everything, exactly. The other topics repeat parts of it
+in formats that viewers draw (Foxglove documentation, message schemas).
 """
 
 import dataclasses
@@ -21,13 +21,13 @@ RUN, WORLD, END = "gazerig.run", "gazerig.world", "gazerig.end"
 """Names of the metadata records at the beginning and the end."""
 
 UNUSED = ("metadata", "arrows", "cubes", "cylinders", "triangles", "texts", "models")
-"""Parts of a scene's entity that viewers want to find, and that are empty here."""
+"""Parts of a scene's entity that viewers require and that are empty here."""
 
 Schema = dict[str, Any]
 
 
 class Message(NamedTuple):
-    """One message to be written: topic, time since the first tick, JSON."""
+    """A message of the recording: topic, time since the first tick, JSON."""
 
     topic: str
     at_s: float
@@ -38,12 +38,12 @@ def _object(**properties: Schema) -> Schema:
     return {"type": "object", "properties": properties}
 
 
-def _list(items: Schema, says: str = "") -> Schema:
-    return {"type": "array", "items": items, **({"description": says} if says else {})}
+def _list(items: Schema) -> Schema:
+    return {"type": "array", "items": items}
 
 
-def _says(schema: Schema, says: str) -> Schema:
-    return {**schema, "description": says}
+def _describe(schema: Schema, description: str) -> Schema:
+    return {**schema, "description": description}
 
 
 _NUMBER: Schema = {"type": "number"}
@@ -60,30 +60,30 @@ _COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
 _POSE = _object(position=_XYZ, orientation=_TURN)
 _ORDER: Schema = {"type": "object", "properties": {"order": _TEXT}}
 
-_SAYS = {
+_DESCRIPTIONS = {
     "t_s": "the rig's own time, s",
-    "dt_s": "since the tick before, s",
+    "dt_s": "since the previous tick, s",
     "joints": "as measured, in the order of guard_result.joints",
     "pose": "of head and eyes, by joints; yaw + left, pitch + up; lids 0 shut .. 1 open",
     "percept": "number of the /rig/percept that this tick used",
     "target": "where to look and why, the highest saliences term by term",
-    "gaze": "what the models ask for",
+    "gaze": "output of the gaze models",
     "desired_rad": "desired joint angles; in guard_result null if equal to the tick's",
-    "guard_result": "what the guard let through",
+    "guard_result": "output of the guard",
     "measured": "false: the servo reports nothing, this is its goal moved at known speeds; "
     "empty: all are measured",
     "stopped": "why the robot was stopped",
-    "led": "which client leads gaze or joints and with what",
-    "lead": "the newest lead; left out before the first",
+    "led": "client that controls gaze or joints, and its command",
+    "lead": "the newest command of a client; left out before the first",
     "gesture": "the newest gesture; left out before the first",
-    "plan": "what the action planner chose and why; left out without a planner",
-    "before": "what the machine reported besides the tick's own reading",
+    "plan": "choice of the action planner and its reason; left out without a planner",
+    "before": "further reports of the machine since the previous tick",
     "looks_at_head": "null: too uncertain",
     "gaze_world": "null: the detector does not find the gaze of the eyes",
     "eye_opening": "of the lids, as a ratio of the usual; null: not found",
     "mouth_opening_m": "gap between the lips; null: not found",
     "speaks": "null: no mouth is found",
-    "scene": "counts the cuts so far",
+    "scene": "number of scene cuts since the start",
 }
 """Descriptions of fields by name."""
 
@@ -96,7 +96,9 @@ def schema_of(kind: Any) -> Schema:
     """
     if dataclasses.is_dataclass(kind) or hasattr(kind, "_fields"):
         fields = {
-            name: _says(schema_of(of), _SAYS[name]) if name in _SAYS else schema_of(of)
+            name: _describe(schema_of(of), text)
+            if (text := _DESCRIPTIONS.get(name))
+            else schema_of(of)
             for name, of in get_type_hints(kind).items()
         }
         return _object(**fields)
@@ -121,14 +123,14 @@ for _unwritten in ("as_desired", "parking"):
     del _TICK["properties"][_unwritten]
 _PERCEPT = {
     **_object(number=_WHOLE, **schema_of(Percept)["properties"]),
-    "description": "what one frame showed, placed in the world by the head's pose at its capture",
+    "description": "content of one frame in world coordinates, by the head's pose at its capture",
 }
-_HEALTH = _says(
+_HEALTH = _describe(
     _object(
         tx_bytes=_WHOLE, rx_bytes=_WHOLE,
-        errors=_says({"type": "object", "additionalProperties": _WHOLE}, "kind -> count"),
+        errors=_describe({"type": "object", "additionalProperties": _WHOLE}, "kind -> count"),
         temperature_c=_list(_MAYBE), voltage_v=_list(_MAYBE), load=_NUMBERS, fault=_TEXTS,
-        lost_ticks=_says(_WHOLE, "ticks that this recording could not keep so far"),
+        lost_ticks=_describe(_WHOLE, "ticks that this recording has lost since its start"),
     ),
     "bus counts since it was opened, and the servos in the order of /joint_states' names",
 )  # fmt: skip
@@ -137,7 +139,7 @@ _LINE = _object(
 )  # fmt: skip
 _IMAGE = _object(
     timestamp=_TIME, frame_id=_TEXT, data={"type": "string", "contentEncoding": "base64"},
-    format=_TEXT, captured_s=_says(_NUMBER, "exposure in the rig's own time, s"),
+    format=_TEXT, captured_s=_describe(_NUMBER, "exposure in the rig's own time, s"),
 )  # fmt: skip
 _STATES = _object(
     timestamp=_TIME,

@@ -1,4 +1,4 @@
-"""What should be known of a recorded run beside its ticks; kept in the recording as text."""
+"""Metadata of a recorded run: settings at its start and its end; stored as text."""
 
 import importlib.metadata
 import json
@@ -11,26 +11,32 @@ from typing import Any
 from gazerig.robot.recording.world_info import WorldInfo
 
 FORMAT = 1
-"""Version of what the messages hold; goes up when an older reader would misread them."""
+"""Version of the message contents; it rises when an older reader would misread them."""
 PROFILE = "gazerig-run-1"
 """MCAP profile of recordings of runs."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunInfo:
-    """A run as it was started.
+    """Settings at the start of a run.
 
-    rig, profile, character: names as given on the command line, or paths
-    config_yaml: everything in force at the start, of one piece; walk_yaml: the face walk's file
-    gestures_yaml: the gestures that the rig names itself, "" where it names none
-    scene: what was simulated, None where a camera looked; eyes: what looked, in words
-    mock: emulated servos; fast: simulated time
-    bus: "ideal" where the emulated servos had no bytes, "emulated" where they had
-    rate_hz: control rate at the start; pictures_hz: rate of the recorded frames
-    started_utc: wall clock at the start, ISO 8601
-    versions: name -> version of the packages whose arithmetic counts
-    stands: of a head in a world with others, where its neck base stands there: place (3, metres),
-        then the rows of its rotation (9); () for a head that is alone
+    Attributes:
+        rig, profile, character: Names as given on the command line, or paths.
+        config_yaml: The complete configuration at the start.
+        seed: Seed of the random numbers.
+        rate_hz: Control rate at the start.
+        started_utc: Wall clock at the start, ISO 8601.
+        walk_yaml: The face walk's file.
+        gestures_yaml: The gestures that the rig defines, "" if it defines none.
+        scene: The simulated scene, None with a camera.
+        eyes: Description of the camera.
+        mock: Whether the servos were emulated.
+        fast: Whether time was simulated.
+        bus: "ideal" for emulated servos without bytes, "emulated" for those with bytes.
+        pictures_hz: Rate of the recorded frames.
+        versions: Name -> version of the packages that affect the arithmetic.
+        stands: Pose of the neck base of a head in a world with others: position (3, m), then
+            the rows of its rotation (9); () for a single head.
     """
 
     rig: str
@@ -54,12 +60,13 @@ class RunInfo:
 
 @dataclass(frozen=True, slots=True)
 class RunEnd:
-    """How a run ended, as the program said it; what it did not say is at its default.
+    """The end of a run; fields that the program did not write have their defaults.
 
-    stopped_by: "seconds", a signal, a fault; "" where the program was killed
-    lost: ticks that could not be kept
-    ran_s: time from the start of the loop to the slot at which it ended
-    tx_sha256: of all bytes sent to an emulated bus in simulated time, else ""
+    Attributes:
+        stopped_by: "seconds", a signal, a fault; "" if the program was killed.
+        lost: Number of ticks that were not recorded.
+        ran_s: Time from the start of the loop to the slot at which it ended.
+        tx_sha256: Hash of all bytes sent to an emulated bus in simulated time, else "".
     """
 
     stopped_by: str = ""
@@ -69,7 +76,7 @@ class RunEnd:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python, of this package and of those that do its arithmetic."""
+    """Return the versions of Python, of this package and of the packages for its arithmetic."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in ("gazerig", "numpy", "scipy", "opencv-contrib-python-headless"):
         try:
@@ -83,22 +90,22 @@ def started_ns(info: RunInfo) -> int:
     """Return the wall clock at the start in nanoseconds since 1970.
 
     Raises:
-        ValueError: it is no time of ISO 8601.
+        ValueError: It is not a time in ISO 8601.
     """
     return round(datetime.fromisoformat(info.started_utc).timestamp() * 1e6) * 1000
 
 
 def as_text(value: RunInfo | RunEnd | WorldInfo) -> dict[str, str]:
-    """Return the fields as MCAP metadata: YAML as it is, all else as JSON."""
+    """Return the fields as MCAP metadata: YAML unchanged, everything else as JSON."""
     plain = asdict(value)
     return {k: v if k.endswith("_yaml") else json.dumps(v) for k, v in plain.items()}
 
 
-def info_of(text: Mapping[str, str]) -> RunInfo:
-    """Read what ``as_text`` gave of a run's beginning.
+def read_run_info(text: Mapping[str, str]) -> RunInfo:
+    """Read the settings of a run that ``as_text`` wrote.
 
     Raises:
-        ValueError: something is missing or no JSON.
+        ValueError: A field is missing, is not JSON or has an impossible value.
     """
     found = _read(text, {f.name for f in fields(RunInfo)})
     if isinstance(found.get("stands"), list):
@@ -107,12 +114,12 @@ def info_of(text: Mapping[str, str]) -> RunInfo:
         info = RunInfo(**found)
     except TypeError as error:
         raise ValueError(str(error)) from None
-    _refuse_nonsense(info)
+    _check_values(info)
     return info
 
 
-def _refuse_nonsense(info: RunInfo) -> None:
-    """Refuse what no run is started with; files are made with these numbers and names."""
+def _check_values(info: RunInfo) -> None:
+    """Refuse impossible settings, as exports use these numbers and names."""
     texts = (
         info.rig,
         info.profile,
@@ -124,22 +131,22 @@ def _refuse_nonsense(info: RunInfo) -> None:
     )
     maybe = (info.character, info.scene)
     if not all(isinstance(word, str) for word in texts + tuple(m for m in maybe if m is not None)):
-        raise ValueError("a name of the run is no text")
+        raise ValueError("a name of the run is not text")
     if not (_within(info.rate_hz, 1.0, 10_000.0) and _within(info.pictures_hz, 0.0, 1000.0)):
         raise ValueError(f"a control rate of {info.rate_hz} Hz")
     if type(info.seed) is not int or info.seed < 0:
         raise ValueError(f"the seed {info.seed}")
     if type(info.mock) is not bool or type(info.fast) is not bool:
-        raise ValueError("neither real nor emulated")
+        raise ValueError("mock or fast is not a boolean")
     if not isinstance(info.versions, dict):
         raise ValueError("no versions")
-    if not _is_place(info.stands):
-        raise ValueError("a place that is none")
+    if not _is_pose(info.stands):
+        raise ValueError("an invalid pose of the neck base")
     started_ns(info)
 
 
-def _is_place(stands: object) -> bool:
-    """Return whether these are the numbers of ``RunInfo.stands``."""
+def _is_pose(stands: object) -> bool:
+    """Return whether this is a valid ``RunInfo.stands``."""
     if not isinstance(stands, tuple) or len(stands) not in (0, 12):
         return False
     return all(_within(number, -1000.0, 1000.0) for number in stands)
@@ -149,17 +156,17 @@ def _within(value: object, low: float, high: float) -> bool:
     return type(value) in (int, float) and low <= value <= high  # type: ignore[operator]
 
 
-def end_of(text: Mapping[str, str]) -> RunEnd:
-    """Read what ``as_text`` gave of a run's end.
+def read_run_end(text: Mapping[str, str]) -> RunEnd:
+    """Read the end of a run that ``as_text`` wrote.
 
     Raises:
-        ValueError: something is no JSON.
+        ValueError: A field is not JSON or has an impossible value.
     """
     end = RunEnd(**_read(text, {f.name for f in fields(RunEnd)}))
     if not isinstance(end.stopped_by, str) or not isinstance(end.tx_sha256, str):
-        raise ValueError("an end that is no text")
+        raise ValueError("a field of the end is not text")
     if type(end.lost) is not int or not (end.ran_s is None or _within(end.ran_s, 0.0, 1e9)):
-        raise ValueError("an end that is no number")
+        raise ValueError("a field of the end is not a number")
     return end
 
 

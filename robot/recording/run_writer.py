@@ -1,7 +1,7 @@
-"""A recording of a run being written: MCAP in zstd chunks, every byte given to the system.
+"""Writer of a run's recording: MCAP in zstd chunks, without buffers in this program.
 
-Nothing waits inside this program: what ``flush`` has written survives its death. After
-an error the file is cut back to its last whole chunk, so that it can be read.
+Data that ``flush`` has written survives the program's death. After an error the file is
+truncated to its last complete chunk, so that it can be read.
 """
 
 import contextlib
@@ -20,7 +20,7 @@ _WHOLE_NS = 1_000_000_000
 
 
 class WrittenFile(NamedTuple):
-    """What is in a recording: ticks, frames, bytes."""
+    """The size of a recording: number of ticks, number of frames, bytes."""
 
     ticks: int
     frames: int
@@ -30,17 +30,19 @@ class WrittenFile(NamedTuple):
 class RunWriter:
     """An MCAP file of one run.
 
-    written: what is in it; failed: why nothing more can be written, or ""
+    Attributes:
+        failed: Reason why nothing more can be written, or "".
     """
 
     def __init__(self, fd: int, about: Mapping[str, str], started_ns: int) -> None:
-        """Begin the file.
+        """Write the beginning of the file.
 
-        fd: an empty file, open for writing; it is closed with the recording
-        about: the run's beginning as ``run_info.as_text`` gives it
-        started_ns: wall clock that stands for the first tick's time
+        Args:
+            fd: Descriptor of an empty file, open for writing; ``close`` closes it.
+            about: Settings of the run from ``run_info.as_text``.
+            started_ns: Wall clock at the first tick.
         """
-        self._file = _Straight(fd)
+        self._file = _UnbufferedFile(fd)
         self._started_ns = started_ns
         self._writer = Writer(
             self._file,  # type: ignore[arg-type]  # of a file, it uses write, tell and flush
@@ -51,11 +53,11 @@ class RunWriter:
         self._channels: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self.failed = ""
-        self._safely(self._begin, about)
+        self._guard_write(self._begin, about)
 
     @property
     def written(self) -> WrittenFile:
-        """Count what is in the file."""
+        """Return the numbers of ticks, frames and bytes in the file."""
         count = self._counts.get
         return WrittenFile(count(fmt.TICK, 0), count(fmt.FRAME, 0), self._file.tell())
 
@@ -64,31 +66,31 @@ class RunWriter:
         return self._started_ns + round(at_s * _WHOLE_NS)
 
     def add(self, message: fmt.Message) -> None:
-        """Append a message to the present chunk; without effect after a failure."""
+        """Append a message to the present chunk; do nothing after a failure."""
         if self.failed:
             return
         self._counts[message.topic] = self._counts.get(message.topic, 0) + 1
-        self._safely(self._add, message)
+        self._guard_write(self._add, message)
 
     def world(self, about: Mapping[str, str]) -> None:
-        """Write the world that the run is in, as ``run_info.as_text`` gives it."""
+        """Write the run's simulated world from ``run_info.as_text``."""
         if not self.failed:
-            self._safely(self._add_world, about)
+            self._guard_write(self._add_world, about)
 
     def flush(self) -> None:
-        """Write the chunk in progress and hand it to the system."""
+        """Write the present chunk to the operating system."""
         if not self.failed:
-            self._safely(self._flush)
+            self._guard_write(self._flush)
 
     def sync(self) -> None:
-        """Have the system put everything on the disk."""
+        """Make the operating system write everything to the disk."""
         if not self.failed:
-            self._safely(self._file.sync)
+            self._guard_write(self._file.sync)
 
     def close(self, end: RunEnd) -> None:
-        """Write how the run ended, and the index; after a failure the file ends as it is."""
+        """Write the end of the run and the index, unless writing failed; close the file."""
         if not self.failed:
-            self._safely(self._finish, end)
+            self._guard_write(self._finish, end)
         self._file.close()
 
     def _begin(self, about: Mapping[str, str]) -> None:
@@ -125,8 +127,8 @@ class RunWriter:
         self._file.keep()
         self._file.sync()
 
-    def _safely(self, act: Callable[..., None], *arguments: Any) -> None:
-        """Do it; where the disk refuses, cut the file back and say why."""
+    def _guard_write(self, act: Callable[..., None], *arguments: Any) -> None:
+        """Call ``act``; on an error, truncate the file and store the reason."""
         try:
             act(*arguments)
         except OSError as error:
@@ -137,8 +139,8 @@ class RunWriter:
             self._file.cut()
 
 
-class _Straight:
-    """A file whose every write is a write of the system, whole or an error."""
+class _UnbufferedFile:
+    """A file without a buffer, whose writes are complete or raise an error."""
 
     def __init__(self, fd: int) -> None:
         self._fd = fd
@@ -156,15 +158,15 @@ class _Straight:
         return self._at
 
     def flush(self) -> None:
-        """Nothing waits here."""
+        """Do nothing: there is no buffer."""
 
     def keep(self) -> None:
         """Mark the file as complete."""
         self._kept = self._at
 
     def cut(self) -> None:
-        """Go back to where the file was good."""
-        with contextlib.suppress(OSError):  # a disk that is gone cannot do that either
+        """Truncate the file to its last complete state."""
+        with contextlib.suppress(OSError):  # also fails if the disk is gone
             os.ftruncate(self._fd, self._kept)
         self._at = self._kept
 

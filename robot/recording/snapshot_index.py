@@ -1,7 +1,7 @@
-"""A recording as the page shows it: snapshots made once, packed small, found by their time.
+"""Compressed snapshots of a recording for the page, indexed by time.
 
-Some 50 snapshots a second are kept, each as the message that goes to the page, compressed;
-the camera's frames lie in a file without a name that goes with the program.
+About 50 snapshots per second are stored, each as the compressed message to the page. The
+camera's frames are in a temporary file without a name.
 """
 
 import tempfile
@@ -26,18 +26,21 @@ from gazerig.robot.recording.playback_clock import Mark
 SNAPSHOT_EVERY_S = 0.02
 _NO_RESIDUAL = ResidualFigures(None, None, 0)
 RECALL_S = 10.0
-"""How far back the joints are recalled: the last seconds of it closely, the rest thinned."""
+"""Time before a position for which joints are sent again: the newest part closely, the rest
+thinned."""
 
 _CLOSELY_S, _THINNED = 1.5, 2
-_MOST_EVENTS = 1000  # with the joints some 150 kB: they fit in one message
+_MOST_EVENTS = 1000  # with the joints about 150 kB: they fit in one message
 _GRAVE = ("hold", "torque_off")
-_TELL_EVERY = 50
+_PROGRESS_EVERY = 50
 
 
 class SnapshotIndex:
     """The snapshots and images of one recording.
 
-    duration_s: from the first tick to the last; marks: what can be stepped to
+    Attributes:
+        duration_s: Time from the first tick to the last.
+        marks: Positions to step to.
     """
 
     def __init__(
@@ -49,22 +52,27 @@ class SnapshotIndex:
         rig: ShownRig | None = None,
         progress: Callable[[float], None] = lambda at_s: None,
     ) -> None:
-        """Read everything.
+        """Read the recording.
 
-        rate_hz, character: of the run; rig: how it was built, where that is known
-        progress: takes how many seconds are read
+        Args:
+            ticks: Ticks of the run.
+            frames: Camera frames: time of the exposure in s and JPEG.
+            rate_hz: Control rate of the run.
+            character: Character of the run.
+            rig: Description of the rig, None if unknown.
+            progress: Called with the time in s up to which the recording is read.
 
         Raises:
-            SetupError: there is no tick.
+            SetupError: There is no tick.
         """
         self._times, self._packed = array("d"), list[bytes]()
         self.marks: list[Mark] = []
         self._events: list[SeenEvent] = []
-        self._events_at = array("l")  # the number of the snapshot that brings each
+        self._events_at = array("l")  # number of each event's snapshot
         self._start_s, self.duration_s = 0.0, 0.0
         self._read_ticks(ticks, SnapshotBuilder(rate_hz, rig), character, progress)
         if not self._packed:
-            raise SetupError("the recording holds no tick: there is nothing to show")
+            raise SetupError("the recording contains no tick: there is nothing to show")
         self._frame_times, self._places = array("d"), array("Q", (0,))
         self._frames = tempfile.TemporaryFile()  # noqa: SIM115  # open as long as the frames are
         for t_s, jpeg in frames:
@@ -73,28 +81,28 @@ class SnapshotIndex:
             self._places.append(self._places[-1] + len(jpeg))
 
     def __len__(self) -> int:
-        """Count the snapshots."""
+        """Return the number of snapshots."""
         return len(self._packed)
 
     @property
     def packed_bytes(self) -> int:
-        """Return how much memory the snapshots take."""
+        """Return the memory of the compressed snapshots in bytes."""
         return sum(map(len, self._packed))
 
     def at(self, at_s: float) -> int:
-        """Return the number of the snapshot that shows a time: the last that is not later."""
+        """Return the number of the last snapshot that is not after a time."""
         return max(bisect_right(self._times, at_s + 1e-9) - 1, 0)
 
     def message(self, number: int) -> bytes:
-        """Return a snapshot as the message that goes to the page."""
+        """Return a snapshot as a message to the page."""
         return zlib.decompress(self._packed[number])
 
-    def bare(self, number: int) -> bytes:
-        """Return a snapshot's message without what happened before it, which is shown but once."""
+    def message_without_history(self, number: int) -> bytes:
+        """Return a snapshot's message without its trail and events, which are shown only once."""
         return pack(replace(unpack(self.message(number)), trail=(), events=()))
 
-    def recalled(self, first: int, number: int) -> bytes:
-        """Return a snapshot's message with the joints and events of those from ``first`` on."""
+    def message_with_history(self, first: int, number: int) -> bytes:
+        """Return a snapshot's message with the joints and events since snapshot ``first``."""
         from_s = self._times[number] - RECALL_S
         closely = self.at(self._times[number] - _CLOSELY_S)
         trail: list[Trail] = []
@@ -114,7 +122,7 @@ class SnapshotIndex:
         return len(self._frame_times) > 0
 
     def frame_at(self, at_s: float) -> int | None:
-        """Return the number of the frame in force at a time, None before the first."""
+        """Return the number of the newest frame at a time, None before the first."""
         number = bisect_right(self._frame_times, at_s + 1e-9) - 1
         return number if number >= 0 else None
 
@@ -134,11 +142,11 @@ class SnapshotIndex:
         character: str,
         progress: Callable[[float], None],
     ) -> None:
-        noticing, due_s = Noticing(), 0.0
+        detector, due_s = MarkDetector(), 0.0
         for number, tick in enumerate(ticks):
             self._start_s = tick.t_s if number == 0 else self._start_s
             at_s = tick.t_s - self._start_s
-            self.marks += noticing.update(tick, at_s)
+            self.marks += detector.update(tick, at_s)
             self.duration_s = at_s
             snapshots.update(tick)
             if at_s < due_s - 1e-9:
@@ -146,21 +154,22 @@ class SnapshotIndex:
             due_s = max(due_s + SNAPSHOT_EVERY_S, at_s)
             perception = perception_text(tick, _NO_RESIDUAL)
             said = SnapshotTexts(
-                "recorded", noticing.behaviour, perception, character, noticing.conversation
+                "recorded", detector.behaviour, perception, character, detector.conversation
             )
             if (shown := snapshots.take(said)) is not None:
                 self._events += shown.events
                 self._events_at.extend([len(self._packed)] * len(shown.events))
                 self._times.append(at_s)
                 self._packed.append(zlib.compress(pack(shown), 1))
-            if len(self._packed) % _TELL_EVERY == 0:
+            if len(self._packed) % _PROGRESS_EVERY == 0:
                 progress(at_s)
 
 
-class Noticing:
-    """Notices what a person would step to, tick by tick.
+class MarkDetector:
+    """A detector of the positions to step to, tick by tick.
 
-    behaviour, conversation: those asked for last
+    Attributes:
+        behaviour, conversation: Those of the newest command.
     """
 
     def __init__(self) -> None:
@@ -169,7 +178,7 @@ class Noticing:
         self._grave = ""
 
     def update(self, tick: Tick, at_s: float) -> list[Mark]:
-        """Return what begins in this tick."""
+        """Return the marks of this tick."""
         found = []
         if tick.gaze.saccades > self._saccades:
             found.append(Mark(at_s, "saccade", f"saccade to {tick.target.kind}"))
@@ -181,7 +190,7 @@ class Noticing:
                 continue
             found.append(Mark(at_s, "event", command_text(command)))
             if isinstance(command, Ask):
-                self._heed(command)
+                self._note_choice(command)
         found += [Mark(at_s, "event", text) for text in drawn_together(tick.events)]
         grave = tick.guard_result.level if tick.guard_result.level in _GRAVE else ""
         if grave and grave != self._grave:
@@ -189,7 +198,7 @@ class Noticing:
         self._grave = grave
         return found
 
-    def _heed(self, command: Ask) -> None:
+    def _note_choice(self, command: Ask) -> None:
         if command.menu == "behaviour":
             self.behaviour = command.choice
         elif command.menu == "conversation":

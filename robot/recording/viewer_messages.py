@@ -1,4 +1,4 @@
-"""Parts of a tick in the shapes that viewers draw, named as in Foxglove's message schemas.
+"""Parts of a tick as messages for viewers, named as in Foxglove's message schemas.
 
 Quaternions are x, y, z, w. Frames: world at the neck base, head between the eyes, left_eye
 and right_eye with x along the line of sight.
@@ -21,14 +21,14 @@ _LINE_LIST = 2
 _STILL: Json = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 _AT_HEAD = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": _STILL}
 _FOREVER = {"sec": 0, "nsec": 0}
-_FACE_M = 0.11  # half the height of a face, drawn as a ball
+_FACE_M = 0.11  # half the height of a face; it is drawn as a sphere
 _SKIN = {"r": 0.95, "g": 0.72, "b": 0.55, "a": 0.7}
 _SIGHT = {"r": 0.2, "g": 0.6, "b": 1.0, "a": 1.0}
 _AIM = {"r": 1.0, "g": 0.3, "b": 0.2, "a": 1.0}
 
 
 def stamp(ns: int) -> dict[str, int]:
-    """Return a time in nanoseconds as viewers take it."""
+    """Return a time in nanoseconds as a viewer's time stamp."""
     sec, nsec = divmod(ns, 1_000_000_000)
     return {"sec": sec, "nsec": nsec}
 
@@ -45,7 +45,7 @@ def image(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
 
 
 def line(text: str, at_ns: int) -> Json:
-    """Return words as foxglove.Log."""
+    """Return a text as foxglove.Log."""
     return {
         "timestamp": stamp(at_ns), "level": _INFO, "message": text, "name": "gazerig", "file": "",
         "line": 0,
@@ -53,7 +53,7 @@ def line(text: str, at_ns: int) -> Json:
 
 
 def joint_states(names: Sequence[str], joints: JointState, at_ns: int) -> Json:
-    """Return joints as they are as foxglove.JointStates: rad and rad/s."""
+    """Return measured joints as foxglove.JointStates in rad and rad/s."""
     rows = zip(names, joints.position_rad, joints.velocity_rad_s, strict=True)
     return {
         "timestamp": stamp(at_ns),
@@ -62,7 +62,7 @@ def joint_states(names: Sequence[str], joints: JointState, at_ns: int) -> Json:
 
 
 def transforms(pose: GazeState, at_ns: int) -> Json:
-    """Return head and eyes as measured as foxglove.FrameTransforms."""
+    """Return the measured poses of head and eyes as foxglove.FrameTransforms."""
     head = _transform("world", "head", pose.p_world_head_m, pose.R_world_head, at_ns)
     eyes = (
         ("left_eye", pose.p_world_eye_left_m, pose.eye_left_rad),
@@ -76,7 +76,7 @@ def transforms(pose: GazeState, at_ns: int) -> Json:
 
 
 def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json:
-    """Return faces, lines of sight and the point aimed at as foxglove.SceneUpdate."""
+    """Return faces, lines of sight and the gaze point as foxglove.SceneUpdate."""
     sights: list[Vec3] = []
     for p, angles in (
         (pose.p_world_eye_left_m, pose.eye_left_rad),
@@ -100,7 +100,7 @@ def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json
 
 
 def orientation(R: Mat3) -> dict[str, float]:
-    """Return a rotation matrix as the quaternion of a viewer's message."""
+    """Return a rotation matrix as a viewer's quaternion."""
     w, x, y, z = quaternion(R)
     return {"x": x, "y": y, "z": z, "w": w}
 

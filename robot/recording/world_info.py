@@ -1,4 +1,4 @@
-"""The simulated world that a recorded run was in; kept in the recording as text."""
+"""Metadata of a recorded run's simulated world; stored in the recording as text."""
 
 import json
 from collections.abc import Mapping
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class WorldInfo:
-    """A world as a run was in it.
+    """A simulated world of a run.
 
-    name: of its script or file, without folder and ending
-    script_yaml: everything its script says, "" of one in MuJoCo's own format
-    seed: of what its people do
-    start_s: when their script began, on the clock of the ticks
+    Attributes:
+        name: Name of its script or file, without folder and suffix.
+        script_yaml: The complete script, "" for a world in MuJoCo's own format.
+        seed: Seed of its people's behaviour.
+        start_s: Start of their script on the clock of the ticks.
     """
 
     name: str
@@ -21,11 +22,11 @@ class WorldInfo:
     start_s: float = 0.0
 
 
-def world_of(text: Mapping[str, str]) -> WorldInfo:
-    """Read what ``gazerig.robot.recording.run_info.as_text`` gave of a world.
+def read_world_info(text: Mapping[str, str]) -> WorldInfo:
+    """Read a world that ``gazerig.robot.recording.run_info.as_text`` wrote.
 
     Raises:
-        ValueError: something is missing, no JSON or nonsense.
+        ValueError: A field is missing, is not JSON or has an impossible value.
     """
     try:
         name, seed, start_s = (json.loads(text[key]) for key in ("name", "seed", "start_s"))

@@ -1,7 +1,7 @@
-"""The loop's side of the process that writes a recording: hands over and never waits.
+"""Client of the process that writes a recording; its calls do not wait.
 
-What the socket does not take stays in a queue until it does. Beyond the queue's bound
-what is handed over is lost, which is reported. Without the process all goes on.
+Messages that the socket does not accept stay in a queue. If the queue is full, further
+messages are lost, which is reported. If the process has died, the calls have no effect.
 """
 
 import os
@@ -18,17 +18,17 @@ from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.run_writer import WrittenFile
 
 QUEUE_BYTES = 64_000_000
-"""What waits at most: some minutes of a run."""
+"""Limit of the queue: some minutes of a run."""
 
 IMAGE_BYTES = 64_000_000
-"""Images that wait at most, beside it: half a minute of a webcam's."""
+"""Separate limit of the images in the queue: half a minute of a webcam's."""
 
-_TRIES = 8  # messages sent in one go at most, so that a writer that is back costs no tick
+_TRIES = 8  # most messages per call, so that a writer that recovers delays no tick
 _TIMEOUT_S = 15.0
 
 
 class _Piece(NamedTuple):
-    """A message that waits: its bytes, and an image's file descriptor and size, or -1 and 0."""
+    """A queued message: its bytes, and an image's file descriptor and size, or -1 and 0."""
 
     data: bytes
     fd: int = -1
@@ -36,13 +36,19 @@ class _Piece(NamedTuple):
 
 
 class WriterClient:
-    """A process that writes, and what waits for it.
+    """The writing process and the queue of its messages.
 
-    failed: why nothing more is written, or ""; done: what was written, once it has ended
+    Attributes:
+        failed: Reason why nothing more is written, or "".
+        done: Size of the recording, None until the process has ended.
     """
 
     def __init__(self, patient: bool) -> None:
-        """Prepare; ``patient``: wait for the writer where it is behind."""
+        """Create a client without a process.
+
+        Args:
+            patient: Wait for a slow writer.
+        """
         self._patient = patient
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -52,7 +58,7 @@ class WriterClient:
         self.done: WrittenFile | None = None
 
     def open(self, file_fd: int) -> None:
-        """Start the process that writes to an open file; returns at once."""
+        """Start the process that writes to an open file, without waiting."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = child_process.start(
@@ -67,14 +73,14 @@ class WriterClient:
 
     @property
     def alive(self) -> bool:
-        """Return whether there is a writer to send to."""
+        """Return whether the writer is connected."""
         return self._socket is not None
 
     def post(self, kind: bytes, body: bytes) -> bool:
-        """Send something, or have it wait until it is taken; False where it is lost.
+        """Send or queue a message; return False if it is lost.
 
-        Every message wakes the writer, which costs the loop more than making it: so many small
-        things are better one.
+        Each message wakes the writer, which takes the loop longer than making the message, so
+        one large message is better than several small ones.
         """
         if self._socket is None or self._queued > QUEUE_BYTES:
             return False
@@ -87,9 +93,9 @@ class WriterClient:
         return True
 
     def post_image(self, body: bytes, fd: int, image_bytes: int) -> bool:
-        """Send an image's description and its memory; False where it is lost.
+        """Send or queue an image's description and memory; return False if it is lost.
 
-        The file descriptor is closed here.
+        This class closes the file descriptor.
         """
         if self._socket is None or self._images > IMAGE_BYTES:
             os.close(fd)
@@ -104,16 +110,16 @@ class WriterClient:
         self._images += piece.image_bytes
 
     def _send_waiting(self) -> None:
-        """Send what waits, as far as it is taken; a patient client waits for the rest."""
+        """Send queued messages that the socket accepts; a patient client waits for the rest."""
         self._send(_TRIES)
         if self._patient and self._queue:
             self.drain()
 
     def drain(self) -> None:
-        """Wait until the writer has taken everything, or for long enough."""
+        """Wait until the writer has accepted everything, with a timeout."""
         while self._queue and self._socket is not None:
             if not select.select([], [self._socket], [], _TIMEOUT_S)[1]:
-                self._lose("its writer does not go on")
+                self._lose("its writer does not respond")
                 return
             self._send(len(self._queue))
 
@@ -132,7 +138,7 @@ class WriterClient:
             self._receive(*pickle.loads(message))
 
     def close(self) -> None:
-        """Send the end of the recording to the writer, and wait until it has closed the file."""
+        """Signal the end of the recording, and wait until the writer has closed the file."""
         self.drain()
         if self._socket is not None:
             self._socket.shutdown(socket.SHUT_WR)
@@ -149,7 +155,7 @@ class WriterClient:
             self._process = None
 
     def _send(self, most: int) -> None:
-        """Send what waits, the oldest first, as far as the socket takes it."""
+        """Send queued messages, the oldest first, until the socket accepts no more."""
         while self._socket is not None and self._queue and most > 0:
             piece = self._queue[0]
             try:
@@ -157,14 +163,14 @@ class WriterClient:
             except BlockingIOError:
                 return
             except OSError:
-                self.listen()  # it may have said why
+                self.listen()  # it may have sent the reason
                 self._lose("its writer has died")
                 return
             self._forget(self._queue.popleft())
             most -= 1
 
     def _forget(self, piece: _Piece) -> None:
-        """Free what a piece has occupied while it waited."""
+        """Free the resources of a queued message."""
         self._queued -= len(piece.data)
         self._images -= piece.image_bytes
         if piece.fd >= 0:
@@ -177,7 +183,7 @@ class WriterClient:
             self.failed = self.failed or str(values)
 
     def _lose(self, why: str) -> None:
-        """Go on without the writer."""
+        """Continue without the writer."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None

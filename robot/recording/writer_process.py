@@ -1,10 +1,10 @@
-"""The process that writes a recording: fed through a socket, it outlives the program it serves.
+"""Process that writes a recording; it receives messages on a socket and outlives its program.
 
-Run as ``python -m gazerig.robot.recording.writer_process SOCKET FILE``, two open file descriptors,
-by gazerig.robot.recording.writer_client. A message is a letter, MORE or LAST, and a piece of some
-kind and body; the first of all is the run's beginning. Ticks come as ``control.tick_stream`` has
-encoded them, images in memory of their own; the JSON of the file and its JPEGs are made here.
-When the other side is gone, however it ended, the file is closed as it should be.
+gazerig.robot.recording.writer_client starts ``python -m gazerig.robot.recording.writer_process
+SOCKET FILE`` with two open file descriptors. A message is the byte MORE or LAST and a piece of
+kind and body; the first message contains the run's settings. Ticks are encoded by
+``control.tick_stream``, images are passed in shared memory. This process makes the file's JSON
+and JPEGs. When the client is gone for any reason, the file is closed properly.
 """
 
 import contextlib
@@ -26,11 +26,11 @@ from gazerig.robot.recording.run_writer import RunWriter
 
 MORE, LAST = b"+", b"."
 BEGIN, WORLD, TICKS, FRAME, HEALTH, END = b"b", b"w", b"t", b"f", b"h", b"e"
-"""What may be handed over. Bodies are MessagePack; of TICKS, see ``tick_stream.TickBatch``."""
+"""Kinds of messages. Bodies are MessagePack; for TICKS see ``tick_stream.TickBatch``."""
 FAILED, DONE = "failed", "done"
-"""What is answered: why nothing more can be written; what was written."""
+"""Kinds of replies: the reason why nothing more can be written; the size of the recording."""
 PIECE_BYTES = 100_000
-"""No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
+"""Longest message: a socket's default send buffer in Linux holds 212,992 bytes."""
 
 _FLUSH_S = 0.4
 _SYNC_S = 1.0
@@ -39,7 +39,7 @@ _NICE = 5
 
 
 class _Message(NamedTuple):
-    """What was handed over, and the file descriptor beside it, or -1."""
+    """A received message and its file descriptor, or -1."""
 
     kind: bytes
     body: bytes
@@ -47,7 +47,7 @@ class _Message(NamedTuple):
 
 
 def main(socket_fd: int, file_fd: int) -> None:
-    """Write until the other side is gone or says that the run is over."""
+    """Write until the client is gone or ends the recording."""
     os.nice(_NICE)
     with socket.socket(fileno=socket_fd) as rig:
         messages = _messages(rig, os.getppid())
@@ -64,11 +64,11 @@ def main(socket_fd: int, file_fd: int) -> None:
 def _write(
     messages: Iterator[_Message | None], writer: RunWriter, rig: socket.socket, clock: Clock
 ) -> RunEnd:
-    """Write the messages; return how the run ended."""
+    """Write the messages; return the end of the run."""
     router = RecordRouter(writer)
     end = RunEnd()
     flushed_s = synced_s = clock.now_s()
-    said = False
+    reported = False
     for one in messages:
         if one is not None:
             if one.kind == END:
@@ -84,14 +84,14 @@ def _write(
         if now_s - synced_s >= _SYNC_S:
             synced_s = now_s
             writer.sync()
-        if writer.failed and not said:
-            said = True
+        if writer.failed and not reported:
+            reported = True
             _answer(rig, FAILED, writer.failed)
     return end
 
 
 def _take(router: RecordRouter, one: _Message) -> None:
-    """Write one thing that was handed over."""
+    """Write the content of a message."""
     if one.kind == TICKS:
         router.ticks(one.body)
     elif one.kind == FRAME:
@@ -103,9 +103,11 @@ def _take(router: RecordRouter, one: _Message) -> None:
 
 
 def _messages(rig: socket.socket, parent: int) -> Iterator[_Message | None]:
-    """Return what is handed over, None where nothing comes for a while, until the end.
+    """Return the messages until the end, and None after each pause.
 
-    parent: the program's process; one that it forked may hold the socket open after its death
+    Args:
+        rig: Socket to the client.
+        parent: Process of the program; its forks may keep the socket open after its death.
     """
     pieces: list[bytes] = []
     while True:
@@ -128,7 +130,7 @@ def _messages(rig: socket.socket, parent: int) -> Iterator[_Message | None]:
 
 
 def _answer(rig: socket.socket, kind: str, values: Any) -> None:
-    """Send a reply, if the other side still exists."""
+    """Send a reply, if the client still exists."""
     with contextlib.suppress(OSError):
         rig.send(pickle.dumps((kind, values)))
 

@@ -20,7 +20,7 @@ from gazerig.features.lab.report.run_header import RunHeader
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.recording.export_csv import columns
-from gazerig.robot.recording.gaze_angles import trace_of
+from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 
 pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 
@@ -131,7 +131,7 @@ def test_hobby_eyes_on_a_neck_that_tells_its_place(tmp_path: Path) -> None:
     seen = gathered(list(mixed.recording.ticks())).joints
     assert seen == JointBasis((*SIX, "neck_yaw", "neck_pitch"), SIX)
     assert seen.basis("Eyes and head") == "partly estimated" and seen.basis("Lids") == "estimated"
-    trace = trace_of(mixed.ticks)
+    trace = collect_gaze_angles(mixed.ticks)
     assert trace.basis("head") == "measured" and trace.basis("left") == "partly estimated"
     assert {"head_yaw_deg", "head_pitch_deg"} < set(columns(trace.joints))
     assert "head_roll_deg" not in columns(trace.joints)

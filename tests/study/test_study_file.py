@@ -326,7 +326,7 @@ def test_a_recording_must_be_of_the_rig_and_as_long_as_a_trial(
     said = faults(tmp_path, text)
     assert len(said) == 3, said
     assert "4: conditions.a.recording: lasts 0." in said[0] and "a trial 30 s" in said[0]
-    assert "5: conditions.b.recording: " in said[1] and "ends before it begins" in said[1]
+    assert "5: conditions.b.recording: " in said[1] and "is empty: it contains nothing" in said[1]
     assert "6: conditions.c.recording: " in said[2]
     (one,) = faults(
         tmp_path,

@@ -30,7 +30,7 @@ from gazerig.robot.dashboard.feed.live_feed import (
 )
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_info import as_text
-from gazerig.robot.recording.world_info import WorldInfo, world_of
+from gazerig.robot.recording.world_info import WorldInfo, read_world_info
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -130,12 +130,12 @@ def test_what_cannot_be_shown_is_said_in_one_line(tmp_path: Path) -> None:
 )
 def test_nonsense_is_refused(changes: dict[str, str]) -> None:
     text = as_text(WorldInfo("hall", "room: hall\n", 3, 1.5))
-    assert world_of(text) == WorldInfo("hall", "room: hall\n", 3, 1.5)
+    assert read_world_info(text) == WorldInfo("hall", "room: hall\n", 3, 1.5)
     with pytest.raises(ValueError, match="world"):
-        world_of({**text, **changes})
+        read_world_info({**text, **changes})
     text.pop("seed")
     with pytest.raises(ValueError, match="without 'seed'"):
-        world_of(text)
+        read_world_info(text)
 
 
 def test_the_page_shows_the_world_at_the_time_of_what_is_replayed(

@@ -20,13 +20,13 @@ from gazerig.features.study.report.page import Progress
 from gazerig.features.study.report.tables import as_text
 from gazerig.robot.recording.export_bids import (
     DatasetDescription,
-    generated,
-    label_of,
+    bids_label,
+    generated_by,
     refuse_foreign,
     write_bids,
 )
-from gazerig.robot.recording.gaze_angles import trace_of
-from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
+from gazerig.robot.recording.gaze_angles import collect_gaze_angles
+from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
 from gazerig.robot.recording.read import RunRecording, used
 
 COLUMNS = (
@@ -68,7 +68,7 @@ def write_study(
     Raises:
         SetupError: the folder holds other files, or a file cannot be read or written.
     """
-    labels = [label_of(one.participant) for one in study.people]
+    labels = [bids_label(one.participant) for one in study.people]
     refuse_foreign(root)
     if root.is_dir():
         shutil.rmtree(root)
@@ -89,7 +89,7 @@ def _frame(study: StudyAnalysis, labels: Sequence[str], made_by: str) -> Iterato
     """Yield the files of a data set besides the participants', with their contents."""
     description = {
         "Name": study.design.title,
-        **generated(made_by),
+        **generated_by(made_by),
         "DesignSHA256": study.design_sha256,
     }
     readme = (
@@ -121,7 +121,7 @@ def _frame(study: StudyAnalysis, labels: Sequence[str], made_by: str) -> Iterato
 def _write_answers(study: StudyAnalysis, one: Participation, label: str, root: Path) -> None:
     folder = root / f"sub-{label}" / "beh"
     make_folder(folder)
-    stem = f"sub-{label}_task-{label_of(study.name)}_beh"
+    stem = f"sub-{label}_task-{bids_label(study.name)}_beh"
     rows = [_row(row, one) for row in one.answers]
     write_file(folder / f"{stem}.tsv", _tsv(COLUMNS, rows))
     write_file(folder / f"{stem}.json", _json(_sidecar(study)))
@@ -174,16 +174,16 @@ def _write_recordings(
         try:
             with used(file):
                 recording = RunRecording(file)
-                trace = trace_of(recording.ticks())
-                labels = labels_of(trace)
-                stretches = stretches_of(trace, labels)
+                trace = collect_gaze_angles(recording.ticks())
+                labels = label_samples(trace)
+                stretches = find_intervals(trace, labels)
         except SetupError as error:  # the answers deserve their report without it
             yield str(error)
             continue
         info = recording.info
         versions = ", ".join(f"{what} {which}" for what, which in sorted(info.versions.items()))
         about = DatasetDescription(
-            label, label_of(study.name), info.rate_hz, info.started_utc, versions, number
+            label, bids_label(study.name), info.rate_hz, info.started_utc, versions, number
         )
         write_bids(trace, labels, stretches, about, root)
 
