@@ -137,7 +137,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (LATE, "return pace_s, since_s", "return since_s, since_s", late),
     (LATE, "        recent_s.append(since_s)\n        if", "        if", slow_host),
     (LATE, "self.soft_until_s = t_s + soft_s", "pass", late),
-    (GUARD, "            self._motion.left_alone(missed_s)", "            pass", late),
+    (GUARD, "            self._motion.record_gap(missed_s)", "            pass", late),
     (GUARD, "soft = min(soft, self._late_accel)", "pass", late),
     (MOTION, "- limit.accel_rad_s2 * for_s", "", late),
     (MOTION, "min(lost, v + regain * dt_s)", "v", late_while_gentle),

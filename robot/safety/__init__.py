@@ -1,1 +1,1 @@
-"""The guard between what is desired and the bus."""
+"""The guard between desired joint angles and the bus."""

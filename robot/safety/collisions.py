@@ -1,9 +1,9 @@
-"""Pairs of joint ranges that may not be taken together: a lid and a frame, chin and chest.
+"""Avoidance of pairs of joint ranges that collide, such as a lid and a frame, chin and chest.
 
-Of every pair one joint, the keeper, keeps out of its range: it has a wall in front of it
-at which it can always stop. The other is free. The keeper changes only when the other joint
-is out too, by its command and as measured, so no path between two commands crosses
-the forbidden box however long a tick is.
+In every pair one joint, the keeper, stays out of its range: it has a wall in front of it at
+which it can always stop. The other joint is free. The keeper changes only if the other joint is
+out too, by its command and by its measured angle. Therefore no path between two commands crosses
+the forbidden box, however long a tick is.
 """
 
 from collections.abc import Sequence
@@ -18,19 +18,20 @@ _ROUNDING_RAD = 1e-9
 
 
 class Collisions:
-    """Puts up walls so that no forbidden box is ever entered.
+    """A set of forbidden boxes, with walls that keep the joints out of them.
 
-    exits: joints on their way out of a box they began in -> where they go
-    still: joints that wait for these
+    Attributes:
+        exits: Joints that leave a box in which they started -> their goals in rad.
+        still: Joints that wait for these.
 
     Args:
-        params: the forbidden pairs of ranges.
-        margin_deg: distance that is kept from them, as servos round and lag.
-        limits: one for each joint.
-        joints: the joints' names.
+        params: The forbidden pairs of ranges.
+        margin_deg: Distance to the boxes, as servos round and lag.
+        limits: One limit per joint.
+        joints: The joints' names.
 
     Raises:
-        ValueError: a pair leaves no pose inside the limits, or names an unknown joint.
+        ValueError: A pair leaves no pose inside the limits, or names an unknown joint.
     """
 
     def __init__(
@@ -46,30 +47,32 @@ class Collisions:
         self.exits: dict[int, float] = {}
         self.still: set[int] = set()
 
-    def go_on(self, before: "Collisions") -> None:
-        """Leave the pairs that were watched before to the same keepers."""
+    def take_over_keepers(self, before: "Collisions") -> None:
+        """Take over the keepers of the pairs in an earlier instance."""
         kept = dict(zip(before._pairs, before._keeper, strict=True))
         self._keeper = [kept.get(pair, 0) for pair in self._pairs]
 
     def __bool__(self) -> bool:
-        """Return whether there is any pair to watch."""
+        """Return whether there is any pair."""
         return bool(self._pairs)
 
-    def look(
+    def set_walls(
         self,
         motion: MotionLimiter,
         desired: JointAngles,
         position: JointAngles,
         held: Sequence[bool],
     ) -> None:
-        """Set this tick's limits, and find which joints have to leave a forbidden range first.
+        """Set this tick's walls, and find joints that must leave a forbidden range.
 
-        desired: where the joints want to go, any numbers at all
-        position: as measured
-        held: joints that cannot be sent anywhere
+        Args:
+            motion: Limiter of the joints' motion.
+            desired: Desired angles in rad, any numbers including NaN.
+            position: Measured angles in rad.
+            held: Whether each joint cannot follow a goal.
         """
         for i in self._joints:
-            motion.let_be(i)
+            motion.reset_range(i)
         self.exits.clear()
         self.still.clear()
         inside = []
@@ -77,7 +80,7 @@ class Collisions:
             if not self._keep_out(k, pair, motion, desired, position):
                 inside.append(pair)
         for pair in inside:
-            self._lead_out(pair, motion, held)
+            self._move_out(pair, motion, held)
         self.still.difference_update(self.exits)
 
     def _keep_out(
@@ -88,7 +91,7 @@ class Collisions:
         desired: JointAngles,
         position: JointAngles,
     ) -> bool:
-        """Wall off the keeper of a pair; return whether there is one."""
+        """Put up the keeper's wall; return False if both joints are inside their ranges."""
         keeper = self._keeper[k]
         if not _side(pair[keeper], motion):
             keeper = 1 - keeper
@@ -97,52 +100,52 @@ class Collisions:
         elif _side(pair[1 - keeper], motion):
             other = pair[1 - keeper]
             eager = _crosses(pair[keeper], motion, desired)
-            if eager and not _crosses(other, motion, desired) and _is_out(other, position):
+            if eager and not _crosses(other, motion, desired) and _is_outside(other, position):
                 keeper = 1 - keeper
-            elif not _is_out(pair[keeper], position):
-                # The keeper lags, or a hand has pushed it in: the other waits outside.
-                _wall_off(other, motion)
+            elif not _is_outside(pair[keeper], position):
+                # The keeper lags, or was pushed in by hand: the other joint waits outside.
+                _put_wall(other, motion)
         self._keeper[k] = keeper
-        _wall_off(pair[keeper], motion)
+        _put_wall(pair[keeper], motion)
         return True
 
-    def _lead_out(
+    def _move_out(
         self,
         pair: tuple[ForbiddenRange, ForbiddenRange],
         motion: MotionLimiter,
         held: Sequence[bool],
     ) -> None:
-        """Send one joint of a pair that began in its box out by the shortest way."""
-        ways = [
+        """Set the goal of one joint of a pair inside its box to the nearest exit."""
+        paths = [
             (abs(exit_rad - motion.command[span.joint]), span.joint, exit_rad)
             for span in pair
             if not held[span.joint]
             for exit_rad in (span.below, span.above)
             if motion.low[span.joint] <= exit_rad <= motion.high[span.joint]
-            and self._agrees(span.joint, exit_rad, motion)
+            and self._same_direction(span.joint, exit_rad, motion)
         ]
         self.still.update(span.joint for span in pair)
-        if ways:
-            _, joint, exit_rad = min(ways)
+        if paths:
+            _, joint, exit_rad = min(paths)
             now = motion.command[joint]
             farther = [exit_rad, self.exits.get(joint, exit_rad)]
             self.exits[joint] = max(farther, key=lambda angle: abs(angle - now))
 
-    def _agrees(self, joint: int, exit_rad: float, motion: MotionLimiter) -> bool:
-        """Return whether a joint that leaves another box as well goes the same way."""
+    def _same_direction(self, joint: int, exit_rad: float, motion: MotionLimiter) -> bool:
+        """Return whether an exit has the same direction as the joint's exit from another box."""
         now = motion.command[joint]
         return (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
 
 
 def _side(span: ForbiddenRange, motion: MotionLimiter) -> int:
-    """Return on which side a joint is and can stay: -1 below, 1 above, 0 neither."""
+    """Return the side on which a joint is and can stay: -1 below, 1 above, 0 neither."""
     if motion.keeps_below(span.joint, span.below):
         return -1
     return 1 if motion.keeps_above(span.joint, span.above) else 0
 
 
-def _wall_off(span: ForbiddenRange, motion: MotionLimiter) -> None:
-    """Limit a joint to the side on which it is."""
+def _put_wall(span: ForbiddenRange, motion: MotionLimiter) -> None:
+    """Limit a joint to its present side."""
     i = span.joint
     if _side(span, motion) < 0:
         motion.wall_above(i, span.below)
@@ -151,7 +154,7 @@ def _wall_off(span: ForbiddenRange, motion: MotionLimiter) -> None:
 
 
 def _crosses(span: ForbiddenRange, motion: MotionLimiter, desired: JointAngles) -> bool:
-    """Return whether a joint's path to its desired angle leads into its half of the box."""
+    """Return whether a joint's path to its desired angle enters its range of the box."""
     i = span.joint
     if not isfinite(desired[i]):
         return False
@@ -162,6 +165,6 @@ def _crosses(span: ForbiddenRange, motion: MotionLimiter, desired: JointAngles) 
     )
 
 
-def _is_out(span: ForbiddenRange, position: JointAngles) -> bool:
-    """Return whether a joint is measured outside its half of the box."""
+def _is_outside(span: ForbiddenRange, position: JointAngles) -> bool:
+    """Return whether a joint's measured angle is outside its range of the box."""
     return not span.low <= position[span.joint] <= span.high

@@ -1,9 +1,9 @@
-"""The guard between desired angles and the bus: knows limits, measurements and ages, not gaze.
+"""Guard between desired angles and the bus; it uses limits, measurements and ages, not gaze.
 
-Whatever is desired, what leaves is finite, inside every joint's range, within its speed
-and its acceleration, always able to stop before the end of the range, and in no pose in
-which joints collide. What is hot, overloaded, short of voltage or stuck slows down or
-stops, each joint by itself. Radians.
+For any desired angles, the commands are finite, inside every joint's range, within its speed
+and acceleration, always able to stop before the end of the range, and without collisions
+between joints. A joint that is hot, overloaded, short of voltage or stuck slows down or stops
+independently of the others. Angles are in rad.
 """
 
 from collections.abc import Callable
@@ -26,11 +26,13 @@ _ROUNDING_RAD = 1e-9
 
 
 class _Hold(NamedTuple):
-    """Why a joint does not follow its desired angle, and what it does instead.
+    """A reason for a joint not to follow its desired angle, and its motion meanwhile.
 
-    goal: where it goes; None: it comes to a stop
-    slowly: it goes there slowly
-    again: how it begins when this is over
+    Attributes:
+        reason: The reason.
+        goal: Angle to move to, None to stop.
+        slowly: Whether to move there slowly.
+        again: How the joint starts afterwards.
     """
 
     reason: str
@@ -40,18 +42,18 @@ class _Hold(NamedTuple):
 
 
 class Guard:
-    """Checks every command, one tick after the other.
+    """The check of all commands, tick by tick.
 
     Args:
-        params: thresholds and times.
-        limits: one for each joint.
-        joints: the joints' names.
-        reach: returns the ranges and speeds that the servos themselves keep, which apply beside
-            limits that are changed; None: all.
-        period_s: nominal time between ticks; a late tick is not made up for.
+        params: Thresholds and times.
+        limits: One limit per joint.
+        joints: The joints' names.
+        reach: Returns the ranges and speeds that the servos themselves keep, which apply in
+            addition to changed limits; None if they keep any.
+        period_s: Nominal time between ticks. Motion missed by a late tick is not made up for.
 
     Raises:
-        ValueError: a collision leaves no pose inside the limits.
+        ValueError: A collision leaves no pose inside the limits.
     """
 
     def __init__(
@@ -62,10 +64,10 @@ class Guard:
         reach: Callable[[], tuple[JointLimit, ...]] | None = None,
         period_s: float = 0.1,
     ) -> None:
-        self._take(params)
+        self._set_params(params)
         self._late = LateTicks(period_s)
         self._soft = False
-        self._calm = False  # in the last tick every joint followed, and nothing has come since
+        self._calm = False  # every joint followed in the last tick, and nothing has changed since
         self._names, self._numbers = joints, range(len(limits))
         self._neck = tuple("neck" in name.split("_") for name in joints)
         self._motion = MotionLimiter(limits)
@@ -80,39 +82,39 @@ class Guard:
         )
         self.reset(0.0, tuple(0.5 * (limit.low_rad + limit.high_rad) for limit in limits))
 
-    def _take(self, params: GuardParams) -> None:
+    def _set_params(self, params: GuardParams) -> None:
         self._params = params
         self._gentle_speed = radians(params.soft_start_speed_deg_s)
         self._gentle_accel = radians(params.soft_start_accel_deg_s2)
         self._late_accel = radians(params.late_accel_deg_s2)
 
     def pace(self, period_s: float) -> None:
-        """Expect ticks at another rate from now on."""
+        """Set the nominal time between ticks."""
         self._late.period_s = period_s
 
     def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
         """Change the limits without a jump; counters and findings stay.
 
-        A joint that moves so that it cannot keep its new limit comes to rest under the old
-        one first. A joint that is outside its new range then is led inside slowly.
+        A joint whose motion does not keep its new limit first comes to rest under the old one.
+        A joint outside its new range then moves inside slowly.
 
         Raises:
-            ValueError: a collision leaves no pose inside the limits; nothing has changed.
+            ValueError: A collision leaves no pose inside the limits; nothing has changed.
         """
         collisions = Collisions(params.collisions, params.collision_margin_deg, limits, self._names)
-        collisions.go_on(self._collisions)
+        collisions.take_over_keepers(self._collisions)
         self._collisions = collisions
-        self._take(params)
+        self._set_params(params)
         self._health.retune(params.health)
         self._stuck.retune(params.stall)
         self._change.retune(limits)
         self._calm = False
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
-        """Count a joint's angles otherwise, as its zero, sign or ratio was changed.
+        """Convert a joint's angles after a change of its zero, sign or ratio.
 
-        Where the joint is sent does not change; where it should be may, so it goes slowly.
-        What was x is factor x + offset_rad from now on.
+        The angle x becomes factor * x + offset_rad. The servo's goal does not change. The
+        desired angle may change, so the joint moves slowly.
         """
         self._motion.recount(i, factor, offset_rad)
         self._stuck.forget(i)
@@ -120,7 +122,7 @@ class Guard:
         self._slow_down(i)
 
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
-        """Begin from the goals that are in force on the bus, at rest, gently."""
+        """Start from the present goals on the bus, at rest, slowly."""
         self._t_s = t_s
         self._change.reset()
         self._held = [False] * len(self._limits)
@@ -133,7 +135,7 @@ class Guard:
         self.go_gently()
 
     def go_gently(self) -> None:
-        """Move slowly for a while, and each joint until it has once met its desired angle."""
+        """Move slowly for some time, and each joint until it first reaches its desired angle."""
         self._calm = False
         for i in range(len(self._limits)):
             self._motion.forget_gaps(i)
@@ -142,21 +144,24 @@ class Guard:
 
     @property
     def limits(self) -> tuple[JointLimit, ...]:
-        """Return the limits in force, which new ones take the place of once joints keep them."""
+        """Return the present limits; new ones replace them as soon as joints keep them."""
         return tuple(self._limits)
 
     @property
     def gentle(self) -> bool:
-        """Return whether any joint is still on its slow way."""
+        """Return whether any joint still moves slowly."""
         return any(self._gentle)
 
     def check(
         self, desired_rad: JointAngles, joints: JointState, frame_age_s: float, t_s: float
     ) -> GuardResult:
-        """Return what may be sent now.
+        """Return the commands that may be sent now.
 
-        desired_rad: any numbers at all
-        frame_age_s: age of the newest frame; infinity before the first
+        Args:
+            desired_rad: Any numbers including NaN.
+            joints: Measured joints.
+            frame_age_s: Age of the newest frame, infinity before the first.
+            t_s: Present time.
         """
         if any(joints.rearmed):
             self._rearm(joints)
@@ -169,18 +174,18 @@ class Guard:
             self._change.step(bool(self._collisions))
         dt_s, missed_s = self._late.split(since_s, t_s, self._params.late_ms / 1e3)
         if missed_s > 0.0:
-            self._motion.left_alone(missed_s)
+            self._motion.record_gap(missed_s)
         self._soft = t_s < self._late.soft_until_s
         self._health.step(joints, dt_s)
         if self._collisions:
-            self._collisions.look(self._motion, desired_rad, joints.position_rad, self._held)
+            self._collisions.set_walls(self._motion, desired_rad, joints.position_rad, self._held)
         no_frame = not frame_age_s <= self._params.frame_timeout_ms / 1e3
         return self._joints(desired_rad, joints, no_frame, dt_s)
 
     def _joints(
         self, desired_rad: JointAngles, joints: JointState, no_frame: bool, dt_s: float
     ) -> GuardResult:
-        """Move all joints. Nearly every desired angle is a good one and is passed on as it is."""
+        """Move all joints; nearly every desired angle is passed on unchanged."""
         motion, far = self._motion, self._stuck.far_rad
         if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:
             motion.ease(dt_s)
@@ -195,7 +200,7 @@ class Guard:
         )  # fmt: skip
         for i, desired, position, at_s, watched, p, v, before, easy, low, high in rows:
             near = -far <= p - position <= far and not watched
-            if near and at_s >= stale_s and (usual or self._well(i, joints, no_frame)):
+            if near and at_s >= stale_s and (usual or self._is_well(i, joints, no_frame)):
                 wanted = (desired - p) / dt_s
                 if before is p and -easy <= wanted <= easy and -easy <= v <= easy and low <= desired <= high:  # fmt: skip
                     command[i] = goal[i] = desired
@@ -205,19 +210,19 @@ class Guard:
                     continue
             followed = False
             unseen = no_frame and self._neck[i]
-            outcome = self._pass(i, desired, joints, at_s >= stale_s, unseen, dt_s)
+            outcome = self._move_joint(i, desired, joints, at_s >= stale_s, unseen, dt_s)
             if outcome[1]:
                 short[i] = outcome
         self._calm = followed
         if followed:
             return passed(desired_rad, self._names)
-        if short != self._short:  # what is found of joints lasts for many ticks
+        if short != self._short:  # findings last for many ticks
             self._short, self._findings = short, findings(short, self._names)
         level, reasons, why, critical = self._findings
         return GuardResult(tuple(command), level, reasons, desired_rad, why, critical, self._names)
 
     def _all_well(self, joints: JointState) -> bool:
-        """Return whether nothing but limits, ages and distances need be looked at."""
+        """Return whether only limits, ages and distances must be checked."""
         calm = self._calm or not (
             any(self._gentle) or any(self._held) or self._change.waiting or self._change.outside
         )
@@ -230,8 +235,8 @@ class Guard:
             or any(joints.fault)
         )
 
-    def _well(self, i: int, joints: JointState, no_frame: bool) -> bool:
-        """Whether this holds for one joint."""
+    def _is_well(self, i: int, joints: JointState, no_frame: bool) -> bool:
+        """Return whether only limit, age and distance of a joint must be checked."""
         return not (
             (no_frame and self._neck[i])
             or self._soft
@@ -248,7 +253,7 @@ class Guard:
         )
 
     def _rearm(self, joints: JointState) -> None:
-        """Begin where the bus has put the goals of joints whose torque came on again."""
+        """Start at the goals that the bus has set for joints whose torque came on again."""
         for i, (angle, rearmed) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
             if rearmed and isfinite(angle):
                 self._change.begin(i, angle)
@@ -257,17 +262,17 @@ class Guard:
                 self._slow_down(i)
 
     def _slow_down(self, i: int) -> None:
-        """Make one joint go on slowly, as after torque-on."""
+        """Make a joint continue slowly, as after torque-on."""
         self._calm = False
         if not self._gentle[i]:
             self._motion.forget_gaps(i)
         self._gentle[i] = True
         self._gentle_until_s[i] = self._t_s + self._params.soft_start_ms / 1e3
 
-    def _pass(
+    def _move_joint(
         self, i: int, desired: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float
     ) -> tuple[int, str]:
-        """Move one joint; return the rank of the level and the reason, if there is one."""
+        """Move a joint; return the rank of its level and the reason, 0 and "" if it follows."""
         position = joints.position_rad[i]
         fault = joints.fault[i] if joints.fault else ""
         fresh = fresh and isfinite(position)
@@ -276,37 +281,37 @@ class Guard:
         if hold is None:
             self._retreat[i] = None
             hold = self._outer_hold(i, desired, unseen)
-        if fault:  # what still moves, moves to its parking place
+        if fault:  # a joint that still moves is parking
             self._slow_down(i)
         if hold is not None:
-            self._stand(i, hold, dt_s)
+            self._apply_hold(i, hold, dt_s)
             rank, reason = 2, hold.reason
         else:
-            reason = self._go(i, desired, position, dt_s)
+            reason = self._move_towards(i, desired, position, dt_s)
             rank = 1 if reason else 0
         return (3, fault) if fault else (rank, reason)
 
     def _servo_hold(self, i: int, joints: JointState, fault: str, fresh: bool) -> _Hold | None:
-        """Return why a joint's servo cannot or must not follow the command."""
+        """Return the hold of a joint whose servo cannot or must not follow, else None."""
         position = joints.position_rad[i]
         powered = joints.torque[i] if joints.torque else not fault
         if not powered:
-            # Where it is when the torque comes back, its command is already.
+            # The command follows the position, so that nothing jumps when the torque comes on.
             self._stuck.forget(i)
             return _Hold("torque off", position if isfinite(position) else None, again="slowly")
         if "encoder" in fault:
             return _Hold(fault)
-        if self._is_stuck(i, joints, fresh):
-            return self._give_way(i, "not moving", position, fresh)
+        if self._is_stalled(i, joints, fresh):
+            return self._retreat_to(i, "not moving", position, fresh)
         strain = self._health.held[i]
         if strain == "overloaded":
-            return self._give_way(i, strain, position, fresh)
+            return self._retreat_to(i, strain, position, fresh)
         if not fresh:
             return _Hold("stale joints")
         return _Hold(strain, again="slowly") if strain else None
 
     def _outer_hold(self, i: int, desired: float, unseen: bool) -> _Hold | None:
-        """Return what else keeps a joint from its desired angle."""
+        """Return the hold of a joint for reasons other than its servo, else None."""
         if i in self._change.waiting:
             return _Hold("new limits")
         if i in self._collisions.exits:
@@ -321,31 +326,31 @@ class Guard:
             return _Hold("not finite")
         return _Hold("stale frame") if unseen else None
 
-    def _is_stuck(self, i: int, joints: JointState, fresh: bool) -> bool:
-        """Return whether a joint is commanded to move and does not."""
-        if self._stuck.holds(i, self._t_s):
+    def _is_stalled(self, i: int, joints: JointState, fresh: bool) -> bool:
+        """Return whether a joint does not move although it is commanded to."""
+        if self._stuck.is_waiting(i, self._t_s):
             return True
-        # Where a servo tells nothing, its place is no news of what it met.
+        # Without feedback the position is estimated and shows no obstacle.
         if joints.measured and not joints.measured[i]:
             return False
         command, position = self._motion.command[i], joints.position_rad[i]
-        if fresh and self._stuck.found(i, command, position, joints.measured_s[i], self._t_s):
+        if fresh and self._stuck.has_stalled(i, command, position, joints.measured_s[i], self._t_s):
             self._retrying[i] = True
             return True
         return False
 
-    def _give_way(self, i: int, reason: str, position: float, fresh: bool) -> _Hold:
-        """Move the command back to where the joint is, and again if it is pushed away.
+    def _retreat_to(self, i: int, reason: str, position: float, fresh: bool) -> _Hold:
+        """Move the command back to the joint's position, and again if the joint is pushed away.
 
-        Not all the time: a neck would sink under its own weight.
+        The command does not follow continuously: a neck would sink under its own weight.
         """
         back = self._retreat[i]
         if fresh and (back is None or abs(back - position) > self._stuck.far_rad):
             self._retreat[i] = back = position
         return _Hold(reason, back, again="slowly")
 
-    def _stand(self, i: int, hold: _Hold, dt_s: float) -> None:
-        """Bring a joint to a stop, or to where it should be meanwhile."""
+    def _apply_hold(self, i: int, hold: _Hold, dt_s: float) -> None:
+        """Stop a joint, or move it to the goal of its hold."""
         if hold.again == "slowly":
             self._slow_down(i)
         if hold.goal is None:
@@ -359,12 +364,12 @@ class Guard:
     def _seek_gently(
         self, i: int, goal: float, dt_s: float, top: float = inf, accel: float = inf
     ) -> None:
-        """Go to a goal slowly; what a late tick costs of the slow speed is regained at once."""
+        """Move to a goal slowly; slow speed lost by a late tick is regained immediately."""
         speed, soft = min(top, self._gentle_speed), min(accel, self._gentle_accel)
         self._motion.seek(i, goal, dt_s, speed, soft, regain=min(accel, self._late_accel))
 
-    def _go(self, i: int, desired: float, position: float, dt_s: float) -> str:
-        """Move a joint towards its desired angle as far as it may; return why it fell short."""
+    def _move_towards(self, i: int, desired: float, position: float, dt_s: float) -> str:
+        """Move a joint towards its desired angle; return why it fell short, "" if it did not."""
         motion, limit, share = self._motion, self._limits[i], self._health.share[i]
         began = motion.command[i]
         target = min(max(desired, motion.low[i]), motion.high[i])

@@ -1,4 +1,4 @@
-"""The guard's result of one tick, made from what it found of each joint."""
+"""The guard's result of one tick from its findings for the joints."""
 
 from typing import NamedTuple
 
@@ -10,20 +10,20 @@ _LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "torque_off")
 def standstill(
     command: JointAngles, desired_rad: JointAngles, joints: tuple[str, ...]
 ) -> GuardResult:
-    """Return the result where nothing moves, as no time has passed."""
+    """Return the result of a tick without motion, as no time has passed."""
     reasons = ("all: time stands still",)
     why = ("time stands still",) * len(command)
     return GuardResult(command, "hold", reasons, desired_rad, why, reasons, joints)
 
 
 def passed(desired_rad: JointAngles, joints: tuple[str, ...]) -> GuardResult:
-    """Return the result of a tick in which every joint may do as is desired."""
-    # Without the call of a function written in Python that the class itself would cost.
+    """Return the result of a tick in which every joint follows its desired angle."""
+    # Avoids the call of the class's constructor, a Python function.
     return tuple.__new__(GuardResult, (desired_rad, "ok", (), desired_rad, (), (), joints))
 
 
 class Findings(NamedTuple):
-    """What the guard found of all joints, in the fields of ``GuardResult``."""
+    """The guard's findings for all joints, in the fields of ``GuardResult``."""
 
     level: Level
     reasons: tuple[str, ...]
@@ -32,12 +32,12 @@ class Findings(NamedTuple):
 
 
 def findings(short: dict[int, tuple[int, str]], joints: tuple[str, ...]) -> Findings:
-    """Return what was found; its level is that of the worst joint.
+    """Return the findings for all joints; the level is that of the worst joint.
 
     Args:
-        short: how bad it is, 1 (limited) to 3 (torque_off), and why, by the number of every joint
-            that falls short.
-        joints: their names.
+        short: Rank, 1 (limited) to 3 (torque_off), and reason by the number of each joint that
+            does not follow.
+        joints: Names of all joints.
     """
     if not short:
         return Findings("ok", (), (), ())

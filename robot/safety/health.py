@@ -1,4 +1,4 @@
-"""What servos bear: heat, load and voltage slow a joint down before they stop it."""
+"""Strain of servos: heat, load and voltage slow a joint down before they stop it."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -10,31 +10,32 @@ from gazerig.robot.model.types import JointState
 
 Strain = Literal["", "hot", "overloaded", "voltage"]
 _Column = tuple[float | None, ...]
-_COOLER_C = 2.0  # temperatures come in whole degrees: without this a joint would stutter
+_COOLER_C = 2.0  # hysteresis: temperatures have whole degrees, a joint would stutter without it
 
 
 class JointHealth:
-    """Strain of every joint.
+    """The strain of all joints.
 
-    share: part of its speed and acceleration that a joint may use
-    why: what that part is due to
-    held: what keeps a joint still altogether
-    fine: nothing of all this applies to any joint
+    Attributes:
+        share: Part of its speed and acceleration that each joint may use, 0 .. 1.
+        why: Reason for that part, per joint.
+        held: Reason for a complete stop, per joint.
+        fine: Whether no joint is strained.
     """
 
     def __init__(self, params: HealthParams, limits: tuple[JointLimit, ...]) -> None:
-        """Find all joints well."""
+        """Start with all joints unstrained."""
         self._limits = limits
-        self._take(params)
+        self._set_params(params)
         self.reset()
 
-    def _take(self, params: HealthParams) -> None:
+    def _set_params(self, params: HealthParams) -> None:
         self._params = params
         self._full = (1.0 - params.lasting_load**2) * params.overload_ms / 1e3
         self._outside_full_s = params.voltage_ms / 1e3
 
     def reset(self) -> None:
-        """Find all joints well until they say otherwise."""
+        """Set all joints to unstrained until the servos report otherwise."""
         count = len(self._limits)
         self.share = [1.0] * count
         self.why: list[Strain] = [""] * count
@@ -49,11 +50,11 @@ class JointHealth:
         self._seen: tuple[_Column, _Column] = ((), ())
 
     def retune(self, params: HealthParams) -> None:
-        """Bear more or less; the heat that has been counted stays."""
-        self._take(params)
+        """Set new thresholds; the accumulated heat stays."""
+        self._set_params(params)
         self._heated = [min(heat, self._full) for heat in self._heated]
         self._outside_s = [min(s, self._outside_full_s) for s in self._outside_s]
-        self._seen = ((), ())  # what the servos said last is judged again
+        self._seen = ((), ())  # the newest reports are judged again
         self._counting = True
 
     def step(self, joints: JointState, dt_s: float) -> None:
@@ -78,9 +79,9 @@ class JointHealth:
         self.fine = min(self.share) == 1.0 and not any(self.held)
 
     def _judge(self, i: int, joints: JointState, dt_s: float) -> None:
-        heat = self._heat(i, _told(joints.temperature_c, i))
-        load = self._load(i, _told(joints.load, i), dt_s)
-        volts = self._volts(i, _told(joints.voltage_v, i), dt_s)
+        heat = self._heat(i, _value(joints.temperature_c, i))
+        load = self._load(i, _value(joints.load, i), dt_s)
+        volts = self._volts(i, _value(joints.voltage_v, i), dt_s)
         share = min(heat, load, volts)
         slowest = self._params.slowest
         self.share[i] = slowest + (1.0 - slowest) * share
@@ -94,7 +95,7 @@ class JointHealth:
             self.held[i] = "hot" if self._hot[i] else "voltage" if self._no_volts[i] else ""
 
     def _heat(self, i: int, celsius: float | None) -> float:
-        """Return what is left, from 1 when warm to 0 when hot."""
+        """Return the share that heat leaves, from 1 when warm to 0 when hot."""
         if celsius is None:
             return 1.0
         warm = self._limits[i].hottest_c - self._params.warm_c
@@ -103,10 +104,10 @@ class JointHealth:
         return min(max((hot - celsius) / (hot - warm), 0.0), 1.0)
 
     def _load(self, i: int, load: float | None, dt_s: float) -> float:
-        """Return what is left, from 1 at half the bearable heat of the motor to 0 at all of it.
+        """Return the share that load leaves, from 1 at half the motor's heat limit to 0 at it.
 
-        Heat goes with the square of the current; it is given off as fast as the lasting
-        load makes it.
+        Heat rises with the square of the current. It is given off at the rate at which the
+        lasting load produces it.
         """
         if load is not None:
             gained = (load * load - self._params.lasting_load**2) * dt_s
@@ -116,13 +117,13 @@ class JointHealth:
         return min(max(2.0 - 2.0 * filled, 0.0), 1.0)
 
     def _volts(self, i: int, volts: float | None, dt_s: float) -> float:
-        """Return what is left, from 1 inside the margin to 0 at the servo's own limit."""
+        """Return the share that voltage leaves, from 1 inside the margin to 0 at the limit."""
         if volts is None:
             return 1.0
         room = min(volts - self._limits[i].lowest_v, self._limits[i].highest_v - volts)
         outside_s = self._outside_s[i] + (dt_s if room < 0.0 else -dt_s)
         self._outside_s[i] = min(max(outside_s, 0.0), self._outside_full_s)
-        # A sagging supply recovers when the joint stops: it goes on after as long a rest.
+        # A sagging supply recovers when the joint stops: the joint rests for the same time.
         spent = outside_s >= self._outside_full_s and room < 0.0
         self._no_volts[i] = spent or (self._no_volts[i] and self._outside_s[i] > 0.0)
         if room >= self._params.voltage_margin_v:
@@ -130,7 +131,7 @@ class JointHealth:
         return max(room / self._params.voltage_margin_v, 0.0) if room > 0.0 else 0.0
 
 
-def _told(column: Sequence[float | None], i: int) -> float | None:
-    """Return one joint's value, None where it is not known."""
+def _value(column: Sequence[float | None], i: int) -> float | None:
+    """Return one joint's value, None if it is unknown."""
     value = column[i] if column else None
     return value if value is not None and isfinite(value) else None

@@ -1,27 +1,28 @@
-"""Ticks that come too late: no servo has gone on by itself meanwhile. Seconds.
+"""Detection of ticks that come late. Times are in seconds.
 
-Without a new goal a servo brakes to its last one. A guard that lets the joint be where it would
-be by now, had it gone on, sends a leap of all that way: 2.3 times the top speed after 50 ms.
+Without a new goal a servo brakes to its last one. A guard that extrapolated the joint's motion
+over a gap would send a jump: 2.3 times the top speed after 50 ms.
 """
 
 from collections import deque
 from math import inf
 
 LATE_PERIODS = 1.5
-"""A tick so many periods after the one before has missed a slot."""
+"""A tick that comes more than this number of periods after the previous one is late."""
 
 STEADY_TICKS, SLOWEST_S = 5, 0.05
-"""Where so many in a row came late, up to so much apart, that is the pace: a bus or a host too
-slow for its rate. Each of them taken for a gap would leave a neck at 10 deg/s."""
+"""This number of late ticks in a row, up to this interval apart, set a new pace: the bus or the
+host is too slow for its rate. If each counted as a gap, a neck would reach only 10 deg/s."""
 
 
 class LateTicks:
-    """Detects late ticks, and for how long acceleration is limited after one.
+    """A detector of late ticks, after which acceleration is limited for some time.
 
-    soft_until_s: joints gather speed softly until then
+    Attributes:
+        soft_until_s: End of the limited acceleration.
 
     Args:
-        period_s: nominal time between ticks.
+        period_s: Nominal time between ticks.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -30,12 +31,12 @@ class LateTicks:
         self._recent_s: deque[float] = deque([period_s], STEADY_TICKS)
 
     def split(self, since_s: float, t_s: float, soft_s: float) -> tuple[float, float]:
-        """Return the time to move for, and the time in which servos were left alone, 0 for none.
+        """Return the time to move for, and the time without goals, 0 if the tick is not late.
 
         Args:
-            since_s: time since the tick before.
-            t_s: now.
-            soft_s: joints gather speed softly for so long after a late tick.
+            since_s: Time since the previous tick.
+            t_s: Present time.
+            soft_s: Duration of the limited acceleration after a late tick.
         """
         recent_s = self._recent_s
         if since_s <= LATE_PERIODS * self.period_s:

@@ -1,4 +1,4 @@
-"""Limits that change while joints move: without a jump, and joints outside are led inside."""
+"""Change of limits while joints move: without a jump, and joints outside move inside."""
 
 from collections.abc import Callable
 
@@ -9,15 +9,17 @@ _ROUNDING_RAD = 1e-9
 
 
 class LimitChange:
-    """The limits of all joints: those in force, and those that wait until joints can keep them.
+    """The present limits of all joints, and new ones that wait until joints can keep them.
 
-    waiting: joints that come to rest before their new limits apply
-    outside: joints that are outside their ranges
+    Attributes:
+        waiting: Joints that come to rest before their new limits apply.
+        outside: Joints that are outside their ranges.
 
     Args:
-        motion: moves the joints under the limits in force.
-        wanted: one limit for each joint.
-        reach: returns the ranges and speeds that the servos themselves keep; None: all.
+        motion: Limiter with the present limits.
+        wanted: One limit per joint.
+        reach: Returns the ranges and speeds that the servos themselves keep; None if they
+            keep any.
     """
 
     def __init__(
@@ -32,7 +34,7 @@ class LimitChange:
         self.reset()
 
     def reset(self) -> None:
-        """Apply all limits at once."""
+        """Apply all limits immediately."""
         self._motion.limits[:] = self._within_reach()
         self.waiting.clear()
 
@@ -42,21 +44,22 @@ class LimitChange:
         in_force = self._motion.limits
         self.waiting = {i for i, limit in enumerate(self._within_reach()) if limit != in_force[i]}
         for i in range(len(wanted)):
-            self._motion.let_be(i)  # walls of a collision that is gone
+            self._motion.reset_range(i)  # walls of a collision that is gone
 
     def begin(self, i: int, angle_rad: float) -> None:
-        """Begin with one joint at a goal that is in force on the bus, at rest."""
+        """Start a joint at its present goal on the bus, at rest."""
         low, high = self._motion.limits[i][:2]
         if self._reach is not None:
             reach = self._reach()[i]
             low, high = min(low, reach.low_rad), max(high, reach.high_rad)
         self._motion.restart(i, min(max(angle_rad, low), high))
-        self._note_outside(i)
+        self._update_outside(i)
 
     def step(self, walls: bool) -> None:
-        """Go on with what a change has begun.
+        """Apply limits that joints can keep now.
 
-        walls: some were put up against collisions, for the accelerations of now
+        Args:
+            walls: Whether there are walls against collisions, made for the present accelerations.
         """
         if self.waiting:
             limits, motion = self._within_reach(), self._motion
@@ -65,21 +68,21 @@ class LimitChange:
                 if motion.speed[i] == 0.0 or free:
                     motion.take(i, limits[i])
                     self.waiting.discard(i)
-                    self._note_outside(i)
+                    self._update_outside(i)
         for i in sorted(self.outside):
-            self._note_outside(i)
+            self._update_outside(i)
 
     def _within_reach(self) -> tuple[JointLimit, ...]:
-        """Return the limits in force, once joints have come to rest: those that servos keep."""
+        """Return the wanted limits, reduced to those that the servos keep."""
         if self._reach is None:
             return self._wanted
         return tuple(map(JointLimit.within, self._wanted, self._reach()))
 
-    def _note_outside(self, i: int) -> None:
-        """See whether a joint has to be led into its range."""
+    def _update_outside(self, i: int) -> None:
+        """Update whether a joint is outside its range."""
         limit, now = self._motion.limits[i], self._motion.command[i]
         if limit.low_rad - _ROUNDING_RAD <= now <= limit.high_rad + _ROUNDING_RAD:
             self.outside.discard(i)
         else:
             self.outside.add(i)
-        self._motion.let_be(i)
+        self._motion.reset_range(i)

@@ -1,8 +1,8 @@
-"""How a joint's command may move: range, speed, acceleration and room to brake. Radians.
+"""Limits of a command's motion: range, speed, acceleration and room to brake. Units: rad, s.
 
-Every step keeps p + v^2 / 2a inside the range that is in force. As v^2 / 2a bounds every
-later sequence of braking steps, a joint that keeps this can always stop in time, whatever
-the length of the ticks to come.
+Every step keeps p + v^2 / 2a inside the present range. As v^2 / 2a bounds every later sequence
+of braking steps, a joint that keeps this can always stop in time, whatever the length of the
+following ticks.
 """
 
 from math import copysign, inf, sqrt
@@ -11,18 +11,20 @@ from gazerig.robot.model.joint_limit import JointLimit
 
 _ROUNDING_RAD = 1e-9
 SHORT_GAP_S = 0.05
-"""After a longer time without goals a joint begins as from rest."""
+"""After a longer time without goals a joint starts from rest."""
 
 
 class MotionLimiter:
-    """The commands of all joints and their speeds, moved one step at a time.
+    """The commands of all joints and their speeds, moved step by step.
 
-    command, speed: what was sent last
-    goal: the desired angle that was aimed at last; the command itself where it was reached
-    low, high: the ranges in force; a wall inside a joint's own range may be put up as
-        long as the joint can stop before it (``keeps_below``, ``keeps_above``)
-    easy_speed, easy_low, easy_high: a joint whose speeds before and after a step of ``easy_s`` or
-        longer are within the first, and whose angle is between the others, keeps every limit
+    Attributes:
+        command, speed: Newest commands and their speeds.
+        goal: Newest desired angles; the command itself if it was reached.
+        low, high: Present ranges. A wall inside a joint's own range may be put up while the
+            joint can stop before it (``keeps_below``, ``keeps_above``).
+        easy_s, easy_speed, easy_low, easy_high: A joint keeps every limit in a step of at least
+            ``easy_s`` if its speeds before and after are within ``easy_speed`` and its angle is
+            between ``easy_low`` and ``easy_high``.
     """
 
     def __init__(self, limits: tuple[JointLimit, ...]) -> None:
@@ -39,15 +41,15 @@ class MotionLimiter:
         self.easy_low, self.easy_high = list(self.low), list(self.high)
 
     def ease(self, dt_s: float) -> None:
-        """Find for steps of about this length what keeps every limit without further checks."""
-        self.easy_s = 0.9 * dt_s  # ticks are not all of one length
+        """Compute the easy range: steps of about this length in it keep every limit."""
+        self.easy_s = 0.9 * dt_s  # ticks vary in length
         for i in range(len(self.limits)):
             self._ease(i)
 
     def _ease(self, i: int) -> None:
-        """Find it for one joint: half the change of speed that a step allows, both ways.
+        """Compute a joint's easy range: half the change of speed that a step allows.
 
-        The braking distance from there, v^2 / 2a, is kept twice from the ends.
+        The range ends at twice the braking distance v^2 / 2a before the joint's limits.
         """
         limit = self.limits[i]
         speed = min(limit.speed_rad_s, 0.49 * limit.accel_rad_s2 * self.easy_s)
@@ -61,10 +63,10 @@ class MotionLimiter:
         self.speed[i] = 0.0
         self._lost[i] = 0.0
 
-    def left_alone(self, for_s: float) -> None:
-        """Record that servos got no goals for a time, in which they braked to their last ones.
+    def record_gap(self, for_s: float) -> None:
+        """Record a time without goals, in which the servos braked to their last ones.
 
-        What a short gap costs of a slow speed is regained faster than it was gathered (``seek``).
+        Slow speed lost in a short gap is regained faster than it was reached (``seek``).
         """
         short = for_s <= SHORT_GAP_S
         for i, limit in enumerate(self.limits):
@@ -78,11 +80,11 @@ class MotionLimiter:
             self.goal[i] = self.command[i]
 
     def forget_gaps(self, i: int) -> None:
-        """Regain no speed that a joint has had so far, as its slow motion only begins."""
+        """Discard the speed to regain, as a slow motion starts."""
         self._lost[i], self._slow[i] = 0.0, False
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
-        """Count a joint's angles otherwise: what was x is factor x + offset from now on."""
+        """Convert a joint's angles: x becomes factor * x + offset_rad."""
         low, high, speed, accel = self.limits[i][:4]
         ends = sorted(factor * end + offset_rad for end in (low, high))
         size = abs(factor)
@@ -95,22 +97,22 @@ class MotionLimiter:
         self.command[i] = self.goal[i] = factor * self.command[i] + offset_rad
         self.speed[i] *= factor
         self._lost[i] = 0.0
-        self.let_be(i)
+        self.reset_range(i)
 
     def take(self, i: int, limit: JointLimit) -> None:
         """Change the limit."""
         self.limits[i] = limit
         self.goal[i] = self.command[i]
-        self.let_be(i)
+        self.reset_range(i)
 
     def keeps(self, i: int, limit: JointLimit) -> bool:
-        """Return whether a joint that moves as it does keeps another limit as well."""
+        """Return whether a joint's present motion keeps another limit."""
         p, v = self.command[i], self.speed[i]
         room = limit.high_rad - p if v > 0.0 else p - limit.low_rad
         return abs(v) <= limit.speed_rad_s and v * v <= 2.0 * limit.accel_rad_s2 * max(0.0, room)
 
-    def let_be(self, i: int) -> None:
-        """Accept a joint's position: its range holds, and the way back into it."""
+    def reset_range(self, i: int) -> None:
+        """Set a joint's range to its limit, extended to its command; remove walls."""
         limit, now = self.limits[i], self.command[i]
         self.low[i], self.high[i] = min(limit.low_rad, now), max(limit.high_rad, now)
         self._ease(i)
@@ -138,9 +140,9 @@ class MotionLimiter:
         return stop >= wall_rad - _ROUNDING_RAD
 
     def follow(self, i: int, desired: float, dt_s: float) -> bool:
-        """Go to the desired angle, if that keeps every limit; else do nothing and say no.
+        """Move to the desired angle if that keeps every limit; return whether it does.
 
-        Who is still catching up would run past the goal: that is for ``chase``.
+        A joint that is still catching up would overshoot; use ``chase`` for it.
         """
         limit = self.limits[i]
         accel = limit.accel_rad_s2
@@ -159,10 +161,10 @@ class MotionLimiter:
         return True
 
     def chase(self, i: int, desired: float, dt_s: float, top: float, soft: float) -> None:
-        """Catch up with a desired angle that moves and fall into its pace."""
+        """Catch up with a moving desired angle and match its speed."""
         target = min(max(desired, self.low[i]), self.high[i])
         along = (target - self.goal[i]) / dt_s
-        if not -top <= along <= top:  # it jumped, or is too fast: there is no pace to fall into
+        if not -top <= along <= top:  # it jumped or is too fast to match
             along = 0.0
         self.seek(i, desired, dt_s, top, soft, along)
 
@@ -176,15 +178,19 @@ class MotionLimiter:
         along: float = 0.0,
         regain: float = 0.0,
     ) -> None:
-        """Go to a desired angle below a speed ``top``, gathering it with ``soft``, to end there.
+        """Move towards a desired angle and stop there, with limited speed and acceleration.
 
-        Braking may take all of the joint's own acceleration, as a slow passage may begin
-        in full flight.
+        Braking may use the joint's full acceleration, as a slow motion may start at full speed.
 
-        top, soft: the joint's own speed and acceleration hold all the same
-        along: the speed of the goal itself
-        regain: acceleration up to the speed that the joint had before a short gap. With ``soft``
-            alone, a joint that misses a tick now and then would hardly move at all.
+        Args:
+            i: Number of the joint.
+            desired: Desired angle.
+            dt_s: Length of the step.
+            top: Highest speed; the joint's own limit also applies.
+            soft: Acceleration; the joint's own limit also applies.
+            along: Speed of the goal.
+            regain: Acceleration up to the speed before a short gap. With ``soft`` alone, a joint
+                that sometimes misses a tick would hardly move.
         """
         top = min(top, self.limits[i].speed_rad_s)
         soft = min(soft, self.limits[i].accel_rad_s2)
@@ -197,7 +203,7 @@ class MotionLimiter:
         self._step(i, along + (closing if gap >= 0.0 else -closing), dt_s, top, soft, regain)
 
     def brake(self, i: int, dt_s: float) -> None:
-        """Come to a stop as fast as the joint may."""
+        """Stop with the joint's full acceleration."""
         limit = self.limits[i]
         self._step(i, 0.0, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
         self.goal[i] = self.command[i]
@@ -206,21 +212,21 @@ class MotionLimiter:
     def _step(
         self, i: int, wanted: float, dt_s: float, top: float, soft: float, regain: float = 0.0
     ) -> None:
-        """Move with the speed nearest to the wanted one that keeps every limit."""
+        """Move at the speed nearest to ``wanted`` that keeps every limit."""
         accel = self.limits[i].accel_rad_s2
         p, v, low, high = self.command[i], self.speed[i], self.low[i], self.high[i]
-        most, least = _faster(v, accel, soft, dt_s), -_faster(-v, accel, soft, dt_s)
+        most, least = _highest_speed(v, accel, soft, dt_s), -_highest_speed(-v, accel, soft, dt_s)
         lost = self._lost[i]
         if lost != 0.0:
             if lost > 0.0 <= v:
                 most = max(most, min(lost, v + regain * dt_s))
             elif lost < 0.0 >= v:
                 least = min(least, max(lost, v - regain * dt_s))
-            if least <= wanted <= most or wanted * lost <= 0.0:  # as fast as it is to be
+            if least <= wanted <= most or wanted * lost <= 0.0:  # the wanted speed is reached
                 self._lost[i] = 0.0
         chosen = most if wanted > most else least if wanted < least else wanted
-        # Top speed, range and braking distance win over softness, never over the joint's own
-        # acceleration, which is enough for them as long as every step is taken here.
+        # Top speed, range and braking distance override ``soft``, never the joint's own
+        # acceleration, which suffices for them because every step is made here.
         if chosen > 0.0 or v > 0.0:
             up = min(top, reachable_speed(high - p, accel, dt_s))
             if chosen > up:
@@ -244,8 +250,8 @@ def reachable_speed(room_rad: float, accel: float, dt_s: float) -> float:
     return sqrt(half * half + 2.0 * accel * max(0.0, room_rad)) - half
 
 
-def _faster(v: float, accel: float, soft: float, dt_s: float) -> float:
-    """Return the highest speed after one step: braking to rest is hard, what follows is soft."""
+def _highest_speed(v: float, accel: float, soft: float, dt_s: float) -> float:
+    """Return the highest speed after one step: full braking to rest, then soft acceleration."""
     if v >= 0.0:
         return v + soft * dt_s
     at_rest_s = -v / accel

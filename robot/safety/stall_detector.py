@@ -1,7 +1,7 @@
-"""Joints that are commanded to move and do not: a jam, a blocked lid, a finger.
+"""Detection of joints that do not follow their commands: a jam, a blocked lid, a finger.
 
-A servo pushes harder the farther its goal is away, so what does not move must not be
-pushed: the command comes back to where the joint is, waits, and tries again softly.
+A servo pushes harder the farther away its goal is, so a stalled joint must not be pushed: its
+command returns to the joint's position, waits, and tries again softly.
 """
 
 from math import nan, radians
@@ -10,15 +10,16 @@ from gazerig.robot.model.guard_params import StallParams
 
 
 class StallDetector:
-    """Watches how joints follow their commands.
+    """A detector of stalled joints.
 
-    far_rad: joints nearer to their commands than this are well
-    lead_rad: how far a command may be ahead of a joint that tries again
-    watched: side of the joint on which its command is far away, 0 where it is near
+    Attributes:
+        far_rad: Largest normal distance between joint and command.
+        lead_rad: Largest distance of the command ahead of a joint that tries again.
+        watched: Per joint, the side on which its command is far away (1 or -1), 0 if it is near.
     """
 
     def __init__(self, params: StallParams, count: int) -> None:
-        """Find all joints well."""
+        """Start with no joint stalled."""
         self.retune(params)
         self.watched = [0] * count
         self._since_s = [0.0] * count
@@ -26,7 +27,7 @@ class StallDetector:
         self._until_s = [nan] * count
 
     def retune(self, params: StallParams) -> None:
-        """Watch otherwise; joints that wait to try again still do."""
+        """Set new thresholds; stalled joints continue to wait."""
         self._stuck_s = params.detection_ms / 1e3
         self._retry_s = params.retry_ms / 1e3
         self._moved_rad = radians(params.moved_deg)
@@ -34,23 +35,28 @@ class StallDetector:
         self.lead_rad = radians(params.retry_deg)
 
     def forget(self, i: int) -> None:
-        """Find a joint well: it rests on its command."""
+        """Clear a joint's stall, as its command is at its position."""
         self.watched[i] = 0
         self._until_s[i] = nan
 
-    def holds(self, i: int, t_s: float) -> bool:
-        """Return whether a joint was found stuck and has not waited long enough."""
+    def is_waiting(self, i: int, t_s: float) -> bool:
+        """Return whether a joint is stalled and still waits."""
         if t_s >= self._until_s[i]:
             self.forget(i)
         return t_s < self._until_s[i]
 
-    def found(self, i: int, command: float, position: float, at_s: float, t_s: float) -> bool:
-        """Update with one new measurement; return whether the joint is stalled from now on.
+    def has_stalled(self, i: int, command: float, position: float, at_s: float, t_s: float) -> bool:
+        """Update with a new measurement; return whether the joint has stalled.
 
-        Only motion towards the command counts: who drags a joint the other way is to be
-        given way to.
+        Only motion towards the command counts: a joint that a hand moves the other way must
+        give way.
 
-        at_s: when the answer came
+        Args:
+            i: Number of the joint.
+            command: Commanded angle in rad.
+            position: Measured angle in rad.
+            at_s: Time of the measurement.
+            t_s: Present time.
         """
         lead = command - position
         if -self.far_rad <= lead <= self.far_rad:
