@@ -47,7 +47,7 @@ def rig_files(folder: Path) -> dict[str, str]:
 
 def hide_real_ports(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Let bring-up see none of this computer's ports."""
-    progress = pytest.importorskip("gazerig.features.bringup.cli.progress")
+    ports = pytest.importorskip("gazerig.features.bringup.cli.ports")
     host = Host(folder / "latency", folder / "by-id", folder / "processes")
-    monkeypatch.setattr(progress, "host", host)
-    monkeypatch.setattr(progress, "serial_ports", lambda host: ())
+    monkeypatch.setattr(ports, "host", host)
+    monkeypatch.setattr(ports, "serial_ports", lambda host: ())

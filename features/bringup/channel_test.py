@@ -13,9 +13,9 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.hold import HoldResult, take
+from gazerig.drivers.hobby_board.hold import HoldResult, hold_channel
 from gazerig.drivers.hobby_board.release import switch_off
-from gazerig.drivers.hobby_board.start import every_pulse
+from gazerig.drivers.hobby_board.start import read_every_pulse
 from gazerig.drivers.maestro.commands import name_errors
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.types import ServoConfig
@@ -90,9 +90,9 @@ def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     log = EventLog()
     (pulse,) = board.find([setup], log)
     board.prepare(log)
-    channel = Channel(setup, board.timing.longest_lead_s)
+    channel = Channel(setup, board.timing.longest_ramp_s)
     try:
-        outcomes = (take(board, channel, pulse) for _ in range(MOST_TRIES))
+        outcomes = (hold_channel(board, channel, pulse) for _ in range(MOST_TRIES))
         if all(outcome is HoldResult.NO_ANSWER for outcome in outcomes):
             raise ServoMissing(
                 f"{board.line.port.port_name}: no answer about {servo_label(setup)}: check its "
@@ -137,7 +137,7 @@ def _led(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -
         pulses = board.pulses((channel.id,))
         if pulses is not None:
             return pulses[0]
-    return every_pulse(board, [channel.setup])[0]
+    return read_every_pulse(board, [channel.setup])[0]
 
 
 def _end(board: Board, setup: ServoConfig) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 from gazerig.drivers.errors import DriverError, ServoFault, SetupError
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.monitor import TelemetrySample
 from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.telemetry import TelemetrySample
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams

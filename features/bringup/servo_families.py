@@ -1,8 +1,9 @@
 """The kinds of smart servos, each as bring-up deals with it: the only place that names makes."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
-from gazerig.drivers.bus.servo_models import SERVOS
+from gazerig.drivers.bus.servo_models import SERVOS, BusKind
 from gazerig.drivers.dynamixel import control_table as dynamixel
 from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
 from gazerig.drivers.errors import SetupError
@@ -10,7 +11,63 @@ from gazerig.drivers.feetech import homing
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
 from gazerig.drivers.feetech.scs import FEETECH_SCS
-from gazerig.features.bringup.servo_family import Driving, ServoKind, Setting
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Family
+
+Tell = Callable[[str], None]
+"""Takes a few words on what is being done now."""
+
+
+class Setting(NamedTuple):
+    """A register that must have a value where it is calibrated; ``mask`` chooses its bits."""
+
+    register: str
+    value: int
+    mask: int = ~0
+
+    def of(self, now: int) -> int:
+        """Return what the register should be, being this now."""
+        return now & ~self.mask | self.value & self.mask
+
+
+class Driving(NamedTuple):
+    """How one servo of a kind is led gently by itself.
+
+    settings: without which its steps do not mean what they should
+    offset: register that shifts its position; offset_usable: it keeps to that
+    full_drive: register and the one that holds its largest value, to which it is put back
+    gentle: makes the registers of a share of full drive and a speed in steps/s; reads registers
+        by name
+    load: present current as a share of the stall current, of a model by its name
+    """
+
+    settings: tuple[Setting, ...]
+    offset: str
+    offset_usable: bool
+    full_drive: tuple[str, str] | None
+    gentle: Callable[[Callable[[str], int], float, float], dict[str, int]]
+    load: Callable[[str, int], float]
+
+
+class ServoKind(NamedTuple):
+    """One kind of smart servo; ports are open at the baud rate that is given or was found.
+
+    title: as people call it
+    family: what the engine must know of it
+    no_reply: what to look at where no servo answers
+    notes: what must be known of all of them
+    driving: None where this program does not drive one by itself
+    set_middle: makes the present position the middle, None where a kind cannot
+    """
+
+    name: BusKind
+    title: str
+    family: Family
+    no_reply: str
+    notes: tuple[str, ...]
+    driving: Driving | None
+    set_middle: Callable[[BusPort, Family, int], int] | None = None
+
 
 GENTLE_ACCELERATION = 10
 """1000 steps/s2: a search begins within a tenth of a second."""

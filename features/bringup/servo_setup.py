@@ -17,14 +17,14 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
     SHARED,
     FoundServo,
-    any_reply,
-    corrupt,
+    count_corrupt,
+    has_any_reply,
     ping,
     scan_ids,
 )
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.servo_family import ServoKind, Tell
+from gazerig.features.bringup.servo_families import ServoKind, Tell
 
 
 class SetUp(NamedTuple):
@@ -52,12 +52,12 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
     junk = 0
     for baud in bauds:
         tell(f"asking at {baud} bit/s")
-        if not port.setBaudRate(baud) or (found and not any_reply(port, kind.family)):
+        if not port.setBaudRate(baud) or (found and not has_any_reply(port, kind.family)):
             continue
         answers, noise = scan_ids(port, kind.family, baud)
         found += answers
         junk += noise
-        shared = answers and corrupt(port, kind.family, answers[0].id) >= SHARED
+        shared = answers and count_corrupt(port, kind.family, answers[0].id) >= SHARED
         found += [answers[0]] if shared else []
     where = port.port_name
     if len(found) > 1:

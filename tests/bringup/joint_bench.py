@@ -4,8 +4,11 @@ from collections.abc import Callable
 
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped, SingleJoint
-from gazerig.features.bringup.calibration.smart_servo_access import SingleServo
+from gazerig.features.bringup.calibration.smart_servo_access import (
+    CalibrationStopped,
+    SingleJoint,
+    SingleServo,
+)
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
@@ -59,7 +62,7 @@ class Bench:
         return value
 
     def put(self, register: str, value: int) -> None:
-        assert self.registers.write_lasting(self.id, register, value)
+        assert self.registers.write_persistent(self.id, register, value)
 
     def limits(self) -> tuple[int, int]:
         return self.get("min_position_limit"), self.get("max_position_limit")

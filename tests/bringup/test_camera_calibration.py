@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
-from gazerig.features.bringup.calibration.board_coverage import Held, ViewParams, coverage, held
 from gazerig.features.bringup.calibration.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
     LensCalibrationParams,
     calibrate_lens,
 )
+from gazerig.features.bringup.calibration.charuco_views import Held, ViewParams, coverage, held
 from gazerig.robot.model.charuco_board import CharucoBoard, SeenBoard
 from gazerig.robot.model.intrinsics import project
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens

@@ -16,8 +16,8 @@ from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.health import (
     FIELD_TEXT,
     CameraHealth,
+    CameraObservation,
     HealthModel,
-    Judged,
     PictureStats,
     TurnedFaces,
     picture_stats,
@@ -71,7 +71,11 @@ def looked(
 
 
 def stepped(model: HealthModel, count: int, **seen: Any) -> list[str]:
-    return [line for _ in range(count) for line in model.step(Judged(GOOD, True)._replace(**seen))]
+    return [
+        line
+        for _ in range(count)
+        for line in model.step(CameraObservation(GOOD, True)._replace(**seen))
+    ]
 
 
 @pytest.mark.parametrize(
@@ -191,7 +195,7 @@ def test_an_upside_down_camera_is_found_and_its_end_too():
 def test_searches_that_do_not_agree_are_not_told():
     model = HealthModel()
     for turned_deg in (180.0, 180.0, 90.0, 180.0, 0.0, 180.0) * 4:
-        assert not model.step(Judged(GOOD, False, turned_deg))
+        assert not model.step(CameraObservation(GOOD, False, turned_deg))
 
 
 def test_frames_that_come_too_fast_are_told_with_the_stage():

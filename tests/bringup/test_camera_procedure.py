@@ -9,7 +9,6 @@ from desk import GAZE_JOINTS, LIDS
 
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.features.bringup.calibration.board_coverage import ViewParams
 from gazerig.features.bringup.calibration.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibrationParams,
@@ -20,6 +19,7 @@ from gazerig.features.bringup.calibration.camera_procedure import (
     neck_angles,
     neck_steps,
 )
+from gazerig.features.bringup.calibration.charuco_views import ViewParams
 from gazerig.features.bringup.calibration.hand_eye import camera_on_head
 from gazerig.gaze.types import Angles3
 from gazerig.robot.model.charuco_board import CharucoBoard

@@ -10,7 +10,7 @@ from served_rigs import hide_real_ports, rig_files, served
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port_by_path import port_of
-from gazerig.features.bringup.cli import progress
+from gazerig.features.bringup.cli import ports
 from gazerig.sim_mock.devices import MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus
 
@@ -46,8 +46,7 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
     with PtyBus() as bus:
         path = bus.start_device(MaestroLine(crc=True))
         board = SerialPort(path, "Pololu Mini Maestro", "1ffb:008a", None)
-        monkeypatch.setattr(progress, "serial_ports", lambda host: (board,))
-        monkeypatch.setattr("gazerig.features.bringup.cli.ports.serial_ports", lambda: (board,))
+        monkeypatch.setattr(ports, "serial_ports", lambda host: (board,))
         for words in (
             ("scan", "--port", path, "--kind", "feetech"),
             ("scan", "--port", path, "--kind", "dynamixel"),
@@ -111,11 +110,11 @@ def test_setup_of_a_board_that_is_too_small(monkeypatch):
     with PtyBus() as bus:
         path = bus.start_device(MaestroLine(6, crc=True))
         board = SerialPort(path, "Pololu Micro Maestro", "1ffb:0089", None)
-        monkeypatch.setattr(progress, "serial_ports", lambda host: (board,))
+        monkeypatch.setattr(ports, "serial_ports", lambda host: (board,))
         code, _, err = invoked("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
         assert code == 0 and "USB Dual Port" in err
         monkeypatch.setattr(
-            "gazerig.features.bringup.cli.setup_maestro.USB_CHANNELS", {"1ffb:0089": 2}
+            "gazerig.features.bringup.cli.setup_boards.USB_CHANNELS", {"1ffb:0089": 2}
         )
         code, _, err = invoked("setup", "maker", "--port", path, "--yes")
         assert code == 2 and "has channels 0..1, not those of left_upper_lid (channel 2)" in err
@@ -165,7 +164,7 @@ def test_reboot_of_a_maestro_says_what_there_is_instead():
 
 def test_the_command_port_is_the_first_of_the_two_of_a_maestro(monkeypatch):
     both = [SerialPort(f"/dev/ttyNONE{n}", "Maestro", "1ffb:0089", None) for n in range(2)]
-    monkeypatch.setattr(progress, "serial_ports", lambda host: both)
+    monkeypatch.setattr(ports, "serial_ports", lambda host: both)
     assert "no serial port /dev/ttyNONE0" in invoked("scan").err
 
 

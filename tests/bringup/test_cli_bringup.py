@@ -18,7 +18,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.cli import progress
+from gazerig.features.bringup.cli import ports
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -116,11 +116,11 @@ def test_what_is_asked_wrongly(words, says):
 
 
 def test_scan_asks_which_port_where_there_are_several(monkeypatch):
-    ports = [SerialPort(f"/dev/ttyACM{i}", "board", "1:2", None) for i in range(2)]
-    monkeypatch.setattr(progress, "serial_ports", lambda host: ports)
+    two = [SerialPort(f"/dev/ttyACM{i}", "board", "1:2", None) for i in range(2)]
+    monkeypatch.setattr(ports, "serial_ports", lambda host: two)
     code, _, err = invoked("scan")
     assert code == 2 and "which port?" in err and "/dev/ttyACM1 (board)" in err
-    monkeypatch.setattr(progress, "serial_ports", lambda host: ports[:1])
+    monkeypatch.setattr(ports, "serial_ports", lambda host: two[:1])
     assert "no serial port /dev/ttyACM0" in invoked("scan").err
 
 

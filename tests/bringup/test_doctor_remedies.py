@@ -8,6 +8,7 @@ from gazerig.drivers.feetech.memory_table import TABLE_END
 from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
 from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.features.bringup.bus_search import SearchRound
+from gazerig.features.bringup.cli.scan import remarks
 from gazerig.features.bringup.doctor.diagnostics import (
     Diagnostic,
     Fix,
@@ -18,7 +19,6 @@ from gazerig.features.bringup.doctor.diagnostics import (
 )
 from gazerig.features.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
 from gazerig.features.bringup.doctor.run import fix_latency, look
-from gazerig.features.bringup.scan_report import remarks
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
 
 # --- fixes

@@ -16,9 +16,8 @@ from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.record_gesture import app
 from gazerig.features.bringup.hand_recording import record, switch_off
-from gazerig.features.bringup.monitor import Monitor, TelemetrySample
 from gazerig.features.bringup.servo_families import KINDS
-from gazerig.features.bringup.telemetry import SmartServoTelemetry
+from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry, TelemetrySample
 from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
 from gazerig.robot.model.gesture_fit import motions
 

@@ -10,7 +10,7 @@ from served_rigs import rig_files
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
 from gazerig.features.bringup.cli.prompts import Lines
 

@@ -5,9 +5,9 @@ from joint_bench import EYE, GENTLY, NECK, STS, Bench
 
 from gazerig.drivers.errors import BusLost, ServoFault, SetupError
 from gazerig.features.bringup.calibration.endstop_search import STEPS_PER_DEG
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
 from gazerig.features.bringup.calibration.joint_calibration import CalibrationRefused
 from gazerig.features.bringup.calibration.joint_procedure import by_hand, by_motion
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.model.joint import JointParams
 
 STOPS = (1700.0, 2500.0)

@@ -8,9 +8,8 @@ from joint_bench import EYE, GENTLY, STS, Bench
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.features.bringup.calibration.endstop_search import STEPS_PER_DEG
-from gazerig.features.bringup.calibration.joint_access import SingleJoint
-from gazerig.features.bringup.calibration.linkage_procedure import HandPlacer, Steered, by_places
-from gazerig.features.bringup.calibration.smart_servo_access import SingleServo
+from gazerig.features.bringup.calibration.linkage_calibration import HandPlacer, Steered, by_places
+from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint, SingleServo
 from gazerig.robot.model.joint import JointParams
 
 

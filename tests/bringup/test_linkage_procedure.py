@@ -10,14 +10,14 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, ServoMissing
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, OneHobby
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
 from gazerig.features.bringup.calibration.joint_calibration import CalibrationRefused
-from gazerig.features.bringup.calibration.linkage_procedure import (
+from gazerig.features.bringup.calibration.linkage_calibration import (
     LEAD_US,
     HobbyPlacer,
     Steered,
     by_places,
 )
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import build
@@ -65,7 +65,7 @@ class Bench:
         finally:
             self.hobby.disable()
 
-    # gazerig.features.bringup.calibration.linkage_procedure.Steerer
+    # gazerig.features.bringup.calibration.linkage_calibration.Steerer
 
     def tell(self, line: str) -> None:
         self.said.append(line)

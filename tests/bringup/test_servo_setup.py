@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
-from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, ping
+from gazerig.drivers.servo_bus.discovery import FoundServo, has_any_reply, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
@@ -142,7 +142,7 @@ def test_two_servos_at_two_rates_are_refused(kind):
     bench = Bench(ServoSpec(1, model), ServoSpec(2, model), kind=kind)
     bench.port.setBaudRate(bench.baud)
     index = kind.family.baud_rates.index(115_200)
-    bench.registers().write_lasting(2, "baud_rate", index)
+    bench.registers().write_persistent(2, "baud_rate", index)
     bench.chain.refresh()
     both = rf"id 1 \({model}\) at {bench.baud} .*id 2 \({model}\) at 115200"
     with pytest.raises(ServoMissing, match=both):
@@ -259,12 +259,12 @@ def test_kinds_write_firmware_as_their_makers_do():
 def test_any_reply_is_a_matter_of_answers_not_of_echoes():
     bench = Bench(kind=FEETECH)
     bench.port.setBaudRate(BAUD)
-    assert any_reply(bench.port, FEETECH.family)
+    assert has_any_reply(bench.port, FEETECH.family)
     bench.port.faults.command("lose all")
-    assert not any_reply(bench.port, FEETECH.family)
+    assert not has_any_reply(bench.port, FEETECH.family)
     bench.port.faults.command("echo on")
-    assert not any_reply(bench.port, FEETECH.family)
-    assert any_reply(InProcessPort(build_dynamixel([], lambda: 0.0)), DYNAMIXEL.family)
+    assert not has_any_reply(bench.port, FEETECH.family)
+    assert has_any_reply(InProcessPort(build_dynamixel([], lambda: 0.0)), DYNAMIXEL.family)
 
 
 # --- Dynamixel servos, packet by packet

@@ -14,9 +14,15 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
-from gazerig.features.bringup.monitor import Monitor, as_json, coupled_angles
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
-from gazerig.features.bringup.telemetry import Telemetry, pulse_telemetry, telemetry_of
+from gazerig.features.bringup.telemetry import (
+    Monitor,
+    Telemetry,
+    as_json,
+    coupled_angles,
+    pulse_telemetry,
+    telemetry_of,
+)
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.model.coupling import Differential
 from gazerig.robot.model.coupling_params import CoupledPair

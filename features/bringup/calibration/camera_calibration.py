@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.calibration.board_coverage import ViewCollector, ViewParams
+from gazerig.features.bringup.calibration.charuco_views import ViewCollector, ViewParams
 from gazerig.params import Bounds
 from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.frames import LensParams

@@ -14,13 +14,13 @@ import numpy as np
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.features.bringup.calibration.board_coverage import Coverage, ViewCollector
 from gazerig.features.bringup.calibration.camera_calibration import (
     CameraCalibrationRefused,
     LensCalibration,
     LensCalibrationParams,
     calibrate_lens,
 )
+from gazerig.features.bringup.calibration.charuco_views import Coverage, ViewCollector
 from gazerig.features.bringup.calibration.hand_eye import NeckView
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry
 from gazerig.params import Bounds

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.features.bringup.calibration.camera_calibration import CameraCalibrationRefused
-from gazerig.features.bringup.calibration.charuco_pose import board_poses
+from gazerig.features.bringup.calibration.charuco_views import board_poses
 from gazerig.features.bringup.calibration.hand_eye_solver import Fit, Pose, Sights, refined, start
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds

@@ -14,7 +14,7 @@ from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.guardian.guardian import GuardedBus, Guardian
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.joint import JointParams

@@ -8,7 +8,6 @@ from typing import Literal, Protocol
 
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.features.bringup.calibration.endstop_search import EndStop, StopSearchParams
-from gazerig.features.bringup.calibration.joint_access import SingleJoint
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
@@ -20,6 +19,7 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     middle,
     zero_of,
 )
+from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint
 
 ZeroBy = Literal["middle", "person"]
 

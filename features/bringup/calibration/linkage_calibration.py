@@ -4,18 +4,23 @@ Positions are in the unit of the servo's model (steps, or us of pulse width), an
 degrees at the joint.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import degrees
+from typing import Protocol
 
+from gazerig.features.bringup.calibration.hobby_access import OneHobby
 from gazerig.features.bringup.calibration.joint_calibration import (
     SMALLEST_RANGE_DEG,
     CalibrationRefused,
     LinkageFit,
+    ends_of,
     inwards,
     is_lid,
     zero_of,
 )
+from gazerig.features.bringup.calibration.joint_procedure import Operator, Watched
+from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
 
@@ -82,3 +87,229 @@ def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: f
     except ValueError as error:
         raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
     return made
+
+
+SHUT_WHERE = {
+    "upper_lid": "to where it is SHUT: where it shall meet the lower lid",
+    "lower_lid": "to where it is SHUT: where it meets the upper lid",
+}
+
+
+LEAD_US = 50.0
+"""A quarter of a second at its slow speed: so soon it stands when a key is let go."""
+
+
+class Steered(Protocol):
+    """A servo as a person moves it; pulse widths in us."""
+
+    def by(self, us: float) -> None:
+        """Move the joint by this much."""
+        ...
+
+    def nudge(self, us: float) -> None:
+        """Move the joint by this much, never far ahead of it: for a key that is held down."""
+        ...
+
+    def to(self, us: float) -> None:
+        """Move the joint to a pulse width."""
+        ...
+
+    def live(self) -> str:
+        """Update the joint; return its position as text."""
+        ...
+
+
+class Steerer(Operator, Protocol):
+    """Who moves a servo by small steps, and reads angles off."""
+
+    def steer(self, question: str, servo: Steered) -> None:
+        """Return when the servo is where it is wanted.
+
+        Raises:
+            CalibrationStopped: the user asked to end.
+        """
+        ...
+
+    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        """Return the number they say, or the proposed one where they agree to it."""
+        ...
+
+
+class Placer(Protocol):
+    """Brings a joint to places, and tells them in the unit of its servo's model."""
+
+    name: str
+    joint: JointParams
+
+    def begin(self) -> None:
+        """Begin: hold it where it is, or switch its torque off."""
+        ...
+
+    def mark(self, where: str) -> float:
+        """Let the user move the joint to a position; return it."""
+        ...
+
+    def bring(self, place: float) -> float:
+        """Bring it to about that place; return where it is."""
+        ...
+
+    def leave(self, place: float) -> None:
+        """Bring it to a place and leave it there, where it moves by itself."""
+        ...
+
+    def live(self) -> str:
+        """Update the joint; return its position as text."""
+        ...
+
+
+class HobbyPlacer:
+    """Moves a hobby servo as a person says; implements Placer."""
+
+    def __init__(self, hobby: OneHobby, person: Steerer) -> None:
+        self.name, self.joint = hobby.name, hobby.joint
+        self._hobby, self._person = hobby, person
+
+    def begin(self) -> None:
+        """Hold the joint at its present pulse, or where the user lets the pulses start."""
+        hobby, person = self._hobby, self._person
+        at_us = hobby.open()
+        if at_us is None:
+            rest = self.joint.made().steps(0.0) / self.joint.facts.unit_steps
+            at_us = person.number(
+                f"{hobby.who} gets no pulses, so its position is not known: it goes to the first "
+                "one at once, at its own full speed. Keep your fingers out. "
+                "At which pulse width (us) shall it begin?",
+                float(round(rest)),
+                lambda: "",
+            )
+        began_us = hobby.begin(at_us)
+        self._tell_events()
+        person.tell(
+            f"{hobby.who}: held at {began_us:g} us; should this program die, its guardian stops "
+            "the pulses; should the computer die, cut the servo power"
+        )
+
+    def mark(self, where: str) -> float:
+        """Let the user move the joint to a position; return the pulse width in us."""
+        self._person.steer(f"move {self.name} {where}, then press Enter", self)
+        return self._arrived()
+
+    def by(self, us: float) -> None:
+        """Move the joint by this much."""
+        self._hobby.aim(self._hobby.place_us + us)
+
+    def nudge(self, us: float) -> None:
+        """Move the joint by this much, at most ``LEAD_US`` ahead of its pulse."""
+        at_us = self._hobby.pulse_us
+        self._hobby.aim(min(max(self._hobby.place_us + us, at_us - LEAD_US), at_us + LEAD_US))
+
+    def to(self, us: float) -> None:
+        """Move the joint to a pulse width."""
+        self._hobby.aim(us)
+
+    def bring(self, place: float) -> float:
+        """Lead it slowly to a pulse width in us; return the one that it gets."""
+        self._hobby.aim(place)
+        return self._arrived()
+
+    def leave(self, place: float) -> None:
+        """Lead it slowly to where friction shall hold it."""
+        self.bring(place)
+
+    def _arrived(self) -> float:
+        at_us = self._hobby.arrive()
+        self._tell_events()
+        return at_us
+
+    def live(self) -> str:
+        """Lead it on; return pulse width and angle in words."""
+        self._hobby.look()
+        self._tell_events()
+        at_us = self._hobby.place_us
+        return f"{self.name}: {at_us:g} us ({angle_now(self.joint, at_us):+.1f} deg so far)"
+
+    def _tell_events(self) -> None:
+        for line in self._hobby.events():
+            self._person.tell(line)
+
+
+class HandPlacer:
+    """Lets a person turn a servo without torque that reports its position; implements Placer."""
+
+    def __init__(self, single: SingleJoint, person: Operator) -> None:
+        self.name, self.joint = single.name, single.joint
+        self._single, self._person = single, person
+        self._watched = Watched(single)
+
+    def begin(self) -> None:
+        """Switch the torque off."""
+        self._single.servo.disable_torque()
+        self._person.tell(f"{self._single.who}: torque off, it can be turned by hand")
+
+    def mark(self, where: str) -> float:
+        """Let the user turn the joint to a position; return it in steps."""
+        self._person.wait(f"turn {self.name} {where}, then press Enter", self.live)
+        return float(self._watched.steps())
+
+    def bring(self, place: float) -> float:
+        """Let the user turn the joint to about a position in steps; return where it is."""
+        return self.mark(f"until it reads about step {place:.0f}")
+
+    def leave(self, place: float) -> None:
+        """Leave it where it is: its torque is off."""
+
+    def live(self) -> str:
+        """Return the position in words."""
+        return self._watched.live()
+
+
+def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> LinkageFit:
+    """Mark the places of a joint and say their angles.
+
+    more: places between each two that are marked; margin_deg: kept from the ends, but for lids
+
+    Raises:
+        CalibrationRefused: they make no linkage.
+        DriverError: the servo does not answer any more.
+        CalibrationStopped: the person wants it to end.
+    """
+    placer.begin()
+    marked = _lid(placer, person) if is_lid(placer.name) else _turning(placer, person)
+    marked.sort()
+    all_places = list(marked)
+    for one, other in zip(marked, marked[1:], strict=False):
+        for place in between(one[1], other[1], more):
+            at = placer.bring(place)
+            likely = likely_angle(placer.joint, at, one, other)
+            all_places.append((_angle(placer, person, at, likely), at))
+    made = places(placer.name, all_places, placer.joint, margin_deg)
+    # A lid stays shut, so that the other one can be brought to meet it.
+    placer.leave(marked[0][1] if is_lid(placer.name) else dict(marked)[0.0])
+    return made
+
+
+def _turning(placer: Placer, person: Steerer) -> list[Place]:
+    """Mark straight ahead, which is 0 deg, and both ends."""
+    positive, negative = ends_of(placer.name)
+    marked = [(0.0, placer.mark(zero_of(placer.name)))]
+    for end, sign in ((positive, 1), (negative, -1)):
+        at = placer.mark(f"to its {end} end, as far as it goes freely")
+        marked.append((_angle(placer, person, at, sign * abs(angle_now(placer.joint, at))), at))
+    return marked
+
+
+def _lid(placer: Placer, person: Steerer) -> list[Place]:
+    """Mark a lid open and shut."""
+    shut = next(where for part, where in SHUT_WHERE.items() if placer.name.endswith(part))
+    marked = []
+    for where, sign in (("to where it is fully OPEN", 1), (shut, -1)):
+        at = placer.mark(where)
+        marked.append((_angle(placer, person, at, sign * abs(angle_now(placer.joint, at))), at))
+    return marked
+
+
+def _angle(placer: Placer, person: Steerer, at: float, proposed: float) -> float:
+    """Ask for the angle of the joint's present position."""
+    towards = f" ({ends_of(placer.name)[0]} is +)"
+    asked = f"{placer.name} at {at:g} {placer.joint.facts.unit}: how many degrees{towards}?"
+    return person.number(asked, proposed, placer.live)

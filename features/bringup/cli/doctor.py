@@ -13,16 +13,19 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
 from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.features.bringup.cli import progress as bench
+from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.cli.ports import (
+    JsonOption,
     MockOption,
     PortOption,
     bus_label,
+    console,
+    progress,
     refuse_packages,
     rig_ports,
     setups_on,
+    wipe,
 )
-from gazerig.features.bringup.cli.progress import JsonOption, console, progress, wipe
 from gazerig.features.bringup.doctor import run as checkup
 from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro, visit_pca9685
 from gazerig.features.bringup.doctor.camera import LOOK_S, examine_camera

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from math import isfinite
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
-from gazerig.features.bringup.calibration.linkage_procedure import Steered
+from gazerig.features.bringup.calibration.linkage_calibration import Steered
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import TerminalKeys
 from gazerig.features.bringup.cli.prompts import LOOK_S, TerminalPerson
 from gazerig.robot.cli.terminal import say, status

@@ -23,14 +23,16 @@ from gazerig.features.bringup.cli.ports import (
     rig_ports,
     setups_on,
 )
-from gazerig.features.bringup.monitor import Monitor, TelemetrySample, as_json
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.features.bringup.telemetry import (
     MaestroTelemetry,
+    Monitor,
     Pca9685Telemetry,
     SmartServoTelemetry,
     Telemetry,
     TelemetryReader,
+    TelemetrySample,
+    as_json,
 )
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals

@@ -1,25 +1,74 @@
 """The way to the servos that commands share: a rig, its ports, other ports, or emulated buses."""
 
 import contextlib
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, NamedTuple
 
 import typer
+from rich.console import Console
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
-from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.drivers.serial.list_ports import Host, SerialPort, serial_ports
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_by_path import port_of
-from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.serial.port_owner import check_owner, usb_id_of
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.cli.progress import to_open
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
 from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.cli.terminal import status
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
+
+host = Host()
+"""Where this computer tells about its ports."""
+
+YesOption = Annotated[bool, typer.Option("--yes", help="Yes to every question.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="One line of JSON instead of words.")]
+
+
+def ports_here() -> tuple[SerialPort, ...]:
+    """List the serial ports of this computer."""
+    return serial_ports(host)
+
+
+def usb_id(path: str) -> str:
+    """Return the USB vendor and product id of a port, "" where it has none."""
+    return usb_id_of(path, ports_here())
+
+
+@contextlib.contextmanager
+def to_open(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BusPort]:
+    """Return a port that is not opened yet, closed again at the end.
+
+    on_traffic: called whenever bytes are sent or waited for
+    """
+    line = port_of(path, on_traffic=on_traffic)
+    try:
+        yield line
+    finally:
+        line.closePort()
+
+
+def console() -> Console:
+    """Return the place for results; long lines are the terminal's business."""
+    return Console(soft_wrap=True, highlight=False)
+
+
+def progress(line: str) -> None:
+    """Show what is being done, on a terminal only."""
+    if sys.stderr.isatty():
+        status(line)
+
+
+def wipe() -> None:
+    """Remove the progress line."""
+    if sys.stderr.isatty():
+        status("")
+
 
 MockOption = Annotated[
     bool, typer.Option("--mock", help="Emulated servo bus instead of the rig's.")
@@ -80,9 +129,9 @@ def rig_ports(
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
     if not mock:
-        paths, here = ports_of(rig, port), serial_ports()
+        paths, here = ports_of(rig, port), ports_here()
         for name, path in paths.items():
-            refuse_owner(path, rig.bus_named(name).kind, here)
+            check_owner(path, rig.bus_named(name).kind, here)
         yield RigPorts(paths, None)
         return
     with PtyBuses() as buses:

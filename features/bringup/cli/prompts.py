@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.robot.cli.terminal import say, status
 
 LOOK_S = 0.03

@@ -17,14 +17,14 @@ from gazerig.features.bringup.channel_test import sent_home
 from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
+    YesOption,
     bus_label,
     refuse_packages,
     rig_ports,
     setups_on,
+    to_open,
 )
-from gazerig.features.bringup.cli.progress import YesOption, to_open
-from gazerig.features.bringup.servo_families import KINDS, kind_of
-from gazerig.features.bringup.servo_family import ServoKind
+from gazerig.features.bringup.servo_families import KINDS, ServoKind, kind_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say

@@ -15,9 +15,8 @@ from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.features.bringup.cli.motion import enter_pressed
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, opened, rig_ports
 from gazerig.features.bringup.hand_recording import LONGEST_S, HandRecording, record, switch_off
-from gazerig.features.bringup.monitor import Monitor
 from gazerig.features.bringup.servo_families import kind_of
-from gazerig.features.bringup.telemetry import SmartServoTelemetry
+from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
 from gazerig.robot.cli.gestures import FolderOption, say_written
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (

@@ -3,12 +3,24 @@
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import typer
+from rich.table import Table
+
+from gazerig.config.rig import Rig
 from gazerig.config.save import copy_shipped, rig_file, save_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.cli.prompts import TerminalPerson
 from gazerig.robot.cli.terminal import say
+
+OutOption = Annotated[
+    Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
+]
+DryRunOption = Annotated[
+    bool, typer.Option("--dry-run", help="Show what would change, write nothing.")
+]
+AllYesOption = Annotated[bool, typer.Option("--yes", help="Answer every yes or no with yes.")]
 
 
 def refuse_unwritable(rig: str, out: Path | None) -> None:
@@ -52,3 +64,26 @@ def write_found(
         say(f"everything is as {saved.path} says: nothing to write")
     else:
         say(f"written into {saved.path}; as it was: {saved.backup}")
+
+
+def difference_table(rig: str, loaded: Rig, changes: Mapping[str, Any]) -> Table:
+    """Return old and new values side by side.
+
+    Args:
+        rig: as it was named.
+        loaded: with the old values.
+        changes: new values by the dotted keys of the rig's file.
+    """
+    table = Table(caption=f"what was found, against {rig}")
+    for name in ("key", "old", "new"):
+        table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
+    for key, new in changes.items():
+        old: Any = loaded
+        for step in key.split("."):
+            old = getattr(old, step, "-")
+        table.add_row(key, _text(old), _text(new))
+    return table
+
+
+def _text(value: Any) -> str:
+    return " ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value}"

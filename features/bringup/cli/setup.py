@@ -16,16 +16,17 @@ from gazerig.features.bringup import servo_setup
 from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
+    YesOption,
     bus_label,
+    progress,
     refuse_packages,
     rig_ports,
     setups_on,
+    to_open,
+    wipe,
 )
-from gazerig.features.bringup.cli.progress import YesOption, progress, to_open, wipe
-from gazerig.features.bringup.cli.setup_maestro import set_up_board, write_settings
-from gazerig.features.bringup.cli.setup_pca9685 import set_up_boards
-from gazerig.features.bringup.servo_families import kind_of
-from gazerig.features.bringup.servo_family import ServoKind
+from gazerig.features.bringup.cli.setup_boards import set_up_board, set_up_boards, write_settings
+from gazerig.features.bringup.servo_families import ServoKind, kind_of
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import CHAINS
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say

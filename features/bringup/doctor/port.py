@@ -12,9 +12,9 @@ from gazerig.drivers.serial.list_ports import (
     Host,
     SerialPort,
     access,
-    holders,
     latency_file,
     latency_ms,
+    port_users,
     serial_ports,
 )
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic
@@ -63,7 +63,7 @@ class PortFacts(NamedTuple):
 
 def port_facts(device: str, host: Host) -> PortFacts:
     """Return what the operating system knows of a port."""
-    return PortFacts(device, access(device), holders(device, host), serial_ports(host))
+    return PortFacts(device, access(device), port_users(device, host), serial_ports(host))
 
 
 def examine_port(facts: PortFacts) -> list[Diagnostic]:

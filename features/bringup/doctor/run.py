@@ -19,12 +19,18 @@ from gazerig.drivers.serial.list_ports import (
     set_latency,
 )
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, corrupt, ping, scan_ids
+from gazerig.drivers.servo_bus.discovery import (
+    FoundServo,
+    count_corrupt,
+    has_any_reply,
+    ping,
+    scan_ids,
+)
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix, worst
 from gazerig.features.bringup.doctor.port import examine_latency, examine_port, port_facts
 from gazerig.features.bringup.doctor.servo_rules import visit
-from gazerig.features.bringup.servo_family import ServoKind, Tell
+from gazerig.features.bringup.servo_families import ServoKind, Tell
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, describe
 
@@ -139,7 +145,7 @@ def look(
             found = ping(port, kind.family, setup.id, baud, 2)
             if found is not None:
                 there[setup.id] = found
-        pieces = corrupt(port, kind.family, setup.id, 6 if setup.id in there else 1)
+        pieces = count_corrupt(port, kind.family, setup.id, 6 if setup.id in there else 1)
         if pieces:
             spoilt[setup.id] = pieces
     missing = tuple(setup for setup in setups if setup.id not in there)
@@ -149,7 +155,7 @@ def look(
     for other in kind.family.usual_rates if missing else ():
         if other != baud:
             tell(f"a servo is missing: asking at {other} bit/s")
-            if port.setBaudRate(other) and any_reply(port, kind.family):
+            if port.setBaudRate(other) and has_any_reply(port, kind.family):
                 elsewhere += scan_ids(port, kind.family, other)[0]
     if missing:
         _open(port, baud)

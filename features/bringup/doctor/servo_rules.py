@@ -16,7 +16,7 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.doctor.diagnostics import Advice, Diagnostic, Fix
 from gazerig.features.bringup.doctor.families import CHECKS, FIX, ServoChecks
-from gazerig.features.bringup.servo_family import ServoKind
+from gazerig.features.bringup.servo_families import ServoKind
 
 MOST_NAMED = 6
 TRIPPED = 255
@@ -368,7 +368,7 @@ def apply_fix(port: BusPort, kind: ServoKind, fix: Fix) -> str:
         return "its torque is on"
     if torque is None:
         return "the servo does not take it" if registers.refusal else "the servo does not answer"
-    if not registers.write_lasting(servo_id, fix.register, fix.value):
+    if not registers.write_persistent(servo_id, fix.register, fix.value):
         return "the servo does not take it"
     if registers.read(servo_id, fix.register) != fix.value:
         return "it reads back otherwise"

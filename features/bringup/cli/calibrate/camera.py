@@ -35,7 +35,6 @@ from gazerig.features.bringup.calibration.camera_procedure import (
 from gazerig.features.bringup.calibration.charuco_page import RULER_MM, write_page
 from gazerig.features.bringup.calibration.field_of_view import SIZE_SPREAD, field_by_face
 from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
-from gazerig.features.bringup.cli.calibrate.difference_table import difference_table
 from gazerig.features.bringup.cli.calibrate.oak import (
     as_seen,
     calibration_of_file,
@@ -46,8 +45,14 @@ from gazerig.features.bringup.cli.calibrate.oak import (
 )
 from gazerig.features.bringup.cli.neck_motion import go_on, moving_neck
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
-from gazerig.features.bringup.cli.rig_writer import refuse_unwritable, write_found
-from gazerig.features.bringup.cli.write_options import AllYesOption, DryRunOption, OutOption
+from gazerig.features.bringup.cli.rig_writer import (
+    AllYesOption,
+    DryRunOption,
+    OutOption,
+    difference_table,
+    refuse_unwritable,
+    write_found,
+)
 from gazerig.robot.app.camera_factory import orientation_of
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status

@@ -21,7 +21,7 @@ from gazerig.features.bringup.calibration.face_calibration import (
     changes,
 )
 from gazerig.features.bringup.calibration.face_steering import FaceSteering
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import (
     BUTTONS,
     HELP,
@@ -32,8 +32,12 @@ from gazerig.features.bringup.cli.calibration_keys import (
 )
 from gazerig.features.bringup.cli.ports import MockOption, PortOption
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
-from gazerig.features.bringup.cli.rig_writer import refuse_unwritable, write_found
-from gazerig.features.bringup.cli.write_options import AllYesOption, OutOption
+from gazerig.features.bringup.cli.rig_writer import (
+    AllYesOption,
+    OutOption,
+    refuse_unwritable,
+    write_found,
+)
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble

@@ -12,19 +12,18 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
 from gazerig.features.bringup.calibration.hobby_access import OneHobby
-from gazerig.features.bringup.calibration.joint_access import SingleJoint
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
     LinkageFit,
 )
 from gazerig.features.bringup.calibration.joint_procedure import by_hand, by_motion
-from gazerig.features.bringup.calibration.linkage_procedure import (
+from gazerig.features.bringup.calibration.linkage_calibration import (
     HandPlacer,
     HobbyPlacer,
     by_places,
 )
-from gazerig.features.bringup.calibration.smart_servo_access import SingleServo
+from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint, SingleServo
 from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
 from gazerig.features.bringup.cli.ports import RigPorts, opened
 from gazerig.features.bringup.servo_families import KINDS, kind_of

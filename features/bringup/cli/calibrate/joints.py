@@ -11,8 +11,8 @@ from gazerig.config.save import propose, rig_file
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
-from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
 from gazerig.features.bringup.calibration.joint_calibration import Value, changes
+from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibrate import options as options
 from gazerig.features.bringup.cli.calibrate.joint import (
     By,
@@ -26,8 +26,13 @@ from gazerig.features.bringup.cli.calibrate.joint import (
 from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, refuse_packages, rig_ports
 from gazerig.features.bringup.cli.prompts import Lines
-from gazerig.features.bringup.cli.rig_writer import refuse_unwritable, write_found
-from gazerig.features.bringup.cli.write_options import AllYesOption, DryRunOption, OutOption
+from gazerig.features.bringup.cli.rig_writer import (
+    AllYesOption,
+    DryRunOption,
+    OutOption,
+    refuse_unwritable,
+    write_found,
+)
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
 from gazerig.robot.model.coupling_params import pairs_of, partners
 
