@@ -26,7 +26,7 @@ from gazerig.drivers.plugins import (
     find,
     is_ours,
     load,
-    registered,
+    registrations,
 )
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.params import Choices
@@ -79,7 +79,7 @@ def extended(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
             _section(group, name)
         except PluginError as error:
             # A name that no package registers breaks its key's rule, which lists the known ones.
-            if any(one.name == name for one in registered(group)):
+            if any(one.name == name for one in registrations(group)):
                 problems.append(Problem(key, str(error)))
             elif group != CAMERA:
                 found[group].append("")
@@ -145,7 +145,7 @@ def rig_type(named: Named) -> type[Rig]:
 def _with_sections(base: type[T], group: str, key: str, names: tuple[str, ...]) -> type[T]:
     if not names:
         return base
-    known = Choices(*dict.fromkeys(one.name for one in registered(group)))
+    known = Choices(*dict.fromkeys(one.name for one in registrations(group)))
     declared = next(f for f in dataclasses.fields(cast(Any, base)) if f.name == key)
     fields = [
         (key, Annotated[str, known, _said(base, key)], dataclasses.field(default=declared.default)),

@@ -258,25 +258,25 @@ class Registration:
             part = import_module(module.strip())
             return attrgetter(attribute.strip())(part) if attribute else part
         except (Exception, SystemExit) as error:  # an import may raise anything
-            raise PluginError(f"{self.label} cannot be loaded: {failure(error)}") from error
+            raise PluginError(f"{self.label} cannot be loaded: {describe_error(error)}") from error
 
 
-def failure(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """Return an exception of a package as part of one line."""
     text = " ".join(str(error).split())[:200]
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def registered(group: str) -> tuple[Registration, ...]:
+def registrations(group: str) -> tuple[Registration, ...]:
     """Return all parts of a group: ours, then those of packages by package and name."""
     return (*_ours(group), *_outside(group, tuple(sys.path)))
 
 
-def taken_names(group: str) -> tuple[str, ...]:
+def name_conflicts(group: str) -> tuple[str, ...]:
     """Return one line for each part whose name is already taken."""
     owner: dict[str, Registration] = {}
     lines = []
-    for one in registered(group):
+    for one in registrations(group):
         first = owner.setdefault(one.name, one)
         if first is not one:
             lines.append(f"{one.label} is left out: {first.maker} has that name")
@@ -337,7 +337,7 @@ def _loaded(found: Registration) -> object:
 def yaml_files(group: str) -> dict[str, tuple[Path, Registration]]:
     """Return the YAML files of other packages: name -> file and the part that includes it.
 
-    Of two files with one name the first is used; ``taken_names`` does not report the other.
+    Of two files with one name the first is used; ``name_conflicts`` does not report the other.
 
     Raises:
         PluginError: a package cannot be imported or does not name a folder.
@@ -362,7 +362,7 @@ def folder_of(found: Registration) -> Path:
     raise PluginError(f"{found.label} is no folder: name a folder of YAML files, or its package")
 
 
-def made(group: str, name: str, part: Plugin, params: Any) -> Any:
+def create(group: str, name: str, part: Plugin, params: Any) -> Any:
     """Create a part from its parameters.
 
     Raises:
@@ -374,7 +374,9 @@ def made(group: str, name: str, part: Plugin, params: Any) -> Any:
     except SetupError:
         raise
     except Exception as error:
-        raise PluginError(f"{find(group, name).label} cannot be made: {failure(error)}") from error
+        raise PluginError(
+            f"{find(group, name).label} cannot be made: {describe_error(error)}"
+        ) from error
 
 
 def _ours(group: str) -> tuple[Registration, ...]:

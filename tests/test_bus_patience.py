@@ -77,7 +77,7 @@ def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
         beyond_s = timeout.with_reserve(now_s) - timeout.seconds
         now_s += beyond_s
         waited_s += beyond_s
-        timeout.waited_in_vain(beyond_s, now_s)
+        timeout.consume_reserve(beyond_s, now_s)
     assert waited_s <= RESERVE_S + 1.02 * REFILL * (now_s - 100.0)
     # Half a second later there is some of it again, and after a while all.
     assert timeout.with_reserve(now_s + 0.5) == pytest.approx(0.001 + 0.5 * REFILL, rel=0.05)
@@ -87,7 +87,7 @@ def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
 def test_a_reserve_never_goes_beyond_the_longest_time_out():
     timeout = AdaptiveTimeout(0.02, 0.02)
     assert timeout.with_reserve(1.0) == 0.02
-    timeout.waited_in_vain(-0.01, 1.0)
+    timeout.consume_reserve(-0.01, 1.0)
     assert timeout.with_reserve(1.0) == 0.02
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gazerig.drivers.camera.depth_roi import depth_at, metres, millimetres, resized
+from gazerig.drivers.camera.depth_roi import depth_at, resize_depth, to_metres, to_millimetres
 
 BOX = (20.0, 10.0, 40.0, 40.0)
 
@@ -103,21 +103,21 @@ def test_whatever_the_picture_the_answer_is_a_distance_in_it_or_none(depth, box)
 
 def test_millimetres_there_and_back_are_exact():
     mm = np.arange(65536, dtype=np.uint16).reshape(256, 256)
-    depth = metres(mm)
+    depth = to_metres(mm)
     assert np.isnan(depth[0, 0]) and depth[3, 232] == np.float32(1.0)
     assert not depth.flags.writeable
-    assert np.array_equal(millimetres(depth), mm)
+    assert np.array_equal(to_millimetres(depth), mm)
 
 
 def test_distances_too_far_or_unknown_become_zero():
     odd = np.array([[70.0, -1.0, np.nan, np.inf, 0.0, 1.0]], np.float32)
-    assert millimetres(odd).tolist() == [[0, 0, 0, 0, 0, 1000]]
+    assert to_millimetres(odd).tolist() == [[0, 0, 0, 0, 0, 1000]]
 
 
 def test_resizing_invents_no_distance():
     depth = np.array([[1.0, 3.0], [np.nan, 3.0]], np.float32)
-    big = resized(depth, 8, 4)
+    big = resize_depth(depth, 8, 4)
     assert big.shape == (4, 8)
     assert set(big[np.isfinite(big)].tolist()) == {1.0, 3.0}
     assert np.isnan(big).sum() == 8
-    assert resized(depth, 2, 2) is depth
+    assert resize_depth(depth, 2, 2) is depth

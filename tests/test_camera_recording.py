@@ -135,7 +135,7 @@ def test_file_that_cannot_be_made_is_named(tmp_path):
 def test_depth_whose_picture_is_missing_belongs_to_no_other(tmp_path):
     path = tmp_path / "r.mcap"
     writer = RecordingWriter(path, {})
-    parts = [fmt.encoded(shot(k), None) for k in range(3)]
+    parts = [fmt.encode_shot(shot(k), None) for k in range(3)]
     writer.add(TIMES_S[0], 1, parts[0][:-1])  # all but the picture
     writer.add(TIMES_S[1], 2, parts[1][-1:])  # the picture alone
     writer.add(TIMES_S[2], 3, parts[2])

@@ -9,7 +9,7 @@ import pytest
 from seeing import row_09_identities as row
 from test_perception import Neck, face_at
 
-from gazerig.drivers.camera.process import renumbered
+from gazerig.drivers.camera.process import offset_ids
 from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.drivers.vision.cut_detector import CutDetector
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
@@ -83,7 +83,7 @@ def test_a_camera_process_that_was_started_again_shows_another_scene() -> None:
         poses.remember(number / 30, (yaw, 0.0, 0.0))
         face = face_at((np.sin(yaw), 0.0, np.cos(yaw)))
         found = Detections(number / 30, number, 640, 400, (face,), scene=2 if starts == 0 else 0)
-        percept = perception.see(renumbered(found, starts), poses)
+        percept = perception.see(offset_ids(found, starts), poses)
         assert percept is not None
         ids.append(percept.faces[0].id)
         scenes.append(percept.scene)

@@ -152,7 +152,7 @@ def test_the_page_shows_an_emulated_head_and_stops_it(tmp_path: Path) -> None:
 def links(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[MessageLink, MessageLink]]:
     """Both ends of a link over the loopback, as parent and child have them."""
     monkeypatch.setattr(message_link, "HAS_PAIRS", False)
-    offered = message_link.offer(1)
+    offered = message_link.create_links(1)
     [ours], [word] = offered.ours, offered.words
     ours.setblocking(False)
     theirs = message_link.open_link(word, offered.variables[message_link.TOKEN_VARIABLE])
@@ -208,7 +208,7 @@ def test_a_link_that_is_not_read_refuses_and_never_waits(
 
 def test_a_stranger_is_not_let_in_and_keeps_nobody_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(message_link, "HAS_PAIRS", False)
-    offered = message_link.offer(1)
+    offered = message_link.create_links(1)
     [ours], [word] = offered.ours, offered.words
     with socket.create_connection(("127.0.0.1", int(word[5:]))) as stranger:
         stranger.sendall(b"0" * 32)

@@ -23,7 +23,7 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE
-from gazerig.drivers.servo_bus.torque import positions
+from gazerig.drivers.servo_bus.torque import read_positions
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.rows import rows
@@ -398,10 +398,10 @@ def test_a_place_to_begin_from_is_taken_only_if_two_answers_agree(again, well):
         family=FEETECH, port=port, label=str, ask=lambda ids, name: next(answers)
     )
     if well:
-        assert positions(line, (1,)) == (again,)
+        assert read_positions(line, (1,)) == (again,)
     else:
         with pytest.raises(ServoMissing):
-            positions(line, (1,))
+            read_positions(line, (1,))
 
 
 def test_a_servo_whose_answers_are_never_confirmed_is_named_and_believed_later(rig):

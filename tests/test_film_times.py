@@ -9,7 +9,12 @@ from present import present
 
 from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.video_file import VideoFile
-from gazerig.drivers.camera.video_timestamps import VideoTimestamps, at_a_rate, by_table, rising
+from gazerig.drivers.camera.video_timestamps import (
+    VideoTimestamps,
+    ascending_times,
+    from_frame_times,
+    from_rate,
+)
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -90,25 +95,25 @@ def times_s(rate_hz, count=40):
 
 
 def test_stated_rate_is_judged_by_the_times():
-    assert at_a_rate(25.0, "", times_s(25.0)) == VideoTimestamps(25.0)
-    assert present(at_a_rate(25.0, "", times_s(25.1))).rate_hz == 25.0  # rounding
-    lie = at_a_rate(25.0, "", times_s(12.5))
+    assert from_rate(25.0, "", times_s(25.0)) == VideoTimestamps(25.0)
+    assert present(from_rate(25.0, "", times_s(25.1))).rate_hz == 25.0  # rounding
+    lie = from_rate(25.0, "", times_s(12.5))
     assert present(lie).rate_hz == pytest.approx(12.5)
     assert "states 25 frames a second and shows 12.5" in present(lie).note
-    assert at_a_rate(25.0, "", [tick / 25.0 for tick in UNEVEN]) is None
-    assert present(at_a_rate(25.0, "25 assumed", times_s(10.0))).rate_hz == pytest.approx(10.0)
-    assert present(at_a_rate(25.0, "25 assumed", [])).note == "25 assumed"
+    assert from_rate(25.0, "", [tick / 25.0 for tick in UNEVEN]) is None
+    assert present(from_rate(25.0, "25 assumed", times_s(10.0))).rate_hz == pytest.approx(10.0)
+    assert present(from_rate(25.0, "25 assumed", [])).note == "25 assumed"
 
 
 def test_times_that_are_missing_are_put_right():
-    assert rising([0.0, 0.1, 0.2, 0.0]) == pytest.approx([0.0, 0.1, 0.2, 0.3])
-    assert rising([0.0] * 10) == []
-    assert rising([]) == []
+    assert ascending_times([0.0, 0.1, 0.2, 0.0]) == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert ascending_times([0.0] * 10) == []
+    assert ascending_times([]) == []
 
 
 @given(st.lists(st.floats(0.001, 2.0), min_size=2, max_size=30), st.integers(1, 200))
 def test_every_due_time_belongs_to_its_own_picture(steps, number):
-    times = by_table(np.cumsum([5.0, *steps]).tolist())
+    times = from_frame_times(np.cumsum([5.0, *steps]).tolist())
     assert times.number_at(times.due_s(number)) == number
     assert times.due_s(number + 1) > times.due_s(number)
     assert times.number_at(-0.001) <= 0

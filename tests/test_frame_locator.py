@@ -15,7 +15,7 @@ from test_perception import STILL, face_at, picture, standing
 
 from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.process import renumbered
+from gazerig.drivers.camera.process import offset_ids
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
@@ -146,7 +146,7 @@ def test_a_locator_and_what_it_locates_pass_between_processes() -> None:
 
 
 def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:
-    found = renumbered(located(picture(1, blobs=(BALL,))), 2)
+    found = offset_ids(located(picture(1, blobs=(BALL,))), 2)
     assert [blob.id for blob in found.blobs] == [2_000_003]
     assert [thing.mark for thing in present(found.located).things] == [2_000_003]
 

@@ -11,7 +11,7 @@ from stand_in import StandIn
 from test_face_pose import CAMERA, image_of, turned
 
 from gazerig.drivers.camera.guarded_camera import fault_of_face
-from gazerig.drivers.camera.recording_format import _face, faces
+from gazerig.drivers.camera.recording_format import _face, decode_faces
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import PARTS, Angles2, Angles3, Bodies, Face, Mat3, Percept, Vec3
@@ -164,7 +164,7 @@ def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool) -> None:
 def test_a_gaze_of_the_eyes_is_kept_by_camera_recordings_and_checked() -> None:
     for gaze in (None, (0.0, 0.6, -0.8)):
         (face,) = detection(gaze).faces
-        (back,) = faces(orjson.dumps({"faces": [_face(face)]}))
+        (back,) = decode_faces(orjson.dumps({"faces": [_face(face)]}))
         assert back.gaze_camera == gaze
         assert fault_of_face(face) == ""
     for wrong in ((0.0, 1.0), (0.0, float("nan"), 1.0), (0.0, 0.0, 0.0)):

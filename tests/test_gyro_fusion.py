@@ -315,9 +315,9 @@ def test_turn_that_is_no_rotation_ends_the_camera_of_a_program_alone():
 def test_recording_keeps_the_turn():
     turn = CameraTurn(7, rows(turned_by((0.1, -0.2, 0.3))))
     shot = Shot(1.0, 1, np.zeros((4, 6, 3), np.uint8), turn=turn)
-    messages = dict(fmt.encoded(shot, None))
-    found = fmt.turn(messages[fmt.TURN])
+    messages = dict(fmt.encode_shot(shot, None))
+    found = fmt.decode_turn(messages[fmt.TURN])
     assert found.epoch == 7 and np.allclose(found.R_start_camera, turn.R_start_camera)
     for wrong in (b"{}", b'{"epoch": 1, "R": [1, 0]}', b'{"epoch": 1, "R": [1,0,0,0,1,0,0,0,2]}'):
         with pytest.raises(fmt.BadMessage):
-            fmt.turn(wrong)
+            fmt.decode_turn(wrong)

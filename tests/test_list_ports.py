@@ -7,9 +7,9 @@ from present import present
 from gazerig.drivers.serial.list_ports import (
     Host,
     access,
-    holders,
     latency_file,
     latency_ms,
+    port_users,
     serial_ports,
     set_latency,
 )
@@ -41,7 +41,7 @@ def test_who_holds_a_port(tmp_path):
     (own / "3").symlink_to(device)
     (tmp_path / "proc" / "14").mkdir()  # may not be looked into
     host = Host(processes=tmp_path / "proc")
-    assert holders(str(device), host) == ("minicom (process 12)",)
+    assert port_users(str(device), host) == ("minicom (process 12)",)
 
 
 def test_latency_timer(tmp_path):

@@ -107,8 +107,8 @@ def test_frames_that_are_not_straightened_carry_the_distortion():
 def test_recording_keeps_the_distortion():
     lens = Intrinsics(570.0, 571.0, 319.0, 199.0, (0.1, -0.2, 0.001, -0.002, 0.3))
     shot = Shot(1.0, 1, np.zeros((4, 6, 3), np.uint8), lens=lens)
-    messages = dict(fmt.encoded(shot, None))
-    assert fmt.lens(messages[fmt.LENS]) == lens
+    messages = dict(fmt.encode_shot(shot, None))
+    assert fmt.decode_lens(messages[fmt.LENS]) == lens
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from oak_packets import face_archive
 
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import device_nodes, readings
+from gazerig.drivers.camera.oak.pipeline import device_nodes, imu_queue
 from gazerig.drivers.camera.oak.sdk import load_depthai
 
 
@@ -59,9 +59,9 @@ def test_gyro_is_asked_for_in_small_batches(dai):
     (imu,) = made["IMU"]
     imu.enableIMUSensor.assert_called_once_with(dai.IMUSensor.GYROSCOPE_RAW, 200)
     imu.setBatchReportThreshold.assert_called_once_with(2)
-    assert readings(outputs) is not None
+    assert imu_queue(outputs) is not None
     outputs, made = asked(dai, depth=False, gyro=False)
-    assert "IMU" not in made and readings(outputs) is None
+    assert "IMU" not in made and imu_queue(outputs) is None
 
 
 def test_yunet_gets_the_frame_in_whole_and_is_decoded_on_the_host(dai, tmp_path):

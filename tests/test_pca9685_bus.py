@@ -10,7 +10,7 @@ from smbus2 import i2c_msg
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.hobby_board.release import stop_pulses
-from gazerig.drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
+from gazerig.drivers.i2c.bridge import READ_STATUS, I2cMessage, commands, read, write
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
@@ -28,12 +28,12 @@ def world():
 
 
 def test_transfers_are_commands_of_the_bridge_and_come_back_as_they_were():
-    text = write(0x40, 6, b"\1\2") + ASK_STATUS + read(0x41, 0xFE, 1)
+    text = write(0x40, 6, b"\1\2") + READ_STATUS + read(0x41, 0xFE, 1)
     assert text.hex(" ") == "53 80 03 06 01 02 50 52 0a 50 53 82 01 fe 53 83 01 50"
     assert list(commands(text)) == [
-        (Part(0x40, b"\6\1\2"),),
+        (I2cMessage(0x40, b"\6\1\2"),),
         (),
-        (Part(0x41, b"\xfe"), Part(0x41, b"", 1)),
+        (I2cMessage(0x41, b"\xfe"), I2cMessage(0x41, b"", 1)),
     ]
     with pytest.raises(ValueError, match="no whole command"):
         list(commands(text[:-1]))

@@ -14,7 +14,7 @@ from gazerig.drivers.i2c.port import I2cPort, explain
 from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.serial.port_by_path import port_of
-from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.serial.port_owner import check_owner
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
@@ -116,8 +116,8 @@ def test_a_path_says_what_kind_of_port_it_is(tmp_path):
 def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
     for kind in ("maestro", "dynamixel"):
         with pytest.raises(PortError, match="is an I2C bus, not a serial port.*pca9685"):
-            refuse_owner("/dev/i2c-1", kind, ())
-    refuse_owner("/dev/i2c-1", "pca9685", ())
+            check_owner("/dev/i2c-1", kind, ())
+    check_owner("/dev/i2c-1", "pca9685", ())
 
 
 # --- the same head on either board

@@ -184,7 +184,7 @@ def found(port, servo_id=1):
     return PacketHandler(2.0).ping(port, servo_id)[1] == COMM_SUCCESS
 
 
-def unheard(port, servo_id=1):
+def take_errors(port, servo_id=1):
     """Return whether a servo stays silent; who awaits silence waits for less of it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(serial_port, "SDK_MARGIN_S", 0.1)
@@ -193,7 +193,7 @@ def unheard(port, servo_id=1):
 
 def test_faults_by_command(strict, client):
     assert strict.command("lose 1 count 1") == "servo 1 does not answer 1 times"
-    assert unheard(client)
+    assert take_errors(client)
     assert found(client)
     with pytest.raises(ValueError, match="'lsoe' is not a command"):
         strict.command("lsoe 1")
@@ -213,7 +213,7 @@ def test_a_late_answer_comes_late(strict, client):
 def test_a_client_at_a_wrong_baud_rate_hears_nothing(strict, client):
     for rate, heard in ((57_600, False), (4_000_000, False), (1_000_000, True)):
         client.setBaudRate(rate)
-        assert found(client) if heard else unheard(client)
+        assert found(client) if heard else take_errors(client)
     client.setBaudRate(115_200)
     strict.command("set baud any")
     assert found(client)

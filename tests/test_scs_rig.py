@@ -13,7 +13,7 @@ from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.scs import FEETECH_SCS, SCS_REGISTERS
-from gazerig.drivers.servo_bus.discovery import corrupt, scan_ids
+from gazerig.drivers.servo_bus.discovery import count_corrupt, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, encode
@@ -56,16 +56,16 @@ def test_both_series_are_known_by_one_search():
     assert [(one.id, one.number, one.model) for one in found] == [
         (1, 1284, "scs0009"), (2, 1295, "scs15"), (3, 777, "sts3215"),
     ]  # fmt: skip
-    assert corrupt(bench.port, FEETECH_SCS, 1) == 0
+    assert count_corrupt(bench.port, FEETECH_SCS, 1) == 0
     bench.chain.faults.command("collide 1")
-    assert corrupt(bench.port, FEETECH_SCS, 1) >= 2
+    assert count_corrupt(bench.port, FEETECH_SCS, 1) >= 2
 
 
 def test_registers_have_the_high_byte_first_and_their_own_lock():
     bench = Bench()
     registers = Registers(bench.port, FEETECH_SCS)
     assert registers.read(2, "present_position") == 300
-    assert registers.write_lasting(1, "max_position_limit", 900)
+    assert registers.write_persistent(1, "max_position_limit", 900)
     bench.chain[1].restart()
     bench.now_s += 1.0
     assert registers.read(1, "max_position_limit") == 900

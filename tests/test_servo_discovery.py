@@ -13,7 +13,7 @@ from gazerig.drivers.dynamixel.protocol_1 import protocol_1_ids
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.homing import set_middle
-from gazerig.drivers.servo_bus.discovery import FoundServo, corrupt, ping, scan, scan_ids
+from gazerig.drivers.servo_bus.discovery import FoundServo, count_corrupt, ping, scan, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers, transact
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -64,7 +64,7 @@ class Bench:
         return ping(self.port, self.family, servo_id, self.baud)
 
     def corrupt(self, servo_id):
-        return corrupt(self.port, self.family, servo_id)
+        return count_corrupt(self.port, self.family, servo_id)
 
 
 @pytest.fixture(params=[DYNAMIXEL, FEETECH], ids=lambda family: family.name)
@@ -183,7 +183,7 @@ def test_latched_errors_and_stuffed_answers_are_heard():
     port.setBaudRate(57_600)
     port.faults.command("overload 9")
     assert present(ping(port, DYNAMIXEL, 9, 57_600)).model == XC
-    assert corrupt(port, DYNAMIXEL, 9) == 0
+    assert count_corrupt(port, DYNAMIXEL, 9) == 0
     port.faults.command("refuse 9 7")
     assert ping(port, DYNAMIXEL, 9, 57_600) is None
 

@@ -240,7 +240,7 @@ def test_registers_behind_a_lock(sts):
     assert registers.read(4, "present_position") == 1928
     assert registers.settle(4, "torque_limit", 600)
     assert registers.read(4, "torque_limit") == 600
-    assert registers.write_lasting(4, "position_offset", -85)
+    assert registers.write_persistent(4, "position_offset", -85)
     sts.chain[4].restart()
     sts.now_s += 1.0
     assert registers.read(4, "position_offset") == -85

@@ -22,7 +22,12 @@ from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import BusLost, PluginError
 from gazerig.drivers.process import bounded_call
-from gazerig.drivers.process.bounded_call import LASTING, BoundedCall, LastingReport, lasting_text
+from gazerig.drivers.process.bounded_call import (
+    OVERDUE_SOURCES,
+    BoundedCall,
+    OverdueReport,
+    overdue_text,
+)
 from gazerig.drivers.types import Detections, ServoConfig
 from gazerig.robot.app import run_bus
 from gazerig.robot.control import line_queue
@@ -90,7 +95,7 @@ def misbehaves() -> Iterator[Callable[[str], Misbehaviour]]:
     yield one
     for function in made:
         function.gate.set()
-    wait_for(lambda: not LASTING)
+    wait_for(lambda: not OVERDUE_SOURCES)
 
 
 def quiet(line: str) -> None:
@@ -273,7 +278,7 @@ def test_a_say_that_blocks_is_an_event_that_comes_again(
             return [one for one in events if "say of the program has not returned" in one]
 
         wait_for(lambda: len(told()) > 1)
-        assert "lines wait" in told()[0] and "say of the program" in lasting_text()
+        assert "lines wait" in told()[0] and "say of the program" in overdue_text()
 
 
 def test_a_camera_that_does_not_open_is_no_start(
@@ -337,7 +342,7 @@ def test_a_call_that_computes_is_ended_and_no_other_thread_is_hit() -> None:
         assert call(partial(spin, k)) is None
         call.close()
     begun, ended = 0, list[int]()
-    while LASTING:  # others begin, which may have the numbers of those that have ended
+    while OVERDUE_SOURCES:  # others begin, which may have the numbers of those that have ended
         begun += 1
         other = threading.Thread(target=_work, args=(begun, ended))
         other.start()
@@ -371,13 +376,13 @@ def test_a_call_that_catches_everything_is_met_again_and_told(
     call = BoundedCall("a rule", 0.001)
     assert call(stubborn) is None
     call.close()
-    report, lines = LastingReport(), list[str]()
+    report, lines = OverdueReport(), list[str]()
     while len(caught) < 2:
         lines += report.lines()
     gate.set()
-    wait_for(lambda: not LASTING)
+    wait_for(lambda: not OVERDUE_SOURCES)
     assert lines and lines[0].startswith("a rule was given up 0 s ago and does not end")
-    assert len(lines) < 20 and report.lines() == () and lasting_text() == ""
+    assert len(lines) < 20 and report.lines() == () and overdue_text() == ""
 
 
 def test_a_call_that_waits_outside_python_is_told_as_long_as_it_lasts() -> None:
@@ -386,9 +391,9 @@ def test_a_call_that_waits_outside_python_is_told_as_long_as_it_lasts() -> None:
     assert call(gate.wait) is None
     call.close()
     wait_for(lambda: call.lasts()[0] > 0.3)
-    assert call in LASTING
+    assert call in OVERDUE_SOURCES
     gate.set()
-    wait_for(lambda: call not in LASTING)
+    wait_for(lambda: call not in OVERDUE_SOURCES)
 
 
 # --- a package's servo bus

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from gazerig.drivers.errors import BusLost, DriverError, PluginError
 from gazerig.drivers.event_log import EventLog, RateLimitedLog
-from gazerig.drivers.plugins import failure
+from gazerig.drivers.plugins import describe_error
 from gazerig.drivers.process.bounded_call import BoundedCall, CallResult
 from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 
@@ -82,7 +82,9 @@ class CheckedBus:
         try:
             return self._sound(feedback, now_s)
         except (TypeError, ValueError) as error:
-            raise BusLost(f"{self._label}: read returned no feedback: {failure(error)}") from error
+            raise BusLost(
+                f"{self._label}: read returned no feedback: {describe_error(error)}"
+            ) from error
 
     def _time(self, took_s: float, now_s: float) -> None:
         """Report a read that leaves no time for the rest of the tick."""

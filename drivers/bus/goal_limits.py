@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from operator import le
 
 
-def clipped(steps: Sequence[int], lowest: Sequence[int], highest: Sequence[int]) -> Sequence[int]:
+def clip_goals(
+    steps: Sequence[int], lowest: Sequence[int], highest: Sequence[int]
+) -> Sequence[int]:
     """Return goals inside their ranges.
 
     Raises:

@@ -21,14 +21,14 @@ STILL_STEPS, STILL_S = 2, 0.3
 """A servo that moves no farther than this in this time has stopped."""
 
 
-class _Place(NamedTuple):
+class _LastPosition(NamedTuple):
     """Last position of a servo, and the time since which it has not moved."""
 
     steps: float
     since_s: float
 
 
-class SlowEntry:
+class LimitRecovery:
     """Servos that move slowly into their limits.
 
     Args:
@@ -39,7 +39,7 @@ class SlowEntry:
 
     def __init__(self, setups: Mapping[int, ServoConfig]) -> None:
         self._setups = setups
-        self.places: dict[int, _Place | None] = {}
+        self.places: dict[int, _LastPosition | None] = {}
 
     def __contains__(self, servo_id: object) -> bool:
         return servo_id in self.places
@@ -68,7 +68,7 @@ class SlowEntry:
             return True
         before = self.places[servo_id]
         if before is None or abs(steps - before.steps) > STILL_STEPS:
-            self.places[servo_id] = _Place(steps, now_s)
+            self.places[servo_id] = _LastPosition(steps, now_s)
             return False
         return now_s - before.since_s >= STILL_S
 

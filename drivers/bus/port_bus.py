@@ -35,7 +35,7 @@ class BusSupervisor(Protocol):
 
     engaged: bool
 
-    def torque_disabled(self) -> None:
+    def stop_supervision(self) -> None:
         """Stop supervision, as the servos have no torque."""
 
 
@@ -114,18 +114,18 @@ class PortBus(ABC):
             BusLost: the port is lost and cannot be reopened; the first read after it reconnects
                 switches torque off.
         """
-        self._supervisor.torque_disabled()
+        self._supervisor.stop_supervision()
         if not self._opened:
             return
-        if self._link.down and not self._link.open_once_more(self._now_s):
-            self._link.refused_release()
+        if self._link.down and not self._link.reopen_now(self._now_s):
+            self._link.record_failed_release()
             raise BusLost(self._cannot_release())
         self._switch_all_off()
 
     def close(self) -> None:
         """Close the port; safe to call twice. Servos keep their last goals."""
         self._opened = False
-        self._supervisor.torque_disabled()
+        self._supervisor.stop_supervision()
         self._port.closePort()
 
     def _reachable(self, now_s: float) -> bool:
@@ -154,7 +154,7 @@ class PortBus(ABC):
             released = self._switch_off()
         except BusLost as lost:
             self._lose(lost)
-            self._link.refused_release()
+            self._link.record_failed_release()
             raise BusLost(self._cannot_release()) from lost
         self._link.released()
         self._line.errors["refused"] += len(released.holding)

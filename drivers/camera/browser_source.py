@@ -8,7 +8,7 @@ import numpy as np
 
 from gazerig.drivers.camera.jpeg_slot import JpegSlot
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.camera.source import Shot, bgr
+from gazerig.drivers.camera.source import Shot, to_bgr
 
 FIELD_DEG = 60.0
 """Assumed horizontal field of view of an unknown camera."""
@@ -45,7 +45,7 @@ class BrowserSource:
             import cv2  # only in the camera's process, not in that of the control loop
 
             found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
-            image = bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
+            image = to_bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
             if image is None:
                 self._tell()
                 continue

@@ -6,9 +6,17 @@ from typing import Any, cast
 
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import WebcamParams
-from gazerig.drivers.camera.source import FrameSource, Shot, bgr
+from gazerig.drivers.camera.source import FrameSource, Shot, to_bgr
 from gazerig.drivers.errors import CameraError, PluginError, SetupError
-from gazerig.drivers.plugins import CAMERA, CameraPlugin, Evidence, failure, find, load, made
+from gazerig.drivers.plugins import (
+    CAMERA,
+    CameraPlugin,
+    Evidence,
+    create,
+    describe_error,
+    find,
+    load,
+)
 from gazerig.drivers.types import CameraTurn
 
 
@@ -28,13 +36,13 @@ WEBCAM = CameraPlugin(_webcam, WebcamParams, ("frames",), Evidence(emulated=True
 OAK = CameraPlugin(_oak, OakParams, ("frames", "depth", "lens"), Evidence(emulated=True))
 
 
-def camera_part(name: str, params: Any) -> object:
+def create_camera_part(name: str, params: Any) -> object:
     """Create a frame source or a camera by its name.
 
     Raises:
         SetupError: there is none, or it cannot be made.
     """
-    return made(CAMERA, name, load(CAMERA, name, CameraPlugin), params)
+    return create(CAMERA, name, load(CAMERA, name, CameraPlugin), params)
 
 
 def is_source(part: object) -> bool:
@@ -42,13 +50,15 @@ def is_source(part: object) -> bool:
     return hasattr(part, "take")
 
 
-def plugin_source(name: str, params: Any) -> FrameSource:
+def create_plugin_source(name: str, params: Any) -> FrameSource:
     """Create a frame source by its name, checked frame by frame; for use in any process.
 
     Raises:
         SetupError: there is none, or it cannot be made.
     """
-    return CheckedSource(cast(FrameSource, camera_part(name, params)), find(CAMERA, name).label)
+    return CheckedSource(
+        cast(FrameSource, create_camera_part(name, params)), find(CAMERA, name).label
+    )
 
 
 class CheckedSource:
@@ -73,7 +83,7 @@ class CheckedSource:
         except SetupError:
             raise
         except (Exception, SystemExit) as error:
-            raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
+            raise PluginError(f"{self._label} cannot be opened: {describe_error(error)}") from error
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; return None if ``stop`` was set meanwhile.
@@ -86,12 +96,12 @@ class CheckedSource:
         except CameraError:
             raise
         except (Exception, SystemExit) as error:
-            raise CameraError(f"{self._label} failed ({failure(error)})") from error
+            raise CameraError(f"{self._label} failed ({describe_error(error)})") from error
         if shot is None or stop.is_set():
             return None
         if not isinstance(shot, Shot):
             raise CameraError(f"{self._label} returned a {type(shot).__name__}, wanted a Shot")
-        image = bgr(shot.image)
+        image = to_bgr(shot.image)
         if image is None:
             raise CameraError(f"{self._label} returned a frame that is no image of 8 or 16 bits")
         if not shot.captured_s <= now_s() + 1.0:  # also rejects NaN

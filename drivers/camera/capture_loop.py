@@ -121,7 +121,7 @@ class CaptureLoop:
         return self._now_s()
 
 
-def failed(failure: BaseException) -> CameraError:
+def detection_error(failure: BaseException) -> CameraError:
     """Return the error that ended the detection, as the control loop reports it."""
     if isinstance(failure, CameraError):
         return CameraError(str(failure))

@@ -18,7 +18,7 @@ _JUMP_S = 0.1  # a larger deviation from the line is a clock that was set ...
 _LASTING_S = 1.0  # ... if it lasts this long; a single frame may be late
 
 
-class _Best(NamedTuple):
+class _BestFrame(NamedTuple):
     """The least delayed frame of a bucket: device time, and arrival minus device time."""
 
     device_s: float
@@ -33,7 +33,7 @@ class ClockSync:
 
     def __init__(self, least_delay_s: float = 0.0) -> None:
         self._least_delay_s = least_delay_s
-        self._best: deque[_Best] = deque(maxlen=_BUCKETS)
+        self._best: deque[_BestFrame] = deque(maxlen=_BUCKETS)
         self._bucket: int | None = None
         self._drift = 0.0
         self._offset_s = 0.0  # offset of the line at device time 0
@@ -92,7 +92,7 @@ class ClockSync:
     def _keep(self, device_s: float, difference_s: float) -> None:
         """Store a frame if it is the least delayed of its bucket, and fit the line again."""
         bucket = int(device_s // _BUCKET_S)
-        new = _Best(device_s, difference_s)
+        new = _BestFrame(device_s, difference_s)
         if bucket != self._bucket:
             self._bucket = bucket
             self._drift = self._slope()  # of whole buckets only
@@ -103,7 +103,7 @@ class ClockSync:
             return
         self._offset_s = min(self._above_drift(best) for best in self._best)
 
-    def _above_drift(self, best: _Best) -> float:
+    def _above_drift(self, best: _BestFrame) -> float:
         """Return a frame's difference without the drift since device time 0."""
         return best.difference_s - self._drift * best.device_s
 

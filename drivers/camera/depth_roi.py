@@ -66,7 +66,7 @@ def depth_at(
     return DepthReading(distance_m, spread_m, layer.size / seen.size)
 
 
-def metres(depth_mm: NDArray[np.uint16]) -> Depth:
+def to_metres(depth_mm: NDArray[np.uint16]) -> Depth:
     """Convert a camera's millimetres (0: unknown) to read-only metres (NaN: unknown)."""
     depth = depth_mm.astype(np.float32)
     depth[depth_mm == 0] = np.nan
@@ -75,7 +75,7 @@ def metres(depth_mm: NDArray[np.uint16]) -> Depth:
     return depth
 
 
-def millimetres(depth_m: Depth) -> NDArray[np.uint16]:
+def to_millimetres(depth_m: Depth) -> NDArray[np.uint16]:
     """Convert metres to whole millimetres, 0 if unknown or beyond 65 m."""
     with np.errstate(over="ignore"):
         mm = np.rint(np.asarray(depth_m, dtype=np.float32) * np.float32(_MM_PER_M))
@@ -83,7 +83,7 @@ def millimetres(depth_m: Depth) -> NDArray[np.uint16]:
     return np.where(known, mm, np.float32(0.0)).astype(np.uint16)
 
 
-def resized(depth_m: Depth, width_px: int, height_px: int) -> Depth:
+def resize_depth(depth_m: Depth, width_px: int, height_px: int) -> Depth:
     """Resize a depth image to its colour image, without inventing distances."""
     if depth_m.shape == (height_px, width_px):
         return depth_m

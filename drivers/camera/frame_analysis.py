@@ -53,7 +53,7 @@ class FrameAnalyzer:
         began_s = perf_counter()
         height, width = shot.image.shape[:2]
         faces = self._faces(shot)
-        for line in self._off_frame.told_of(faces, width, height):
+        for line in self._off_frame.report(faces, width, height):
             self._faults.setdefault(line, False)
         faces = tuple([face for face in faces if not is_off_frame(face, width, height)])
         faces_s = perf_counter()

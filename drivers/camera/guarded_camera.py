@@ -8,7 +8,7 @@ from typing import Any
 from gazerig.drivers.camera.off_frame import OffFrameReport
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.plugins import failure
+from gazerig.drivers.plugins import describe_error
 from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.drivers.types import Camera, DetectedFace, Detections, MovingBlob
 
@@ -112,7 +112,7 @@ class GuardedCamera:
             self._newest = self._checked = found
             if found is not None:
                 size_px = found.width_px, found.height_px
-                for line in self._off_frame.told_of(found.faces, *size_px):
+                for line in self._off_frame.report(found.faces, *size_px):
                     self._log.add(f"{self._label}: {line}")
         return self._newest
 
@@ -156,7 +156,7 @@ def fault_of(found: Any) -> str:
     try:
         return "" if found is None else _fault(found)
     except Exception as error:  # its attributes may be anything
-        return f"detections that cannot be read ({failure(error)})"
+        return f"detections that cannot be read ({describe_error(error)})"
 
 
 def _fault(found: Any) -> str:

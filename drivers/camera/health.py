@@ -85,7 +85,7 @@ class PictureStats(NamedTuple):
     edge_px: float | None
 
 
-class Judged(NamedTuple):
+class CameraObservation(NamedTuple):
     """Observations of a camera for one assessment; None: unknown.
 
     upright: whether a nearly upright face is found
@@ -107,7 +107,7 @@ class Judged(NamedTuple):
     field_assumed: bool = False
 
 
-class _Lasting:
+class _Condition:
     """A condition; it begins and ends after several consecutive equal assessments."""
 
     def __init__(self, over: str, begins: int = _BEGINS, ends: int = _ENDS) -> None:
@@ -136,9 +136,9 @@ class HealthModel:
 
     def __init__(self, rotation_deg: int = 0) -> None:
         self._rotation = rotation_deg
-        self._on = {name: _Lasting(over) for name, over in _OVER.items()}
-        self._on["turned"] = _Lasting(_OVER["turned"], 1)  # its evidence has already lasted
-        self._on["field"] = _Lasting(_OVER["field"], 1, 1)
+        self._on = {name: _Condition(over) for name, over in _OVER.items()}
+        self._on["turned"] = _Condition(_OVER["turned"], 1)  # its evidence has already lasted
+        self._on["field"] = _Condition(_OVER["field"], 1, 1)
         self._upright: deque[bool] = deque(maxlen=_SAMPLES)
         self._turned: deque[float] = deque(maxlen=_PROBES)
 
@@ -153,7 +153,7 @@ class HealthModel:
         few = len(self._upright) >= _BEGINS and 2 * sum(self._upright) < len(self._upright)
         return few and not self._on["turned"].text
 
-    def step(self, seen: Judged) -> tuple[str, ...]:
+    def step(self, seen: CameraObservation) -> tuple[str, ...]:
         """Add observations; return the lines to report."""
         texts = {
             "dark": self._dark(seen.picture),
@@ -185,7 +185,7 @@ class HealthModel:
             "the picture is out of focus: clean or turn the lens, or set webcam.focus (oak.focus)"
         )
 
-    def _roll(self, seen: Judged) -> str | None:
+    def _roll(self, seen: CameraObservation) -> str | None:
         self._upright.append(seen.upright)
         if 2 * sum(self._upright) > len(self._upright):
             self._turned.clear()
@@ -211,7 +211,7 @@ class HealthModel:
             cure = f"set camera.rotation: {(self._rotation - quarter) % 360}"
         return f"the camera is turned by {about}, according to the faces: {cure}"
 
-    def _slow(self, seen: Judged) -> str | None:
+    def _slow(self, seen: CameraObservation) -> str | None:
         if seen.over_s <= 0.0 or seen.offered <= 0:
             return None
         was = bool(self._on["slow"].text)
@@ -271,7 +271,7 @@ class CameraHealth:
             return self._model.conditions
         over_s = t_s - self._due_s + EVERY_S if self._last_s <= t_s and self._number else 0.0
         self._due_s, self._last_s = t_s + EVERY_S, t_s
-        seen = Judged(
+        seen = CameraObservation(
             picture_stats(shot.image),
             _any_upright(faces),
             self._turned(shot.image, t_s, bool(faces)),

@@ -1,8 +1,8 @@
-"""The newest encoded picture, passed from one process to another (``TwoEntries``)."""
+"""The newest encoded picture, passed from one process to another (``DoubleBuffer``)."""
 
 from typing import NamedTuple
 
-from gazerig.drivers.camera.two_entries import CONTEXT, TwoEntries
+from gazerig.drivers.camera.double_buffer import CONTEXT, DoubleBuffer
 
 MOST_BYTES = 190_000
 """Largest picture; a JPEG of 640 x 480 in good quality has a third of it."""
@@ -20,7 +20,7 @@ class JpegSlot:
     """Slot of the newest picture; it can be passed as an argument to a new process."""
 
     def __init__(self) -> None:
-        self._newest = TwoEntries()
+        self._newest = DoubleBuffer()
         self._sizes = CONTEXT.RawArray("q", 2)
         self._times = CONTEXT.RawArray("d", 2)
         self._entries = CONTEXT.RawArray("c", 2 * MOST_BYTES)

@@ -39,7 +39,7 @@ class OffFrameReport:
     def __init__(self) -> None:
         self._told = False
 
-    def told_of(
+    def report(
         self, faces: tuple[DetectedFace, ...], width_px: int, height_px: int
     ) -> tuple[str, ...]:
         """Return the line about the faces of a frame, or an empty tuple."""

@@ -1,12 +1,12 @@
 """The newest pose of the head, written by the control loop, read by a process that draws its view.
 
-No lock is needed (``TwoEntries``).
+No lock is needed (``DoubleBuffer``).
 """
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from gazerig.drivers.camera.two_entries import CONTEXT, TwoEntries
+from gazerig.drivers.camera.double_buffer import CONTEXT, DoubleBuffer
 
 _WIDTH = 13  # time, the rotation's nine numbers, the position
 
@@ -28,7 +28,7 @@ class PoseSlot:
     """
 
     def __init__(self) -> None:
-        self._newest = TwoEntries()
+        self._newest = DoubleBuffer()
         self._first_s = CONTEXT.RawValue("d", 0.0)
         self._entries = CONTEXT.RawArray("d", 2 * _WIDTH)
 

@@ -24,9 +24,16 @@ from gazerig.drivers.camera.frame_watchdog import FrameWatchdog
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_detections import SharedDetections
 from gazerig.drivers.camera.shared_frames import SlotReader
-from gazerig.drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
+from gazerig.drivers.camera.worker import (
+    LONGEST_END_S,
+    CameraParts,
+    DetectionMessage,
+    ProcessEnd,
+    Retune,
+    run,
+)
 from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.drivers.process.child_process import hidden_script
+from gazerig.drivers.process.child_process import hide_script
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, FaceDetector
 
 _LONGEST_START_S = 60.0
@@ -185,7 +192,7 @@ class CameraProcess:
             name="camera",
             daemon=True,
         )
-        with hidden_script():
+        with hide_script():
             process.start()
         theirs.close()
         self._process, self._pipe = process, pipe
@@ -274,7 +281,7 @@ class CameraProcess:
                         return _End("no new frame, and its process hangs")
                     continue
                 message = pipe.recv()
-                if isinstance(message, Ended):
+                if isinstance(message, ProcessEnd):
                     return _End(message.reason, message.final)
                 if isinstance(message, str):
                     retrying = message.startswith(LOST) or (
@@ -304,14 +311,14 @@ class CameraProcess:
             self._events.append("still no frame: starting the camera's process again")
         return verdict == "hung"
 
-    def _publish(self, message: Found, slots: tuple[SlotReader, SlotReader]) -> None:
+    def _publish(self, message: DetectionMessage, slots: tuple[SlotReader, SlotReader]) -> None:
         """Publish detections, which copy the frame from its slot on request."""
         found = message.detections
         self.frames += 1
         self.frames_with_face += bool(found.faces)
         self._number = self._counted + found.number
         if self._starts > 1:
-            found = renumbered(found, self._starts - 1)
+            found = offset_ids(found, self._starts - 1)
         slots[0].see(message.image)
         slots[1].see(message.depth)
         found = replace(found, number=self._number)
@@ -325,7 +332,7 @@ class CameraProcess:
             self._losses = 0
 
 
-def renumbered(found: Detections, starts: int) -> Detections:
+def offset_ids(found: Detections, starts: int) -> Detections:
     """Return detections with ids that differ from those of earlier processes.
 
     Its things and its scene are new: what was in front of the camera meanwhile is unknown, as is

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from gazerig.drivers.camera.recording_format import encoded
+from gazerig.drivers.camera.recording_format import encode_shot
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.camera.source import FrameSource, Shot
 
@@ -16,7 +16,7 @@ _ENCODERS = 2  # PNG of colour and depth takes most of a frame's time; OpenCV fr
 _MOST_WAITING = 30  # frames; if the disk is slower than the camera, frames are omitted
 
 
-class _Waiting(NamedTuple):
+class _QueuedFrame(NamedTuple):
     """A frame that is queued for the file."""
 
     captured_s: float
@@ -57,7 +57,7 @@ class CameraRecorder:
         self._writer: RecordingWriter | None = None
         self._thread: threading.Thread | None = None
         self._encoders: ThreadPoolExecutor | None = None
-        self._waiting: queue.Queue[_Waiting | None] = queue.Queue(_MOST_WAITING)
+        self._waiting: queue.Queue[_QueuedFrame | None] = queue.Queue(_MOST_WAITING)
         self._events: list[str] = []
         self.failure = ""
         self.left_out = 0
@@ -126,8 +126,8 @@ class CameraRecorder:
                 )
             self.left_out += 1
         elif self._encoders is not None:
-            messages = self._encoders.submit(encoded, shot, self._jpeg_quality)
-            self._waiting.put(_Waiting(shot.captured_s, shot.number, messages))
+            messages = self._encoders.submit(encode_shot, shot, self._jpeg_quality)
+            self._waiting.put(_QueuedFrame(shot.captured_s, shot.number, messages))
 
     def _write(self) -> None:
         """Write frames until the end of the recording; after a fault only discard them."""
@@ -149,6 +149,6 @@ class CameraRecorder:
                 self._events.append(self.failure)
 
 
-def _add(writer: RecordingWriter, one: _Waiting) -> None:
+def _add(writer: RecordingWriter, one: _QueuedFrame) -> None:
     """Wait until a frame is encoded, and write it."""
     writer.add(one.captured_s, one.number, one.messages.result())

@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.camera.depth_roi import metres, millimetres
+from gazerig.drivers.camera.depth_roi import to_metres, to_millimetres
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.source import Shot, bgr
+from gazerig.drivers.camera.source import Shot, to_bgr
 from gazerig.drivers.types import CameraTurn, Depth, DetectedFace, ImageArray
 
 PICTURE, DEPTH, LENS, FACES = "/camera/picture", "/camera/depth", "/camera/lens", "/camera/faces"
@@ -95,7 +95,7 @@ def nanoseconds(time_s: float) -> int:
     return round(time_s * 1e9)
 
 
-def encoded(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]:
+def encode_shot(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]:
     """Encode a frame and its data as messages, the image last.
 
     jpeg_quality: 1..100, None for PNG
@@ -105,7 +105,7 @@ def encoded(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]:
     if shot.lens is not None:
         found.append((LENS, _dump(_lens(shot.lens, shot.image, stamp))))
     if shot.depth_m is not None:
-        file = _file(".png", millimetres(shot.depth_m), _DEPTH_PNG)
+        file = _file(".png", to_millimetres(shot.depth_m), _DEPTH_PNG)
         found.append((DEPTH, _dump(_image("png", file, stamp))))
     if shot.faces is not None:
         found.append((FACES, _dump({"faces": [_face(face) for face in shot.faces]})))
@@ -121,19 +121,19 @@ def encoded(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]:
     return found
 
 
-def image(data: bytes) -> ImageArray:
+def decode_image(data: bytes) -> ImageArray:
     """Read a frame message.
 
     Raises:
         BadMessage: it contains no frame.
     """
-    pixels = bgr(_pixels(data))
+    pixels = to_bgr(_pixels(data))
     if pixels is None:
         raise BadMessage("no image in it")
     return pixels
 
 
-def depth(data: bytes) -> Depth:
+def decode_depth(data: bytes) -> Depth:
     """Read a depth message.
 
     Raises:
@@ -142,10 +142,10 @@ def depth(data: bytes) -> Depth:
     mm = _pixels(data)
     if mm.dtype != np.uint16 or mm.ndim != 2:
         raise BadMessage("no 16-bit depth image in it")
-    return metres(mm)
+    return to_metres(mm)
 
 
-def lens(data: bytes) -> Intrinsics:
+def decode_lens(data: bytes) -> Intrinsics:
     """Read a lens message.
 
     Raises:
@@ -161,7 +161,7 @@ def lens(data: bytes) -> Intrinsics:
     return Intrinsics(float(K[0]), float(K[4]), float(K[2]), float(K[5]), (k1, k2, p1, p2, k3))
 
 
-def turn(data: bytes) -> CameraTurn:
+def decode_turn(data: bytes) -> CameraTurn:
     """Read a message of the camera's orientation.
 
     Raises:
@@ -177,7 +177,7 @@ def turn(data: bytes) -> CameraTurn:
     return found
 
 
-def faces(data: bytes) -> tuple[DetectedFace, ...]:
+def decode_faces(data: bytes) -> tuple[DetectedFace, ...]:
     """Read a message of faces.
 
     Raises:

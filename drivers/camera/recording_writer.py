@@ -10,7 +10,7 @@ from typing import IO
 
 from mcap.writer import CompressionType, IndexType, Writer
 
-from gazerig.drivers.camera.recording_format import PROFILE, SCHEMAS, encoded, nanoseconds
+from gazerig.drivers.camera.recording_format import PROFILE, SCHEMAS, encode_shot, nanoseconds
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.files.file_output import refuse_existing
@@ -61,7 +61,7 @@ class RecordingWriter:
         Raises:
             OSError: the disk is full or gone.
         """
-        self.add(shot.captured_s, shot.number, encoded(shot, self._jpeg_quality))
+        self.add(shot.captured_s, shot.number, encode_shot(shot, self._jpeg_quality))
 
     def add(self, captured_s: float, number: int, messages: list[tuple[str, bytes]]) -> None:
         """Add an encoded frame: topics and messages, the image last.

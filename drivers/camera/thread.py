@@ -8,7 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
+from gazerig.drivers.camera.capture_loop import CaptureLoop, detection_error
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource
@@ -88,7 +88,7 @@ class CameraThread:
             CameraError: the source is lost permanently, or detection has failed.
         """
         if self._failure is not None:
-            raise failed(self._failure) from self._failure
+            raise detection_error(self._failure) from self._failure
         return self._newest
 
     def retune(

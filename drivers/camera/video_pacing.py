@@ -7,7 +7,7 @@ from typing import NamedTuple
 from gazerig.drivers.camera.video_timestamps import VideoTimestamps
 
 
-class Due(NamedTuple):
+class DueFrame(NamedTuple):
     """A due frame: its number, and the host time at which it was due."""
 
     number: int
@@ -23,7 +23,7 @@ class VideoPacing:
 
     def wait(
         self, times: VideoTimestamps, now_s: Callable[[], float], stop: threading.Event
-    ) -> Due | None:
+    ) -> DueFrame | None:
         """Wait until the next frame is due and return the newest; None if stopped."""
         if self._zero_s is None:
             self._zero_s = now_s()
@@ -32,4 +32,4 @@ class VideoPacing:
             return None
         # A wait may end slightly early; at least the awaited frame is returned.
         self._taken = max(self._taken + 1, times.number_at(now_s() - self._zero_s))
-        return Due(self._taken, self._zero_s + times.due_s(self._taken))
+        return DueFrame(self._taken, self._zero_s + times.due_s(self._taken))

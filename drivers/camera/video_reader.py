@@ -7,13 +7,13 @@ from typing import Any, Protocol
 import cv2
 
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
-from gazerig.drivers.camera.source import bgr
+from gazerig.drivers.camera.source import to_bgr
 from gazerig.drivers.camera.video_timestamps import (
     SAMPLE,
     VideoTimestamps,
-    at_a_rate,
-    by_table,
-    rising,
+    ascending_times,
+    from_frame_times,
+    from_rate,
 )
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import ImageArray
@@ -108,9 +108,11 @@ class _Film:
         first_s = _times_s(self._capture, SAMPLE)
         if not first_s:
             raise CameraError(f"{path} holds no readable frame: use another file")
-        times = at_a_rate(*stated, rising(first_s))
+        times = from_rate(*stated, ascending_times(first_s))
         if times is None:
-            times = by_table(rising(first_s + _times_s(self._capture, _MOST_TIMES)))
+            times = from_frame_times(
+                ascending_times(first_s + _times_s(self._capture, _MOST_TIMES))
+            )
         elif times.rate_hz == stated[0]:
             # The stated number of frames is often the length times the rate: if the rate is wrong,
             # so is the number.
@@ -206,7 +208,7 @@ def _frozen(image: Any, path: Path) -> ImageArray:
     Raises:
         CameraError: the file has another pixel format.
     """
-    pixels = bgr(image)
+    pixels = to_bgr(image)
     if pixels is None:
         raise CameraError(f"{path} holds pictures of an unknown kind: convert it to mp4 or png")
     return pixels

@@ -55,7 +55,7 @@ class VideoTimestamps(NamedTuple):
         return number
 
 
-def even(times_s: Sequence[float], rate_hz: float) -> bool:
+def is_even(times_s: Sequence[float], rate_hz: float) -> bool:
     """Return whether frames have a constant rate, except for rounding; too few count as even."""
     if len(times_s) < _LEAST:
         return True
@@ -63,7 +63,7 @@ def even(times_s: Sequence[float], rate_hz: float) -> bool:
     return bool(np.max(np.abs(off - np.median(off))) < _UNEVEN / rate_hz)
 
 
-def rising(times_s: Sequence[float]) -> list[float]:
+def ascending_times(times_s: Sequence[float]) -> list[float]:
     """Return ascending times, with wrong ones corrected; [] if few are right.
 
     The last frame of a film often has no time stamp.
@@ -82,15 +82,15 @@ def measured_rate_hz(times_s: Sequence[float]) -> float | None:
     if len(times_s) < _LEAST:
         return None
     rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
-    return rate_hz if even(times_s, rate_hz) else None
+    return rate_hz if is_even(times_s, rate_hz) else None
 
 
-def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTimestamps | None:
+def from_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTimestamps | None:
     """Return time stamps based on the first frames; None if they are uneven.
 
     stated_hz, note: the rate from the container's header, and assumptions about it
     """
-    if even(times_s, stated_hz) and (not note or measured_rate_hz(times_s) is None):
+    if is_even(times_s, stated_hz) and (not note or measured_rate_hz(times_s) is None):
         return VideoTimestamps(stated_hz, note=note)
     rate_hz = measured_rate_hz(times_s)
     if rate_hz is None:
@@ -104,7 +104,7 @@ def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTim
     )
 
 
-def by_table(times_s: Sequence[float]) -> VideoTimestamps:
+def from_frame_times(times_s: Sequence[float]) -> VideoTimestamps:
     """Return a table of the times; the last frame lasts as long as most frames do."""
     starts = tuple(t - times_s[0] for t in times_s)
     last_s = median(b - a for a, b in zip(starts, starts[1:], strict=False))

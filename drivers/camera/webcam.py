@@ -12,7 +12,7 @@ from gazerig.drivers.camera import v4l2_controls
 from gazerig.drivers.camera.frame_rate import FrameRateMonitor
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
-from gazerig.drivers.camera.source import Shot, bgr
+from gazerig.drivers.camera.source import Shot, to_bgr
 from gazerig.drivers.errors import CameraError
 
 # Consecutive failed frames after which the camera counts as lost; one fails at times with a long
@@ -112,7 +112,7 @@ class Webcam:
                 continue
             arrived_s = now_s()
             found, image = self._capture.retrieve()
-            pixels = bgr(image) if found and image is not None else None
+            pixels = to_bgr(image) if found and image is not None else None
             if pixels is not None:
                 captured_s = self._stamp_s(self._capture, arrived_s)
                 away_s = 0.0 if self._left_s is None else came_s - self._left_s

@@ -10,7 +10,7 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
-from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
+from gazerig.drivers.camera.capture_loop import CaptureLoop, detection_error
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
@@ -36,7 +36,7 @@ class CameraParts(NamedTuple):
     locate: Locate | None = None
 
 
-class Found(NamedTuple):
+class DetectionMessage(NamedTuple):
     """Detections in one frame, and the address of the frame in shared memory."""
 
     detections: Detections  # without frame and depth
@@ -52,7 +52,7 @@ class Retune(NamedTuple):
     locate: Locate | None = None
 
 
-class Ended(NamedTuple):
+class ProcessEnd(NamedTuple):
     """Reason for the end of the process.
 
     final: whether the time limit for reopening the camera has passed; otherwise a new process may
@@ -99,17 +99,17 @@ def run(
     except OSError:  # the parent has ended
         pass
     except Exception as failure:
-        pipe.send(Ended(str(failed(failure)), isinstance(failure, CameraError)))
+        pipe.send(ProcessEnd(str(detection_error(failure)), isinstance(failure, CameraError)))
     finally:
         camera.close()
         for slot in slots:
             slot.close()
 
 
-def _message(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> Found:
+def _message(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> DetectionMessage:
     """Copy frame and depth into shared memory; return the message to send."""
     image, depth = found.image, found.depth_m
-    return Found(
+    return DetectionMessage(
         replace(found, image=None, depth_m=None),
         slots[0].put(image) if image is not None else None,
         slots[1].put(depth) if depth is not None else None,

@@ -16,7 +16,7 @@ from gazerig.drivers.dynamixel.control_table import (
     name_errors,
     speed_units,
 )
-from gazerig.drivers.dynamixel.protocol_1 import ask_protocol_1
+from gazerig.drivers.dynamixel.protocol_1 import ping_protocol_1
 from gazerig.drivers.dynamixel.read_plan import read_plan
 from gazerig.drivers.servo_bus.family import Arming, Family
 
@@ -113,7 +113,7 @@ DYNAMIXEL = Family(
     quiet_s=0.1,
     thorough_s=THOROUGH_S,
     duplicate_id_registers=("realtime_tick", "present_position"),
-    protocol_1=ask_protocol_1,
+    protocol_1=ping_protocol_1,
     arming=Arming("profile_velocity", speed=True),
     most_goals=253,
     usual_bauds="57600 or 1000000",

@@ -9,7 +9,7 @@ from gazerig.drivers.servo_bus.registers import REPLY_S
 _PING = b"\xff\xff\xfe\x02\x01\xfe"
 
 
-def ask_protocol_1(port: BusPort) -> tuple[int, ...]:
+def ping_protocol_1(port: BusPort) -> tuple[int, ...]:
     """Ping all servos in Protocol 1.0; return the ids that answer."""
     port.drain()
     port.write(_PING)

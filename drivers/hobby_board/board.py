@@ -67,7 +67,7 @@ class Timing(NamedTuple):
     watch_s: period of its status requests
     stagger_s: time between the first pulses of two servos
     give_up_s: longest silence or loss
-    longest_lead_s: longest time for which the driver's ramps advance while nothing is sent; inf if
+    longest_ramp_s: longest time for which the driver's ramps advance while nothing is sent; inf if
         the board itself ramps pulses
     """
 
@@ -75,7 +75,7 @@ class Timing(NamedTuple):
     watch_s: float
     stagger_s: float
     give_up_s: float
-    longest_lead_s: float
+    longest_ramp_s: float
 
 
 class Board(Protocol):

@@ -14,7 +14,7 @@ unless the guardian process stops the pulses (gazerig.robot.guardian).
 from collections.abc import Sequence
 from math import inf, nan
 
-from gazerig.drivers.bus.goal_limits import clipped
+from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
@@ -65,7 +65,7 @@ class HobbyBoardBus(PortBus):
     def _begin(self) -> None:
         """Create the stateful parts in their initial state."""
         timing = self._board.timing
-        self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
+        self._channels = tuple(Channel(setup, timing.longest_ramp_s) for setup in self._setups)
         self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
         self._silence = SilenceMonitor(self._log, self._line.lateness)
         self._rx_bytes, self._byte_s = 0, -inf
@@ -171,10 +171,10 @@ class HobbyBoardBus(PortBus):
             self.disable_torque()
             raise
         except BusLost:
-            self._link.refused_release()  # some channels may already have pulses
+            self._link.record_failed_release()  # some channels may already have pulses
             raise
         self._link.release_due = False
-        self._supervisor.torque_enabled()
+        self._supervisor.start_supervision()
         return tuple(channel.goal_steps for channel in self._channels)
 
     def write(self, goals_steps: Sequence[int]) -> None:
@@ -187,7 +187,7 @@ class HobbyBoardBus(PortBus):
         Raises:
             ValueError: a goal is not a number, or their number is wrong.
         """
-        goals = [*map(int, clipped(goals_steps, self._lowest, self._highest))]
+        goals = [*map(int, clip_goals(goals_steps, self._lowest, self._highest))]
         held = [channel for channel in self._channels if channel.held]
         if not self._supervisor.engaged or self._link.down or not held:
             return

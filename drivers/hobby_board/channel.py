@@ -29,12 +29,12 @@ class Channel:
 
     Args:
         setup: The servo.
-        longest_lead_s: Longest time for which the driver's ramp advances while nothing is sent,
+        longest_ramp_s: Longest time for which the driver's ramp advances while nothing is sent,
             seconds.
     """
 
-    def __init__(self, setup: ServoConfig, longest_lead_s: float = inf) -> None:
-        self._longest_lead_s = longest_lead_s
+    def __init__(self, setup: ServoConfig, longest_ramp_s: float = inf) -> None:
+        self._longest_lead_s = longest_ramp_s
         self.setup = setup
         self.id = setup.id
         self.on = self.held = self.entering = self.rearmed = self.off_goal_reported = False

@@ -19,7 +19,7 @@ class HoldResult(Enum):
     ELSEWHERE = "elsewhere"
 
 
-def take(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
+def hold_channel(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
     """Hold a channel at its present pulse, or without one at its last position.
 
     Speed and acceleration are armed before the goal is sent, and the pulse is read afterwards. A

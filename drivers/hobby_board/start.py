@@ -7,12 +7,12 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
+from gazerig.drivers.hobby_board.hold import HoldResult, hold_channel, refusal
 from gazerig.drivers.hobby_board.release import TRIES
 from gazerig.drivers.types import ServoConfig
 
 
-def every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
+def read_every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
     """Read every pulse.
 
     Raises:
@@ -41,7 +41,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
         ServoMissing: the board does not answer, or a channel does not accept its goal.
     """
     board.prepare(log)
-    pulses = every_pulse(board, [channel.setup for channel in channels])
+    pulses = read_every_pulse(board, [channel.setup for channel in channels])
     for channel, pulse in zip(channels, pulses, strict=True):
         channel.found(pulse)
     without_pulses = [channel.setup.label("channel") for channel in channels if not channel.on]
@@ -62,7 +62,7 @@ def _insist(board: Board, channel: Channel, pulse: int) -> None:
         ServoMissing: it does not accept its goal.
     """
     for _ in range(TRIES):
-        outcome = take(board, channel, pulse)
+        outcome = hold_channel(board, channel, pulse)
         if outcome is HoldResult.HELD:
             return
         if outcome is HoldResult.ELSEWHERE and channel.on:

@@ -11,7 +11,7 @@ from math import inf
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
+from gazerig.drivers.hobby_board.hold import HoldResult, hold_channel, refusal
 from gazerig.drivers.hobby_board.models import HOBBY
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
@@ -41,7 +41,7 @@ class BoardSupervisor:
         self._line = board.line
         self._channels = tuple(channels)
         self._log = log
-        self._led = board.timing.longest_lead_s < inf
+        self._led = board.timing.longest_ramp_s < inf
         self.engaged = False
         self.pending: list[Channel] = []
         self._asked = -1
@@ -54,7 +54,7 @@ class BoardSupervisor:
         self._last_found = -1, 0
         self._damaged_s = self._hold_at_s = self._told_s = -inf
 
-    def torque_enabled(self) -> None:
+    def start_supervision(self) -> None:
         """Start supervision of enabled channels."""
         self.engaged = True
         self._restarts.clear()
@@ -63,7 +63,7 @@ class BoardSupervisor:
         self.pending.clear()
         self.sure, self._unhandled = True, ()
 
-    def torque_disabled(self) -> None:
+    def stop_supervision(self) -> None:
         """Stop supervision."""
         self.engaged = False
         self.pending.clear()
@@ -285,7 +285,7 @@ class BoardSupervisor:
             if pulse < LEAST_STEPS or not twice:
                 return
         channel.found(pulse)
-        outcome = take(self._board, channel, pulse)
+        outcome = hold_channel(self._board, channel, pulse)
         if outcome is HoldResult.HELD:
             channel.rearm()
             self.pending.remove(channel)

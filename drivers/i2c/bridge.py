@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")
 STATUS_REGISTER = 0x0A
-ASK_STATUS = bytes((READ_REGISTER, STATUS_REGISTER, STOP))
+READ_STATUS = bytes((READ_REGISTER, STATUS_REGISTER, STOP))
 OK, NO_ACKNOWLEDGE, TIMED_OUT = 0xF0, 0xF1, 0xF8
 OUTCOMES = {
     OK: "",
@@ -39,7 +39,7 @@ def read(address: int, register: int, length: int) -> bytes:
     return bytes((START, address << 1, 1, register, START, address << 1 | 1, length, STOP))
 
 
-class Part(NamedTuple):
+class I2cMessage(NamedTuple):
     """One message of a transfer; length: number of bytes to read, None for a write."""
 
     address: int
@@ -47,7 +47,7 @@ class Part(NamedTuple):
     length: int | None = None
 
 
-def commands(text: bytes) -> Iterator[tuple[Part, ...]]:
+def commands(text: bytes) -> Iterator[tuple[I2cMessage, ...]]:
     """Yield the parts of each command; a status request has none.
 
     Raises:
@@ -55,8 +55,8 @@ def commands(text: bytes) -> Iterator[tuple[Part, ...]]:
     """
     at = 0
     while at < len(text):
-        if text.startswith(ASK_STATUS, at):
-            at += len(ASK_STATUS)
+        if text.startswith(READ_STATUS, at):
+            at += len(READ_STATUS)
             yield ()
             continue
         parts = []
@@ -64,9 +64,9 @@ def commands(text: bytes) -> Iterator[tuple[Part, ...]]:
             address, count = text[at + 1], text[at + 2]
             at += 3
             if address & 1:
-                parts.append(Part(address >> 1, b"", count))
+                parts.append(I2cMessage(address >> 1, b"", count))
             else:
-                parts.append(Part(address >> 1, text[at : at + count]))
+                parts.append(I2cMessage(address >> 1, text[at : at + count]))
                 at += count
         if not parts or at >= len(text) or text[at] != STOP:
             raise ValueError(f"no whole command: {text.hex(' ')}")

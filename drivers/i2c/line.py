@@ -6,7 +6,7 @@ I2C has no checksums: an answer that causes an action is read twice.
 from collections import Counter
 from collections.abc import Sequence
 
-from gazerig.drivers.i2c.bridge import ASK_STATUS, OUTCOMES
+from gazerig.drivers.i2c.bridge import OUTCOMES, READ_STATUS
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 
@@ -48,7 +48,7 @@ class I2cLine:
             dropped = port.drain()
             if dropped and self.failure == "timeout":
                 self.lateness.late_answer(port.now_s())
-        packet = b"".join([transfer + ASK_STATUS for transfer, _ in transfers])
+        packet = b"".join([transfer + READ_STATUS for transfer, _ in transfers])
         lengths = [length for _, length in transfers]
         wanted = sum(lengths) + len(lengths)
         wire_s = (len(packet) + wanted) * self._byte_s

@@ -17,7 +17,7 @@ from typing import Any
 from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, Part, commands
+from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, I2cMessage, commands
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
@@ -105,7 +105,7 @@ class I2cPort:
             else:
                 self._waiting += bytes((self._status,))
 
-    def _transfer(self, parts: tuple[Part, ...]) -> None:
+    def _transfer(self, parts: tuple[I2cMessage, ...]) -> None:
         messages = [
             i2c_msg.write(part.address, part.data)
             if part.length is None

@@ -10,7 +10,7 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing, goals_of
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.start import every_pulse
+from gazerig.drivers.hobby_board.start import read_every_pulse
 from gazerig.drivers.maestro.commands import (
     ERRORS,
     MOST_INPUT,
@@ -56,7 +56,7 @@ class MaestroBoard:
         register = self.line.greet()
         if register is None:
             raise ServoMissing(f"{where}: no Maestro answers: {self._mute_causes()}")
-        if not self.line.takes_crc():
+        if not self.line.expects_crc():
             raise ServoMissing(
                 f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
                 "noise moves servos without it, or set crc to false"
@@ -64,7 +64,7 @@ class MaestroBoard:
         if register:
             named = ", ".join(name_errors(register))
             log.add(f"the board had earlier errors, cleared now: {named}")
-        pulses = every_pulse(self, setups)
+        pulses = read_every_pulse(self, setups)
         for setup, pulse in zip(setups, pulses, strict=True):
             if 0 < pulse <= MOST_INPUT:
                 raise ServoMissing(
@@ -108,7 +108,7 @@ class MaestroBoard:
             # Such errors do not exist: it is a pulse width instead of the register, or noise.
             self.line.errors["damaged"] += 1
             return None
-        return ChannelStatus(pulse, name_errors(register | self.line.unheard()))
+        return ChannelStatus(pulse, name_errors(register | self.line.take_errors()))
 
     def wake(self) -> tuple[str, ...] | None:
         """Read the errors of a board that may have to detect its baud rate; None if silent."""

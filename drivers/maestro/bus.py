@@ -35,7 +35,7 @@ class MaestroBus(HobbyBoardBus):
         Raises:
             BusLost: the port is lost.
         """
-        self._supervisor.torque_disabled()
+        self._supervisor.stop_supervision()
         self._maestro.line.send(self._maestro.line.speech.go_home())
 
     def moving(self) -> bool | None:

@@ -99,7 +99,7 @@ class MaestroLink:
         self._unhandled |= found[0]
         return not found[0]
 
-    def unheard(self) -> int:
+    def take_errors(self) -> int:
         """Return the errors that ``send_checked`` has found since the last call."""
         register, self._unhandled = self._unhandled, 0
         return register
@@ -121,7 +121,7 @@ class MaestroLink:
                 return found[0]
         return None
 
-    def takes_crc(self) -> bool:
+    def expects_crc(self) -> bool:
         """Return whether the board expects check bytes.
 
         Other boards answer too, but find an error in every command.

@@ -62,7 +62,7 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> Detected
             line = MaestroLink(port, replace(params, protocol=form, crc=crc))
             port.drain()
             register = line.greet()
-            if register is not None and not register >> len(ERRORS) and line.takes_crc():
+            if register is not None and not register >> len(ERRORS) and line.expects_crc():
                 return _look(line, params, register, count)
     return None
 

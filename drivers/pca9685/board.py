@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.start import every_pulse
+from gazerig.drivers.hobby_board.start import read_every_pulse
 from gazerig.drivers.i2c import bridge
 from gazerig.drivers.i2c.line import I2cLine
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.pca9685.probe import see_board
+from gazerig.drivers.pca9685.probe import check_board
 from gazerig.drivers.pca9685.registers import (
     ALL_LED,
     AUTO_INCREMENT,
@@ -114,8 +114,8 @@ class Pca9685Board:
         """
         self._sent.clear()
         for address in self._boards([setup.id for setup in setups]):
-            see_board(self.line, address)
-        return every_pulse(self, setups)
+            check_board(self.line, address)
+        return read_every_pulse(self, setups)
 
     # --- setup
 

@@ -42,7 +42,7 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
     return tuple(found)
 
 
-def see_board(line: I2cLine, address: int) -> None:
+def check_board(line: I2cLine, address: int) -> None:
     """Check that a PCA9685 answers at an address.
 
     Raises:

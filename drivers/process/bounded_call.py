@@ -8,7 +8,7 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any, NamedTuple, Protocol
 
-from gazerig.drivers.plugins import failure
+from gazerig.drivers.plugins import describe_error
 
 _FIRST_END_S, _NEXT_END_S, _LONGEST_END_S = 0.2, 0.05, 2.0
 """An abandoned call is ended after the first time; then again, at an interval that doubles."""
@@ -21,7 +21,7 @@ class CallEnded(SystemExit):
     """Exception that ends an abandoned call; raised in its thread, which then ends silently."""
 
 
-class Lasting(Protocol):
+class OverdueSource(Protocol):
     """A source of calls that may block a thread for too long."""
 
     def lasts(self) -> tuple[float, str] | None:
@@ -29,19 +29,19 @@ class Lasting(Protocol):
         ...
 
 
-LASTING: set[Lasting] = set()
+OVERDUE_SOURCES: set[OverdueSource] = set()
 """All objects of this program whose calls may block a thread for too long."""
 
 
-class LastingReport:
-    """Report about ``LASTING``, repeated at increasing intervals."""
+class OverdueReport:
+    """Report about ``OVERDUE_SOURCES``, repeated at increasing intervals."""
 
     def __init__(self) -> None:
-        self._due_s: dict[Lasting, float] = {}
+        self._due_s: dict[OverdueSource, float] = {}
 
     def lines(self) -> tuple[str, ...]:
         """Return the lines that are due."""
-        lasting = _lasting()
+        lasting = _overdue()
         self._due_s = {one: self._due_s.get(one, FIRST_LINE_S) for one, _, _ in lasting}
         due = [found for found in lasting if found[1] >= self._due_s[found[0]]]
         for one, for_s, _ in due:
@@ -49,13 +49,13 @@ class LastingReport:
         return tuple([text for _, _, text in due])
 
 
-def lasting_text() -> str:
+def overdue_text() -> str:
     """Return the calls that last too long as text, "" for none."""
-    return "; ".join([text for _, for_s, text in _lasting() if for_s >= FIRST_LINE_S])
+    return "; ".join([text for _, for_s, text in _overdue() if for_s >= FIRST_LINE_S])
 
 
-def _lasting() -> list[tuple[Lasting, float, str]]:
-    found = [(one, one.lasts()) for one in tuple(LASTING)]
+def _overdue() -> list[tuple[OverdueSource, float, str]]:
+    found = [(one, one.lasts()) for one in tuple(OVERDUE_SOURCES)]
     return [(one, *lasts) for one, lasts in found if lasts is not None]
 
 
@@ -168,7 +168,7 @@ class BoundedCall:
         """End the thread; a call that lasts is ended without waiting, and no other begins.
 
         Running Python code ends with a ``CallEnded``, raised again if it is caught. A wait outside
-        Python cannot be ended: it is in ``LASTING`` while it lasts.
+        Python cannot be ended: it is in ``OVERDUE_SOURCES`` while it lasts.
         """
         thread, self._thread = self._thread, None
         if thread is None:
@@ -178,7 +178,7 @@ class BoundedCall:
         if self._late is None:
             thread.join(_NEXT_END_S)  # it has nothing left to do
         else:
-            LASTING.add(self)
+            OVERDUE_SOURCES.add(self)
             ending = threading.Thread(
                 target=self._end, args=(thread,), name=f"end of {self._name}", daemon=True
             )
@@ -203,7 +203,7 @@ class BoundedCall:
                     _raise_in(thread)
             thread.join(wait_s)
             wait_s = min(2.0 * wait_s, _LONGEST_END_S)
-        LASTING.discard(self)
+        OVERDUE_SOURCES.discard(self)
 
     def _serve(self) -> None:
         try:
@@ -235,6 +235,6 @@ def _outcome(
         return CallResult(work())
     except caught as error:  # a package may raise anything
         try:
-            return CallResult(None, error, why=failure(error))
+            return CallResult(None, error, why=describe_error(error))
         except Exception:  # even str() of its error may fail
             return CallResult(None, error, why=type(error).__name__)

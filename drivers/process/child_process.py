@@ -98,7 +98,7 @@ def _environment(variables: Mapping[str, str]) -> dict[str, str]:
 
 
 @contextmanager
-def hidden_script() -> Iterator[None]:
+def hide_script() -> Iterator[None]:
     """Prevent processes that multiprocessing starts meanwhile from running the script again.
 
     Such a process imports the program's script, in case its names are needed. A script that opens a

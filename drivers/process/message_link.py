@@ -82,7 +82,7 @@ class LinkOffer(NamedTuple):
     theirs: tuple[socket.socket, ...]
 
 
-def offer(count: int) -> LinkOffer:
+def create_links(count: int) -> LinkOffer:
     """Create links for a child.
 
     Raises:

@@ -61,7 +61,7 @@ class Access(NamedTuple):
 
 def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
     """Return the serial ports, those on USB first."""
-    names = _lasting_names((host or Host()).by_id)
+    names = _persistent_names((host or Host()).by_id)
     ports = [
         SerialPort(
             port.device,
@@ -74,16 +74,16 @@ def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
     return tuple(sorted(ports, key=lambda port: (not port.usb, port.device)))
 
 
-def _lasting_names(by_id: Path) -> dict[str, str]:
+def _persistent_names(by_id: Path) -> dict[str, str]:
     """Return the persistent name of every device that has one."""
     if not by_id.is_dir():
         return {}
     return {os.path.realpath(link): str(link) for link in sorted(by_id.iterdir())}
 
 
-def lasting_name(device: str, by_id: Path | None = None) -> str | None:
+def persistent_name(device: str, by_id: Path | None = None) -> str | None:
     """Return the name of a port that persists when it is replugged; None without one."""
-    return _lasting_names(by_id or Host().by_id).get(os.path.realpath(device))
+    return _persistent_names(by_id or Host().by_id).get(os.path.realpath(device))
 
 
 def access(device: str) -> Access:
@@ -107,7 +107,7 @@ def _user() -> str:
     return os.environ.get("USER", "")
 
 
-def holders(device: str, host: Host | None = None) -> tuple[str, ...]:
+def port_users(device: str, host: Host | None = None) -> tuple[str, ...]:
     """Return the other programs that have a port open, "python3 (process 1234)".
 
     Only programs that this user may inspect are found.

@@ -5,7 +5,7 @@ import os
 
 from serial.tools import list_ports
 
-from gazerig.drivers.serial.list_ports import holders
+from gazerig.drivers.serial.list_ports import port_users
 
 
 def explain(port_name: str, code: int | None) -> str:
@@ -18,7 +18,7 @@ def explain(port_name: str, code: int | None) -> str:
             "'sudo usermod -aG dialout $USER' and log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN):
-        held = ", ".join(holders(port_name))
+        held = ", ".join(port_users(port_name))
         who = f", {held}," if held else ""
         return f"{port_name} is busy: close the other program{who} that uses it"
     reason = os.strerror(code) if code else "not a serial port"

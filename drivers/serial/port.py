@@ -14,7 +14,7 @@ from dynamixel_sdk import PortHandler
 from serial import Serial, SerialException
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.serial.list_ports import lasting_name
+from gazerig.drivers.serial.list_ports import persistent_name
 from gazerig.drivers.serial.open_error import explain
 
 try:
@@ -311,12 +311,12 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
                 f"{self.port_name} cannot run at {cflag_baud} bit/s: choose 115200 or 1000000"
             ) from error
         self.opened_as = os.path.realpath(where) if where != self.port_name else where
-        self._lasting = lasting_name(where, self._by_id) or self._lasting
+        self._lasting = persistent_name(where, self._by_id) or self._lasting
         self._fd = self.ser.fileno()
         poll = select.poll()
         poll.register(self._fd, select.POLLIN)
         self._poll = poll.poll
-        ask_low_latency(self.ser)
+        request_low_latency(self.ser)
         self.is_open = True
         self.is_using = False
         self.tx_time_per_byte = 1000.0 * BITS_PER_BYTE / cflag_baud
@@ -334,7 +334,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         if os.path.exists(lasting):
             same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
             return name if same else lasting
-        now = lasting_name(self.port_name, self._by_id)
+        now = persistent_name(self.port_name, self._by_id)
         if now not in (None, lasting):
             raise PortError(f"{self.port_name} is another adaptor now ({now}): plug in {lasting}")
         return name
@@ -390,7 +390,7 @@ def _closed(timeout_ms: int) -> object:
     raise ValueError("it is closed")
 
 
-def ask_low_latency(port: Any) -> None:
+def request_low_latency(port: Any) -> None:
     """Request a latency of 1 ms instead of 16 ms from a USB adapter; others ignore it."""
     try:
         port.set_low_latency_mode(True)

@@ -20,13 +20,13 @@ def is_i2c(device: str) -> bool:
     return re.fullmatch(r"i2c-\d+", os.path.basename(os.path.realpath(device))) is not None
 
 
-def usb_of(device: str, ports: Sequence[SerialPort]) -> str:
+def usb_id_of(device: str, ports: Sequence[SerialPort]) -> str:
     """Return the USB vendor and product id of a port, "" if it has none or is not listed."""
     real = os.path.realpath(device)
     return next((port.usb for port in ports if os.path.realpath(port.device) == real), "")
 
 
-def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
+def check_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
     """Check that packets of this kind of bus may be sent to a port.
 
     Raises:
@@ -37,7 +37,7 @@ def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
             f"{device} is an I2C bus, not a serial port: name the adaptor's port with --port or in "
             "the YAML, or set the kind of the bus to pca9685"
         )
-    if kind != "maestro" and usb_of(device, ports).startswith(POLOLU):
+    if kind != "maestro" and usb_id_of(device, ports).startswith(POLOLU):
         raise PortError(
             f"{device} is a board of Pololu: {kind} packets would move its servos; name the "
             "adaptor's port with --port or in the YAML, or set its kind to maestro"

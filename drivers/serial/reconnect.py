@@ -102,7 +102,7 @@ class ReconnectingPort:
             )
         return False
 
-    def refused_release(self) -> None:
+    def record_failed_release(self) -> None:
         """Record that torque could not be switched off; it is after the port reconnects."""
         self.release_due = True
 
@@ -112,7 +112,7 @@ class ReconnectingPort:
             self._log.add("torque switched off, as requested while the port was gone")
         self.release_due = False
 
-    def open_once_more(self, now_s: float) -> bool:
+    def reopen_now(self, now_s: float) -> bool:
         """Try to open the port now, even if no attempt is due; return whether it is open."""
         if not self._open():
             return False

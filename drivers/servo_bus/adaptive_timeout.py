@@ -52,7 +52,7 @@ class AdaptiveTimeout:
         reserve_s = REFILL * (now_s - self._empty_s)
         return min(self._most_s, self.seconds + min(RESERVE_S, reserve_s))
 
-    def waited_in_vain(self, beyond_s: float, now_s: float) -> None:
+    def consume_reserve(self, beyond_s: float, now_s: float) -> None:
         """Subtract from the reserve a wait without an answer, beyond the prompt time-out."""
         if beyond_s > 0.0:
             left_s = min(RESERVE_S, REFILL * (now_s - self._empty_s)) - beyond_s

@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable, Collection, Mapping, Sequence
 from math import ceil
 
-from gazerig.drivers.bus.goal_limits import clipped
+from gazerig.drivers.bus.goal_limits import clip_goals
 from gazerig.drivers.bus.plausibility import DISTURBED_S
 from gazerig.drivers.bus.port_bus import CUT, PortBus
 from gazerig.drivers.bus.released import ReleaseResult
@@ -18,7 +18,6 @@ from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
 from gazerig.drivers.servo_bus.params import BusParams
-from gazerig.drivers.servo_bus.passing_faults import PassingFaultSupervisor
 from gazerig.drivers.servo_bus.poll_list import PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
@@ -27,6 +26,7 @@ from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import OWED_S, ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
+from gazerig.drivers.servo_bus.transient_faults import TransientFaultSupervisor
 from gazerig.drivers.types import Feedback, ServoConfig
 
 RESTART_S = 0.1
@@ -107,7 +107,7 @@ class SmartServoBus(PortBus):
         self._feedback = FeedbackColumns(self._family, self._setups)
         self._reader = SyncReader(line, self._poll_list, plan)
         kind: Callable[..., Supervisor]
-        kind = LatchedFaultSupervisor if self._family.faults_latch else PassingFaultSupervisor
+        kind = LatchedFaultSupervisor if self._family.faults_latch else TransientFaultSupervisor
         self._supervisor = kind(
             line, by_id, self._recovery, self._health, self._feedback, plan, self._watchdog
         )
@@ -122,7 +122,7 @@ class SmartServoBus(PortBus):
                 return True
             if now_s - self._reader.unanswered_s <= OWED_S:
                 return True
-        return not self._supervisor.at_ease
+        return not self._supervisor.is_idle
 
     def _take(self, replies: dict[int, ServoReply], now_s: float) -> None:
         """Apply an answer servo by servo, each with its errors."""
@@ -140,7 +140,7 @@ class SmartServoBus(PortBus):
             garbled = servo_id in self._poll_list.garbling
             was_out = self._poll_list.answered(servo_id)
             if was_out:
-                supervisor.answers_again(servo_id)
+                supervisor.check_after_silence(servo_id)
             if one.sample.error & self._family.codec.REFUSAL:
                 supervisor.check_status(servo_id, one.sample, now_s)
                 self._line.errors["refused"] += 1
@@ -183,7 +183,7 @@ class SmartServoBus(PortBus):
             BusLost: the port is lost.
         """
         disturbed = self._disturbed(now_s)
-        doubtful = [i for i in replies if disturbed or self._reader.answer_owed(i, now_s)]
+        doubtful = [i for i in replies if disturbed or self._reader.is_reply_pending(i, now_s)]
         again = self._reader.again(doubtful) if doubtful else {}
         kept = {i: one for i, one in replies.items() if i not in doubtful}
         for servo_id in doubtful:
@@ -242,7 +242,7 @@ class SmartServoBus(PortBus):
             first.disable(self._ids)
             first.apply(self._ids)
             self._line.starved = False
-            self._supervisor.look_first()
+            self._supervisor.check_prepared()
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
@@ -309,10 +309,10 @@ class SmartServoBus(PortBus):
             self.disable_torque()
             raise
         except BusLost:
-            self._link.refused_release()  # some servos may already have torque
+            self._link.record_failed_release()  # some servos may already have torque
             raise
         self._link.release_due = False
-        self._supervisor.torque_enabled(outside)
+        self._supervisor.start_supervision(outside)
         self._speeds = self._recovery.speeds(self._ids, ())
         return goals
 
@@ -325,7 +325,7 @@ class SmartServoBus(PortBus):
         Raises:
             ValueError: a goal is not a number, or their number is wrong.
         """
-        goals = clipped(goals_steps, self._lowest, self._highest)
+        goals = clip_goals(goals_steps, self._lowest, self._highest)
         supervisor, line = self._supervisor, self._line
         if not supervisor.engaged or self._link.down or line.starved:
             return

@@ -91,14 +91,14 @@ def scan(
         if not port.setBaudRate(baud):
             yield BaudScan(baud, False)
             continue
-        if not thorough and not any_reply(port, family):
+        if not thorough and not has_any_reply(port, family):
             yield BaudScan(baud, True)
             continue
         quiet_s = family.thorough_s if thorough else family.quiet_s
         found, junk = scan_ids(port, family, baud, quiet_s, progress, ids)
         old = family.protocol_1(port) if family.protocol_1 and not found else ()
         each = {one.id: (family_of or {}).get(one.model, family) for one in found}
-        shared = tuple(i for i, its in each.items() if corrupt(port, its, i) >= SHARED)
+        shared = tuple(i for i, its in each.items() if count_corrupt(port, its, i) >= SHARED)
         yield BaudScan(baud, True, found, junk, shared, old)
 
 
@@ -140,7 +140,7 @@ def scan_ids(
     return tuple(each), max(0, len(raw) - used)
 
 
-def any_reply(port: BusPort, family: Family) -> bool:
+def has_any_reply(port: BusPort, family: Family) -> bool:
     """Return whether any servo answers a broadcast ping, even if the answers corrupt each other.
 
     True if ``scan_ids`` sends only a broadcast ping.
@@ -170,7 +170,7 @@ def ping(
     return None
 
 
-def corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) -> int:
+def count_corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) -> int:
     """Return how many answers of one id were corrupt or disagreed about its position.
 
     Two servos with one id answer at the same time and corrupt bytes that differ. Their answers to

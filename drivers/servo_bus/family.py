@@ -295,7 +295,7 @@ class Family:
         (servo_id,) = ids
         return self.codec.read(servo_id, address, length)
 
-    def asked_together(self, ids: Sequence[int]) -> Iterable[tuple[int, ...]]:
+    def request_groups(self, ids: Sequence[int]) -> Iterable[tuple[int, ...]]:
         """Return the groups of servos that are read with one request."""
         if not self.sync_read:
             return [(servo_id,) for servo_id in ids]

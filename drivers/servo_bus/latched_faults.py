@@ -29,16 +29,16 @@ class LatchedFaultSupervisor(Supervisor):
         super().mark_all_for_recovery()
         self.due_s = -inf
 
-    def torque_enabled(self, entering: Collection[int]) -> None:
+    def start_supervision(self, entering: Collection[int]) -> None:
         """Start supervision under torque; ``entering``: servos outside their limits."""
-        super().torque_enabled(entering)
+        super().start_supervision(entering)
         self.due_s = -inf  # from now on the servos take turns
 
-    def look_first(self) -> None:
+    def check_prepared(self) -> None:
         """Check servos that have just been prepared."""
         self._find_alerts(self._ids)
 
-    def answers_again(self, servo_id: int) -> None:
+    def check_after_silence(self, servo_id: int) -> None:
         """Check whether a servo that was out of the group is still armed."""
         if self.engaged:
             self._check(servo_id)

@@ -11,7 +11,13 @@ from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.provisioning import Provisioning
-from gazerig.drivers.servo_bus.torque import find_faults, insist, positions, switch_off, switch_on
+from gazerig.drivers.servo_bus.torque import (
+    find_faults,
+    read_positions,
+    switch_off,
+    switch_on,
+    write_verified,
+)
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import ServoConfig
@@ -91,7 +97,7 @@ class Recovery:
             if engaged:
                 well = self._on_this_side(well)
                 self.enable(well)
-            found = dict(zip(well, positions(line, well), strict=True))
+            found = dict(zip(well, read_positions(line, well), strict=True))
         except ServoMissing:
             return None
         except ServoFault as fault:
@@ -145,11 +151,11 @@ class Recovery:
         """
         if not self._family.single_turn:
             return ids
-        present = dict(zip(ids, positions(self._line, ids), strict=True))
+        present = dict(zip(ids, read_positions(self._line, ids), strict=True))
         astray = [i for i in ids if self.is_lost(i, present[i])]
         if astray:
             # Damaged bytes may look like such a position.
-            again = dict(zip(astray, positions(self._line, astray), strict=True))
+            again = dict(zip(astray, read_positions(self._line, astray), strict=True))
             astray = [i for i in astray if self.is_lost(i, again[i])]
         for servo_id in astray:
             self._health.name(servo_id, FAR_SIDE)
@@ -179,18 +185,18 @@ class Recovery:
         if not ids:
             return (), set()
         if family.watchdog_unit_s is not None:
-            insist(line, ids, "bus_watchdog", [0] * len(ids))
-        present = positions(line, ids)
+            write_verified(line, ids, "bus_watchdog", [0] * len(ids))
+        present = read_positions(line, ids)
         if family.single_turn:
             self._refuse_lost(ids, present)
         goals = [self.clip(i, p) for i, p in zip(ids, present, strict=True)]
         outside = {i for i, p, g in zip(ids, present, goals, strict=True) if p != g}
         speeds = self.speeds(ids, outside)
         armed = speeds if family.arming.speed else self._accelerations(ids)
-        insist(line, ids, family.arming.register, armed)
+        write_verified(line, ids, family.arming.register, armed)
         switch_on(line, ids, goals, speeds)
         if family.watchdog_unit_s is not None:
-            insist(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
+            write_verified(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
         return tuple(goals), outside
 
     def _refuse_lost(self, ids: Sequence[int], present: Sequence[int]) -> None:

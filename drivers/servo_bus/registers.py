@@ -61,7 +61,7 @@ class Registers:
         The value is None without a good answer. A servo that falls silent is not read further.
         """
         values: dict[str, int | None] = dict.fromkeys(names)
-        for span in side_by_side(self._family, values):
+        for span in group_adjacent(self._family, values):
             first = span[0].address
             data = self.read_bytes(servo_id, first, span[-1].address + span[-1].size - first)
             if data is not None:
@@ -92,7 +92,7 @@ class Registers:
         """Write a register only if it differs; return whether it now has the value."""
         return self.read(servo_id, name) == value or self.write(servo_id, name, value)
 
-    def write_lasting(self, servo_id: int, name: str, value: int) -> bool:
+    def write_persistent(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register so that an EEPROM value survives a loss of power.
 
         The lock, if any, is open only during the write.
@@ -114,7 +114,7 @@ class Registers:
     ) -> Status | None:
         """Send a request until a good answer arrives; ``insist``: also after a refusal."""
         for _ in range(self._tries):
-            self._let_late_ones_pass(servo_id)
+            self._wait_for_late_replies(servo_id)
             self._port.clearPort()
             self.refusal = 0
             _, status = transact(self._port, self._family, request, length, REPLY_S, servo_id)
@@ -130,7 +130,7 @@ class Registers:
                 return None
         return None
 
-    def _let_late_ones_pass(self, servo_id: int) -> None:
+    def _wait_for_late_replies(self, servo_id: int) -> None:
         """Wait until no answer to an earlier request can arrive any more.
 
         An answer does not contain the address of its register.
@@ -141,7 +141,7 @@ class Registers:
                 pass
 
 
-def side_by_side(family: Family, names: Iterable[str]) -> list[list[Register]]:
+def group_adjacent(family: Family, names: Iterable[str]) -> list[list[Register]]:
     """Return registers in groups that one request can read: without unused bytes between them."""
     known = {
         address

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from math import inf
 
-from gazerig.drivers.bus.limit_recovery import SlowEntry
+from gazerig.drivers.bus.limit_recovery import LimitRecovery
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
@@ -60,7 +60,7 @@ class Supervisor(ABC):
         self._watchdog = watchdog
         self.engaged = False
         self.due_s = -inf
-        self.entering = SlowEntry(setups)
+        self.entering = LimitRecovery(setups)
         self._suspects: set[int] = set()
         self._rearmed: set[int] = set()
         self._recover_at_s = self._check_at_s = -inf
@@ -68,11 +68,11 @@ class Supervisor(ABC):
         self._failures = 0
 
     @property
-    def at_ease(self) -> bool:
+    def is_idle(self) -> bool:
         """Return whether no servo has a condition that an answer could change."""
         return True
 
-    def torque_enabled(self, entering: Collection[int]) -> None:
+    def start_supervision(self, entering: Collection[int]) -> None:
         """Start supervision under torque; ``entering``: servos outside their limits."""
         self.engaged = True
         self.entering.begin(entering)
@@ -82,7 +82,7 @@ class Supervisor(ABC):
         self._feedback.expect_torque(True)
         self._feedback.places.forget()
 
-    def torque_disabled(self) -> None:
+    def stop_supervision(self) -> None:
         """Stop supervision, as the servos have no torque."""
         self.engaged = False
         self.entering.clear()
@@ -98,7 +98,7 @@ class Supervisor(ABC):
         self._feedback.places.forget()
 
     @abstractmethod
-    def look_first(self) -> None:
+    def check_prepared(self) -> None:
         """Check servos that have just been prepared."""
 
     @abstractmethod
@@ -117,7 +117,7 @@ class Supervisor(ABC):
         """Return the servos that must get no goals now."""
         return frozenset()
 
-    def answers_again(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
+    def check_after_silence(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
         """Check a servo that was out of the group."""
 
     def record_out(self, out: Collection[int], now_s: float) -> None:  # noqa: B027

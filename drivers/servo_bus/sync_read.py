@@ -84,7 +84,7 @@ class SyncReader:
         self._save(group, raw, at_s, replies, now_s, self._together)
         return replies
 
-    def answer_owed(self, servo_id: int, now_s: float) -> bool:
+    def is_reply_pending(self, servo_id: int, now_s: float) -> bool:
         """Return whether a servo has recently left a request unanswered.
 
         The present answer may belong to that request, as a packet identifies neither its time nor
@@ -100,7 +100,7 @@ class SyncReader:
         """
         replies: dict[int, ServoReply] = {}
         window = self._second.next()
-        for asked in self._line.family.asked_together(ids):
+        for asked in self._line.family.request_groups(ids):
             group = self._group(asked, window)
             raw, at_s = self._line.exchange(group.request, group.reply_length)
             raw = self._line.complete(raw, group.missing, self._line.deadline_s)
@@ -121,7 +121,7 @@ class SyncReader:
         self._until_s = inf
         if together:
             window = self._together.next()
-            for asked in self._line.family.asked_together(together):
+            for asked in self._line.family.request_groups(together):
                 if self._line.port.now_s() < self._until_s:
                     self._read(asked, replies, now_s, self._together, window)
         if due is not None and self._line.port.now_s() < self._until_s:

@@ -32,7 +32,7 @@ LEAST_S, MOST_S = 0.005, 0.02
 Value = TypeVar("Value")
 
 
-def positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
+def read_positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
     """Read every position, in the servos' own count.
 
     They become the first goals: with a weak checksum, two answers must agree.
@@ -48,7 +48,9 @@ def positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
     return tuple(found[servo_id] for servo_id in ids)
 
 
-def insist(line: Transactions, ids: Sequence[int], name: str, values: Sequence[int]) -> None:
+def write_verified(
+    line: Transactions, ids: Sequence[int], name: str, values: Sequence[int]
+) -> None:
     """Write a register and read it back until every servo has its value.
 
     Raises:
@@ -124,14 +126,14 @@ def switch_on(
     wanted = dict(zip(ids, zip(goals, speeds, strict=True), strict=True))
     send = partial(_send_goals, line)
     if family.goal_speed:
-        before = positions(line, ids)
+        before = read_positions(line, ids)
         places = dict(zip(ids, zip(before, goals, strict=True), strict=True))
         _until(line, wanted, send, partial(_ask_goals, line, places), "goal_position")
     else:
-        insist(line, ids, "goal_position", goals)
-        before = positions(line, ids)
+        write_verified(line, ids, "goal_position", goals)
+        before = read_positions(line, ids)
     try:
-        insist(line, ids, "torque_enable", [1] * len(ids))
+        write_verified(line, ids, "torque_enable", [1] * len(ids))
     except ServoMissing:
         ailing = find_faults(line, ids)
         if not ailing:
@@ -141,7 +143,7 @@ def switch_on(
             for i, bits in ailing.items()
         )
         raise ServoFault(f"{named}: let it cool, free it, {family.fault_cure}") from None
-    for servo_id, was, now in zip(ids, before, positions(line, ids), strict=True):
+    for servo_id, was, now in zip(ids, before, read_positions(line, ids), strict=True):
         if abs(now - was) > JUMP_TURN * family.steps_per_turn:
             raise ServoFault(
                 f"{line.label(servo_id)}: position jumped from {was} to {now} as the torque came on: "

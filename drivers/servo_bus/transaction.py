@@ -125,7 +125,7 @@ class Transactions:
         if len(raw) == length:
             timeout.update(at_s - whole_s)
         else:
-            timeout.waited_in_vain(at_s - whole_s - prompt_s, at_s)
+            timeout.consume_reserve(at_s - whole_s - prompt_s, at_s)
         return raw, at_s
 
     @property
@@ -225,7 +225,7 @@ class Transactions:
         alone = not self.family.sync_read
         # If a request's echo looks like an answer, another length must be requested.
         more = int(alone and length == self.family.codec.ECHO_LENGTH)
-        for asked in self.family.asked_together(ids):
+        for asked in self.family.request_groups(ids):
             answers = self._ask_once(asked, address, length + more)
             found |= {servo_id: data[:length] for servo_id, data in answers.items()}
         return found

@@ -7,7 +7,7 @@ from gazerig.drivers.bus.checked_bus import CheckedBus
 from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.errors import PluginError, SetupError
-from gazerig.drivers.plugins import BUS, BusPlugin, failure, find, is_ours, load
+from gazerig.drivers.plugins import BUS, BusPlugin, describe_error, find, is_ours, load
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.types import ServoBus, ServoConfig
@@ -179,5 +179,5 @@ def _bus(config: BusConfig, port: BusPort, own: Sequence[ServoConfig]) -> ServoB
     except SetupError:
         raise
     except Exception as error:
-        raise PluginError(f"{label} cannot be made: {failure(error)}") from error
+        raise PluginError(f"{label} cannot be made: {describe_error(error)}") from error
     return CheckedBus(bus, label, own, getattr(port, "now_s", None) or RealClock().now_s)

@@ -13,9 +13,9 @@ from gazerig.drivers.camera import sources
 from gazerig.drivers.camera.browser_source import FIELD_DEG
 from gazerig.drivers.camera.camera_plugins import (
     CheckedSource,
-    camera_part,
+    create_camera_part,
+    create_plugin_source,
     is_source,
-    plugin_source,
 )
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.guarded_camera import (
@@ -281,9 +281,9 @@ def real_camera(
         parts = CameraParts(_source(rig, options), detector, motion, locate)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery)
     params, label = _section(rig, name), find(CAMERA, name).label
-    camera = camera_part(name, params)
+    camera = create_camera_part(name, params)
     if is_source(camera):
-        source = upright(partial(plugin_source, name, params), orientation_of(placed))
+        source = upright(partial(create_plugin_source, name, params), orientation_of(placed))
         parts = CameraParts(source, detector, motion, locate)
         process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
         return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S, open_s=OPEN_PROCESS_S)

@@ -7,7 +7,7 @@ import numpy as np
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, find, is_ours, load, made
+from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, create, find, is_ours, load
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
@@ -117,7 +117,7 @@ def chooser_of(
     if is_ours(ATTENTION, name):
         return own
     part = load(ATTENTION, name, AttentionPlugin)
-    rule = made(ATTENTION, name, part, getattr(rig.gaze, name))
+    rule = create(ATTENTION, name, part, getattr(rig.gaze, name))
     label = find(ATTENTION, name).label
     if not callable(getattr(rule, "choose", None)):
         raise PluginError(f"{label} made a {type(rule).__name__}, which has no method choose")

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.serial.list_ports import serial_ports
-from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.drivers.serial.port_owner import check_owner
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
 from gazerig.robot.app.emulation import emulated_lines, ideal_bus, place_of
 from gazerig.robot.app.options import RunOptions
@@ -30,7 +30,7 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
     if not options.mock:
         paths, here = ports_of(rig, options.port), serial_ports()
         for name, path in paths.items():
-            refuse_owner(path, rig.bus_named(name).kind, here)
+            check_owner(path, rig.bus_named(name).kind, here)
         return RunBus(guarded_rig_bus(rig, paths))
     if options.bus == "ideal":
         return without_wires(rig, ideal_bus(rig, clock.now_s))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.process.bounded_call import LastingReport
+from gazerig.drivers.process.bounded_call import OverdueReport
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import (
@@ -139,7 +139,7 @@ class Session:
         scene = made.scene
         self._score = SceneScore.of(scene) if summarised and scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
-        self._lasting = LastingReport()
+        self._lasting = OverdueReport()
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from gazerig.drivers.errors import PluginError, SetupError
-from gazerig.drivers.plugins import SURROUNDINGS, find, is_ours, registered
+from gazerig.drivers.plugins import SURROUNDINGS, find, is_ours, registrations
 
 if TYPE_CHECKING:
     import numpy as np
@@ -174,7 +174,7 @@ def surroundings(name: str) -> Surroundings:
     Raises:
         PluginError: they cannot be imported, or several packages have this name.
     """
-    outside = any(one.name == name and not one.ours for one in registered(SURROUNDINGS))
+    outside = any(one.name == name and not one.ours for one in registrations(SURROUNDINGS))
     found = find(SURROUNDINGS, name if outside and not is_ours(SURROUNDINGS, name) else WORLD)
     part = found.load()
     if isinstance(part, type) and issubclass(part, Surroundings):
@@ -185,7 +185,7 @@ def surroundings(name: str) -> Surroundings:
 def surroundings_names() -> list[str]:
     """Return the names after ``--world``, ours and packages', without those that are missing."""
     names: list[str] = []
-    for one in registered(SURROUNDINGS):
+    for one in registrations(SURROUNDINGS):
         if not one.ours:
             names.append(one.name)
             continue

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.plugins import COMMAND, SHIPPED, Registration, find, registered
+from gazerig.drivers.plugins import COMMAND, SHIPPED, Registration, find, registrations
 
 Examples = tuple[tuple[str, str], ...]
 """What to type after ``gazerig``, and what it is for."""
@@ -115,7 +115,7 @@ def shipped_commands() -> Mapping[str, CommandEntry]:
 
 def package_commands() -> Mapping[str, CommandEntry]:
     """Return the commands of installed packages, by name."""
-    return _loaded([one for one in registered(COMMAND) if not one.ours])
+    return _loaded([one for one in registrations(COMMAND) if not one.ours])
 
 
 def in_order(commands: Mapping[str, CommandEntry]) -> list[str]:

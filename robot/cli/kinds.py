@@ -10,7 +10,14 @@ from rich.console import Console
 from rich.table import Table
 
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.plugins import GROUPS, Plugin, Registration, folder_of, registered, taken_names
+from gazerig.drivers.plugins import (
+    GROUPS,
+    Plugin,
+    Registration,
+    folder_of,
+    name_conflicts,
+    registrations,
+)
 from gazerig.robot.cli.terminal import clear_errors
 
 app = typer.Typer()
@@ -22,8 +29,8 @@ def kinds(
 ) -> None:
     """List buses, cameras, detectors, rules, gestures and rigs, of this program and of packages."""
     with clear_errors():
-        rows = [_row(one) for group in GROUPS for one in registered(group)]
-        taken = [line for group in GROUPS for line in taken_names(group)]
+        rows = [_row(one) for group in GROUPS for one in registrations(group)]
+        taken = [line for group in GROUPS for line in name_conflicts(group)]
         if as_json:
             print(json.dumps({"kinds": rows, "left_out": taken}))
             return

@@ -7,8 +7,8 @@ from functools import partial
 from types import TracebackType
 from typing import Self
 
-from gazerig.drivers.plugins import failure
-from gazerig.drivers.process.bounded_call import LASTING, BoundedCall
+from gazerig.drivers.plugins import describe_error
+from gazerig.drivers.process.bounded_call import OVERDUE_SOURCES, BoundedCall
 
 _MOST = 500
 """So many lines wait; more are dropped."""
@@ -19,8 +19,8 @@ _END_S = 1.0
 class LineQueue:
     """Hands lines to a function that may block or fail, in the order of the calls.
 
-    While its block lasts, a function that does not return is in ``LASTING``. The end of the block
-    waits for a second at most, and tells standard error of lines that were not delivered.
+    While its block lasts, a function that does not return is in ``OVERDUE_SOURCES``. The end of the
+    block waits for a second at most, and tells standard error of lines that were not delivered.
 
     Args:
         deliver: takes one line after another, in one thread.
@@ -59,7 +59,7 @@ class LineQueue:
 
     def __enter__(self) -> Self:
         """Begin to watch what takes the lines."""
-        LASTING.add(self)
+        OVERDUE_SOURCES.add(self)
         return self
 
     def __exit__(
@@ -70,7 +70,7 @@ class LineQueue:
     ) -> None:
         """Wait for what is under way, and end it where it lasts."""
         blocked = not self.flush(_END_S)
-        LASTING.discard(self)
+        OVERDUE_SOURCES.discard(self)
         lost = self.dropped + self._call.waiting() * blocked
         self._call.close()
         if lost:
@@ -88,7 +88,7 @@ class LineQueue:
             self._deliver(text)
         except BaseException as error:
             self.dropped += 1
-            self._failure = f"{self._name} failed ({failure(error)})"
+            self._failure = f"{self._name} failed ({describe_error(error)})"
 
 
 def _to_stderr(line: str) -> None:

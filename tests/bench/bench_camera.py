@@ -22,7 +22,7 @@ from all_processors import on_all_processors
 
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.recorder import CameraRecorder
-from gazerig.drivers.camera.recording_format import encoded
+from gazerig.drivers.camera.recording_format import encode_shot
 from gazerig.drivers.camera.recording_reader import Recording
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
@@ -164,7 +164,7 @@ def recording(pictures: list[np.ndarray], folder: Path) -> None:
         for shot in shots:
             cv2.imencode(".png" if quality is None else ".jpg", shot.image)
         bare_ms = (time.perf_counter() - bare) / len(shots) * 1e3
-        size = sum(len(data) for _, data in encoded(shots[-1], quality)) / 1e3
+        size = sum(len(data) for _, data in encode_shot(shots[-1], quality)) / 1e3
         print(
             f"  {name:8} write {write_ms:5.1f} ms of processor  read {read_ms:5.1f} ms  "
             f"open {open_ms:4.1f} ms for {len(shots)}  {size:6.0f} kB   "

@@ -13,7 +13,9 @@ _USB2_BYTES_S = 30e6
 _COLOUR_BYTES, _DEPTH_BYTES = 1.5, 2.0  # per pixel, NV12 and RAW16
 
 
-def possible(dai: Any, device: Any, params: OakParams) -> tuple[OakParams, tuple[str, ...]]:
+def supported_settings(
+    dai: Any, device: Any, params: OakParams
+) -> tuple[OakParams, tuple[str, ...]]:
     """Return the supported settings, and one line for each omitted one.
 
     Raises:

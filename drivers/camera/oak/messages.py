@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from gazerig.drivers.camera.depth_roi import metres, resized
+from gazerig.drivers.camera.depth_roi import resize_depth, to_metres
 from gazerig.drivers.camera.oak.pipeline import COLOUR, DEPTH, FACES
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.source import bgr
+from gazerig.drivers.camera.source import to_bgr
 from gazerig.drivers.types import Depth, DetectedFace, ImageArray
 
 _LANDMARKS = 5
@@ -16,24 +16,24 @@ _LANDMARKS = 5
 _LEAST_FOCAL_PX = 10.0
 
 
-def names(group: Any) -> set[str]:
+def message_names(group: Any) -> set[str]:
     """Return the names of the messages in a group."""
     return set(group.getMessageNames())
 
 
 def image_of(group: Any) -> ImageArray | None:
     """Return the colour frame of a group, None if it has none."""
-    return bgr(group[COLOUR].getCvFrame())
+    return to_bgr(group[COLOUR].getCvFrame())
 
 
 def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
     """Return the depth of a group in metres and in the size of its frame."""
-    if DEPTH not in names(group):
+    if DEPTH not in message_names(group):
         return None
     mm = np.asarray(group[DEPTH].getFrame())
     if mm.dtype != np.uint16 or mm.ndim != 2 or not mm.size:
         return None
-    return resized(metres(mm), width_px, height_px)
+    return resize_depth(to_metres(mm), width_px, height_px)
 
 
 def lens_of(group: Any) -> Intrinsics | None:
@@ -53,7 +53,7 @@ def faces_of(
 
     Detections without five landmarks are omitted, as their gaze is unknown.
     """
-    if FACES not in names(group):
+    if FACES not in message_names(group):
         return None
     message = group[FACES]
     target = group[COLOUR].getTransformation()

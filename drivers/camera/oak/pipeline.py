@@ -92,7 +92,7 @@ def _faces(dai: Any, pipeline: Any, params: OakParams, camera: Any) -> FoundFace
     return FoundFaces(network.out)
 
 
-def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
+def join_outputs(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
     """Return the queue of message groups, each with all outputs of one instant."""
     sync = pipeline.create(dai.node.Sync)
     sync.setRunOnHost(True)
@@ -103,7 +103,7 @@ def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
     return sync.out.createOutputQueue(maxSize=_QUEUE, blocking=False)
 
 
-def readings(outputs: Outputs) -> Any | None:
+def imu_queue(outputs: Outputs) -> Any | None:
     """Return the queue of the gyro's readings, None without a gyro.
 
     They are not joined to frames, as there are many per frame, in separate messages.

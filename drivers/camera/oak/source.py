@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.clock_sync import ClockSync
 from gazerig.drivers.camera.frame_rate import FrameRateMonitor
-from gazerig.drivers.camera.oak.abilities import full_line_text, possible, usb2_text
+from gazerig.drivers.camera.oak.abilities import full_line_text, supported_settings, usb2_text
 from gazerig.drivers.camera.oak.calibration import (
     OakCalibration,
     imu_to_camera,
@@ -23,7 +23,13 @@ from gazerig.drivers.camera.oak.discovery import find_oak
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.oak.messages import depth_of, faces_of, image_of, lens_of
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import COLOUR, MakeNodes, device_nodes, joined, readings
+from gazerig.drivers.camera.oak.pipeline import (
+    COLOUR,
+    MakeNodes,
+    device_nodes,
+    imu_queue,
+    join_outputs,
+)
 from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.start_faults import start_cure
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -94,8 +100,8 @@ class OakSource:
             else:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
             outputs = self._nodes(self._dai, self._pipeline, self._asked)
-            self._queue = joined(self._dai, self._pipeline, outputs, self._asked.rate_hz)
-            self._gyro_queue, self._face_fault = readings(outputs), outputs.face_fault
+            self._queue = join_outputs(self._dai, self._pipeline, outputs, self._asked.rate_hz)
+            self._gyro_queue, self._face_fault = imu_queue(outputs), outputs.face_fault
             self._pipeline.start()
             self._settle_gyro()
         except RuntimeError as error:
@@ -215,7 +221,7 @@ class OakSource:
             self._calibration = read_calibration(self._dai, stored, self._params)
         except CameraError as error:
             self._calibration = error
-        self._asked, left_out = possible(self._dai, self._device, self._params)
+        self._asked, left_out = supported_settings(self._dai, self._device, self._params)
         self._events.extend(left_out)
         speed = self._device.getUsbSpeed()
         slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)

@@ -14,11 +14,11 @@ from gazerig.drivers.plugins import (
     DETECTOR,
     DetectorPlugin,
     Evidence,
-    failure,
+    create,
+    describe_error,
     find,
     is_ours,
     load,
-    made,
 )
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -81,7 +81,7 @@ def _finder(params: FaceDetectorParams) -> FaceDetector:
     part = load(DETECTOR, params.kind, DetectorPlugin)
     if is_ours(DETECTOR, params.kind):
         return cast(FaceDetector, part.make(params))
-    found = made(DETECTOR, params.kind, part, getattr(params, params.kind))
+    found = create(DETECTOR, params.kind, part, getattr(params, params.kind))
     return CheckedDetector(found, find(DETECTOR, params.kind).label, lambda: mtcnn(params))
 
 
@@ -109,7 +109,7 @@ class CheckedDetector:
             faces = tuple(self._detector.find(image))
             wrong = next((f"returned {bad}" for face in faces if (bad := fault_of_face(face))), "")
         except (Exception, SystemExit) as error:
-            wrong = f"failed ({failure(error)})"
+            wrong = f"failed ({describe_error(error)})"
         if not wrong:
             return faces
         self._log.add(f"{self._label} {wrong}: dropped, mtcnn finds the faces")

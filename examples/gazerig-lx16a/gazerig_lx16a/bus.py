@@ -97,7 +97,7 @@ class Lx16aBus(PortBus):
         self._volts: list[float | None] = [None] * count
         self._turn = 0
 
-    def torque_disabled(self) -> None:
+    def stop_supervision(self) -> None:
         self.engaged = False
 
     def open(self) -> None:
@@ -211,7 +211,7 @@ class Lx16aBus(PortBus):
                     raise ServoMissing(f"{setup.label()} does not confirm its torque: {CUT}")
                 goals.append(min(max(steps, setup.min_steps), setup.max_steps))
         except BusLost:
-            self._link.refused_release()
+            self._link.record_failed_release()
             raise
         self.engaged, self._link.release_due = True, False
         return tuple(goals)

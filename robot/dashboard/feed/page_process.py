@@ -165,7 +165,7 @@ class PageProcess:
 
     def _begin(self) -> None:
         """Start a process, and talk to it."""
-        links = message_link.offer(2)
+        links = message_link.create_links(2)
         # The page's own words are of interest only if it dies, and a pipe without a reader fills.
         self._errors = _errors_file()
         self._folder = tempfile.mkdtemp(prefix="gazerig-page-")

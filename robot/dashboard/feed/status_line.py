@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
-from gazerig.drivers.process.bounded_call import lasting_text
+from gazerig.drivers.process.bounded_call import overdue_text
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
@@ -47,7 +47,7 @@ class StatusLine:
             self._rate = f"{timing.rate_hz:5.1f} Hz" if timing is not None and known else ""
             self._busy = busy_text(timing)
         parts = [
-            lasting_text(),
+            overdue_text(),
             self._busy,
             self._rate,
             doing(tick).headline,

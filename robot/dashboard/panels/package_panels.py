@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 
 from gazerig.drivers.errors import PluginError
-from gazerig.drivers.plugins import PAGE_PANEL, failure, registered
+from gazerig.drivers.plugins import PAGE_PANEL, describe_error, registrations
 from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Html
@@ -38,7 +38,7 @@ class PackagePanels:
 
     def __init__(self, place: Container) -> None:
         self._shown: list[tuple[type[PagePanel], Html]] = []
-        for one in registered(PAGE_PANEL):
+        for one in registrations(PAGE_PANEL):
             try:
                 part = one.load()
                 if not (isinstance(part, type) and issubclass(part, PagePanel)):
@@ -57,7 +57,7 @@ class PackagePanels:
             try:
                 self._panels[html] = part()
             except Exception as error:  # a package's code may do anything
-                html.content = note(f"the panel has failed: {failure(error)}")
+                html.content = note(f"the panel has failed: {describe_error(error)}")
 
     def update(self, snapshot: Snapshot) -> None:
         """Give a snapshot to all panels."""
@@ -77,4 +77,4 @@ class PackagePanels:
 
     def _drop(self, html: Html, error: Exception) -> None:
         del self._panels[html]
-        html.content = note(f"the panel has failed: {failure(error)}")
+        html.content = note(f"the panel has failed: {describe_error(error)}")

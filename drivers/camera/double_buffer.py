@@ -14,7 +14,7 @@ CONTEXT = multiprocessing.get_context("spawn")
 """Creates shared memory that can be passed to a new process."""
 
 
-class TwoEntries:
+class DoubleBuffer:
     """Index of the newer of two entries; the user of this class owns their contents."""
 
     def __init__(self) -> None:

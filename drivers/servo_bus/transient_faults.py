@@ -18,7 +18,7 @@ RESTART_S = 0.1
 """Silence after which a servo may have restarted: it gets no goals until it is set up."""
 
 
-class PassingFaultSupervisor(Supervisor):
+class TransientFaultSupervisor(Supervisor):
     """Supervisor of servos with transient faults."""
 
     withholds = True
@@ -32,14 +32,14 @@ class PassingFaultSupervisor(Supervisor):
         self._doubted: set[int] = set()
 
     @property
-    def at_ease(self) -> bool:
+    def is_idle(self) -> bool:
         """Return whether no servo has a condition that an answer could change."""
         doubts = self._torque_off or self._doubted or self._seen_s or self._health.faults
         return not (doubts or any(self._last_errors.values()))
 
-    def torque_enabled(self, entering: Collection[int]) -> None:
+    def start_supervision(self, entering: Collection[int]) -> None:
         """Start supervision under torque; ``entering``: servos outside their limits."""
-        super().torque_enabled(entering)
+        super().start_supervision(entering)
         self._torque_off.clear()
         self._doubted.clear()
         # Earlier faults have ended: all servos have just accepted goals and torque.
@@ -47,13 +47,13 @@ class PassingFaultSupervisor(Supervisor):
             del self._health.faults[servo_id]
             self._name_fault(servo_id)
 
-    def torque_disabled(self) -> None:
+    def stop_supervision(self) -> None:
         """Stop supervision, as the servos have no torque."""
-        super().torque_disabled()
+        super().stop_supervision()
         self._torque_off.clear()
         self._doubted.clear()
 
-    def look_first(self) -> None:
+    def check_prepared(self) -> None:
         """Do nothing: every answer of servos that have just been prepared contains their faults."""
 
     def withheld(self, now_s: float) -> frozenset[int]:
