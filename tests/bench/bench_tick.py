@@ -11,7 +11,7 @@ rustypot reads and writes nine servos.
     --save FILE        keeps the figures as JSON
     --against FILE     prints them beside those kept before, or beside another version's:
                        PYTHONPATH=/path/to/other/.links python tests/bench/bench_tick.py --save FILE
-    --table            also prints them as rows of docs/performance.md
+    --table            also prints them as rows of docs/measurements/performance.md
     --page             with the live page, watched by Chromium, or with --browsers N by N clients
                        that take all that is sent
     --record           with a recording
@@ -299,7 +299,7 @@ def show(figures: dict[str, Any], before: dict[str, Any] | None) -> None:
 
 
 def table(figures: dict[str, Any], before: dict[str, Any] | None) -> Iterator[str]:
-    """Yield the rows of docs/performance.md, mean / 99th percentile of all and new frames."""
+    """Yield the rows of docs/measurements/performance.md, mean / 99th percentile of all and new frames."""
     runs = [figures] if before is None else [before, figures]
     for part in ("stages_us", "calls", "peers"):
         rows = {part: figures[part]} if part == "calls" else figures[part]
