@@ -107,24 +107,19 @@ def search(
     for kind, baud in asked:
         if met == "maestro" or (met not in (None, kind) and not to_the_end):
             return
-        looked = _look(port, usb, kind, baud, thorough)
+        if kind != "maestro":
+            (one,) = scan(port, KINDS[kind].family, (baud,), thorough, family_of=FAMILY_OF)
+            looked = SearchRound(
+                kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1
+            )
+        elif port.setBaudRate(baud):
+            # The first six channels are there on every board; others might be an error to it.
+            board = probe(port, replace(MaestroParams(), baud=baud))
+            looked = SearchRound(kind, baud, board=board, channels=USB_CHANNELS.get(usb))
+        else:
+            looked = SearchRound(kind, baud, possible=False)
         met = kind if looked.answered else met
         yield looked
-
-
-def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> SearchRound:
-    if kind == "maestro":
-        return _board(port, usb, baud)
-    (one,) = scan(port, KINDS[kind].family, (baud,), thorough, family_of=FAMILY_OF)
-    return SearchRound(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
-
-
-def _board(port: BusPort, usb: str, baud: int) -> SearchRound:
-    if not port.setBaudRate(baud):
-        return SearchRound("maestro", baud, possible=False)
-    # The first six channels are there on every board; others might be an error to it.
-    found = probe(port, replace(MaestroParams(), baud=baud))
-    return SearchRound("maestro", baud, board=found, channels=USB_CHANNELS.get(usb))
 
 
 def found_of(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:

@@ -162,10 +162,6 @@ class ManualControl:
             DriverError: the bus is gone.
         """
         goal, end_s = self._goal, self._clock.now_s() + seconds
-
-        def over(step: Step) -> str | None:
-            return "arrived" if step.t_s >= end_s else None
-
         return self.follow(
             lambda *_: goal, lambda s: "arrived" if s.t_s >= end_s else None, seconds
         )

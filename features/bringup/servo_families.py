@@ -73,17 +73,6 @@ GENTLE_ACCELERATION = 10
 """1000 steps/s2: a search begins within a tenth of a second."""
 
 
-def _dynamixel_load(model: str, current: int) -> float:
-    """Return Present Current, or Present Load where the model has that, as a share of the stall."""
-    return current * dynamixel.MODELS[model].load_unit
-
-
-def _feetech_load(model: str, current: int) -> float:
-    """Return Present Current as a share of the stall current."""
-    amperes = current * feetech.CURRENT_UNIT_MA / 1000.0
-    return amperes / feetech.MODELS[model].stall_current_a
-
-
 def _gentle_dynamixel(
     value: Callable[[str], int], strength: float, speed_steps_s: float
 ) -> dict[str, int]:
@@ -118,7 +107,8 @@ DYNAMIXEL = ServoKind(
         offset_usable=False,
         full_drive=("goal_pwm", "pwm_limit"),
         gentle=_gentle_dynamixel,
-        load=_dynamixel_load,
+        # Present Current, or Present Load on a model with that register.
+        load=lambda model, current: current * dynamixel.MODELS[model].load_unit,
     ),
 )
 
@@ -142,7 +132,9 @@ FEETECH = ServoKind(
         offset_usable=True,
         full_drive=None,
         gentle=_gentle_feetech,
-        load=_feetech_load,
+        load=lambda model, current: (
+            current * feetech.CURRENT_UNIT_MA / 1000.0 / feetech.MODELS[model].stall_current_a
+        ),
     ),
     set_middle=homing.set_middle,
 )

@@ -8,7 +8,7 @@ they are written with it open, or they would hold until the next power-off only;
 under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory table STS3215.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import servo_label
@@ -61,7 +61,11 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
         found += [answers[0]] if shared else []
     where = port.port_name
     if len(found) > 1:
-        raise ServoMissing(f"{where}: {_crowd(found)}: connect one servo alone")
+        named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
+        crowd = f"{len(named)} servos answer: {', '.join(named)}"
+        if len(set(named)) < len(named):
+            crowd = f"two servos answer as {named[0]}"
+        raise ServoMissing(f"{where}: {crowd}: connect one servo alone")
     if not found and junk:
         raise ServoMissing(
             f"{where}: answers in pieces only: connect one servo alone, and check its plug"
@@ -71,13 +75,6 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
             f"{where}: no servo answers at any baud rate: is its supply on, its plug in?"
         )
     return found[0]
-
-
-def _crowd(found: Iterable[FoundServo]) -> str:
-    named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
-    if len(set(named)) < len(named):
-        return f"two servos answer as {named[0]}"
-    return f"{len(named)} servos answer: {', '.join(named)}"
 
 
 def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: str) -> None:
@@ -128,7 +125,12 @@ class _Assignment:
         """Write what differs, and see that the servo answers so."""
         registers, kind = self._registers, self._kind
         self._open(self._found.baud)
-        self._torque_off()
+        # It then replies to every instruction.
+        registers.write_all((self._id,), "status_return_level", kind.family.answer_level)
+        if registers.read(self._id, "torque_enable"):
+            if not registers.write(self._id, "torque_enable", 0):
+                raise self._refused("let its torque go")
+            self._done.append("torque 1 -> 0")
         if self._id != servo_id:
             tell(f"id {self._id} -> {servo_id}")
             self._change_id(servo_id)
@@ -145,15 +147,6 @@ class _Assignment:
         if kind.family.lock is not None and not registers.settle(self._id, kind.family.lock, 1):
             raise self._refused("close its lock")
         return SetUp(self._found, seen, tuple(self._done))
-
-    def _torque_off(self) -> None:
-        """Make the servo reply to every instruction, and switch its torque off."""
-        registers = self._registers
-        registers.write_all((self._id,), "status_return_level", self._kind.family.answer_level)
-        if registers.read(self._id, "torque_enable"):
-            if not registers.write(self._id, "torque_enable", 0):
-                raise self._refused("let its torque go")
-            self._done.append("torque 1 -> 0")
 
     def _change_id(self, servo_id: int) -> None:
         self._unlock()

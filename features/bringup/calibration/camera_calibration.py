@@ -81,13 +81,14 @@ class LensCalibration:
 
     def params(self) -> LensParams:
         """Return it as it is written down."""
-        i = self.intrinsics
-        k1, k2, p1, p2, k3 = (round(k, 6) for k in i.distortion)
-        focal, centre = (round(i.fx_px, 2), round(i.fy_px, 2)), (round(i.cx_px, 2), i.cy_px)
-        return LensParams(
-            self.width_px, self.height_px, *focal, centre[0], round(centre[1], 2),
-            (k1, k2, p1, p2, k3),
-        )  # fmt: skip
+        return lens_params(self.intrinsics, self.width_px, self.height_px)
+
+
+def lens_params(lens: Intrinsics, width_px: int, height_px: int) -> LensParams:
+    """Return a lens as the rig's file holds it."""
+    fx, fy, cx, cy = (round(px, 2) for px in (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px))
+    k1, k2, p1, p2, k3 = (round(k, 6) + 0.0 for k in lens.distortion)
+    return LensParams(width_px, height_px, fx, fy, cx, cy, (k1, k2, p1, p2, k3))
 
 
 class _Fit(NamedTuple):
@@ -118,7 +119,7 @@ def calibrate_lens(
     usable = _usable(views, guess, width_px, height_px, par.views)
     kept = list(usable)
     fit = _fit(views, kept, width_px, height_px)
-    while (worst := _outlier(fit, par.outlier_ratio)) is not None:
+    while (worst := outlier(fit.view_rms_px, par.outlier_ratio, _GOOD_PX)) is not None:
         if len(kept) <= max(par.views.least_views, (1.0 - _MOST_DROPPED) * len(usable)):
             break
         del kept[worst]
@@ -185,11 +186,14 @@ def _calibrated(views: Sequence[SeenBoard], width: int, height: int, flags: int)
     return _Fit(lens, float(rms), np.ravel(view_rms), np.ravel(spreads))
 
 
-def _outlier(fit: _Fit, ratio: float) -> int | None:
-    """Return the view that fits worst, if it fits much worse than is usual."""
-    worst = int(np.argmax(fit.view_rms_px))
-    usual = float(np.median(fit.view_rms_px))
-    return worst if fit.view_rms_px[worst] > max(ratio * usual, _GOOD_PX) else None
+def outlier(view_rms_px: Floats, ratio: float, good_px: float) -> int | None:
+    """Return the view with the largest error if that is much larger than the median.
+
+    ratio: of both; good_px: no view with a smaller error is an outlier
+    """
+    worst = int(np.argmax(view_rms_px))
+    usual = float(np.median(view_rms_px))
+    return worst if view_rms_px[worst] > max(ratio * usual, good_px) else None
 
 
 def _judge(fit: _Fit, width: int, height: int, params: LensCalibrationParams) -> None:

@@ -102,7 +102,9 @@ def pressed(state: FaceCalibration, key: Key) -> FaceCalibration:
     if part is None:
         return state
     if key in _WAYS:
-        return _with_place(state, _moved(state.place_mm(part), _WAYS[key], state.step_mm))
+        (x, y, z), (left, up) = state.place_mm(part), _WAYS[key]
+        place = x, _within(y, left * state.step_mm), _within(z, up * state.step_mm)
+        return _with_place(state, place)
     match key:
         case "larger" | "smaller":
             step = state.step + (1 if key == "larger" else -1)
@@ -147,12 +149,6 @@ def _usual_mm(part: str) -> Vec3:
 def _tenths(place_mm: Vec3) -> Vec3:
     x, y, z = (round(v, 1) + 0.0 for v in place_mm)  # + 0.0: no -0.0 in a file
     return x, y, z
-
-
-def _moved(place_mm: Vec3, way: tuple[float, float], step_mm: float) -> Vec3:
-    """Move a place in the face's plane, no farther than a face goes."""
-    (x, y, z), (left, up) = place_mm, way
-    return x, _within(y, left * step_mm), _within(z, up * step_mm)
 
 
 def _within(value: float, by: float) -> float:

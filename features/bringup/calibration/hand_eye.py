@@ -18,7 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.features.bringup.calibration.camera_calibration import CameraCalibrationRefused
+from gazerig.features.bringup.calibration.camera_calibration import (
+    CameraCalibrationRefused,
+    outlier,
+)
 from gazerig.features.bringup.calibration.charuco_views import board_poses
 from gazerig.features.bringup.calibration.hand_eye_solver import Fit, Pose, Sights, refined, start
 from gazerig.gaze.types import Mat3, Vec3
@@ -134,11 +137,15 @@ def camera_on_head(
             not good or not sure enough.
     """
     par = params if params is not None else HandEyeParams()
-    _refuse_few(len(views), par)
+    if len(views) < par.least_views:
+        raise CameraCalibrationRefused(
+            f"the board was seen from {len(views)} neck angles, wanted are {par.least_views}: hang "
+            "it where the camera sees all of it while the head looks straight ahead, in good light"
+        )
     _refuse_parallel([view.R_world_head for view in views], par)
     kept = list(range(len(views)))
     fit = _fit(views, lens, width_px, par)
-    while (worst := _outlier(fit, par.outlier_ratio)) is not None:
+    while (worst := outlier(fit.view_rms_px, par.outlier_ratio, _GOOD_PX)) is not None:
         if len(kept) <= max(par.least_views, (1.0 - _MOST_DROPPED) * len(views)):
             break
         del kept[worst]
@@ -180,14 +187,6 @@ def turns_deg(R_world_head: Sequence[Mat3]) -> tuple[float, float]:
     return degrees(main), degrees(second)
 
 
-def _refuse_few(count: int, params: HandEyeParams) -> None:
-    if count < params.least_views:
-        raise CameraCalibrationRefused(
-            f"the board was seen from {count} neck angles, wanted are {params.least_views}: hang "
-            "it where the camera sees all of it while the head looks straight ahead, in good light"
-        )
-
-
 def _refuse_parallel(R_world_head: Sequence[Mat3], params: HandEyeParams) -> None:
     main, second = turns_deg(R_world_head)
     if second < params.least_turn_deg:
@@ -216,13 +215,6 @@ def _judge(fit: Fit, params: HandEyeParams, width_px: int) -> None:
             f"{params.most_position_std_mm:g} mm and {params.most_angle_std_deg:g} deg: turn the "
             "head farther, hang the board nearer, or take more views"
         )
-
-
-def _outlier(fit: Fit, ratio: float) -> int | None:
-    """Return the view that fits worst, if it fits much worse than is usual."""
-    worst = int(np.argmax(fit.view_rms_px))
-    usual = float(np.median(fit.view_rms_px))
-    return worst if fit.view_rms_px[worst] > max(ratio * usual, _GOOD_PX) else None
 
 
 def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: HandEyeParams) -> Fit:

@@ -61,8 +61,12 @@ class OneHobby:
         low, high = (round(end * US_STEPS) for end in pulses_us)
         speed = SPEED_US_S * US_STEPS
         self._setup = ServoConfig(joint.id, joint.model, low, high, speed, name)
-        bus = _bus(port, self._setup, params)
         self._maestro = isinstance(params, MaestroParams)
+        bus: ServoBus
+        if isinstance(params, MaestroParams):
+            bus = MaestroBus(port, [self._setup], params)
+        else:
+            bus = Pca9685Bus(port, [self._setup], params)
         self._bus: ServoBus = bus if guardian is None else GuardedBus(bus, 1, guardian, 0)
         self._goal = self._pulse = 0
         self._on = False
@@ -134,16 +138,6 @@ class OneHobby:
                 break
         return self.place_us
 
-    def _begin_anew(self, pulse_steps: int) -> None:
-        """Stay where the board holds it, however it came there."""
-        sent_us, held_us = self._goal / US_STEPS, pulse_steps / US_STEPS
-        self._goal = pulse_steps
-        range_us = ": if it never comes farther, widen the range of its channel in Pololu's program"
-        self._said.append(
-            f"{self.who} was sent to {sent_us:g} us and is held at {held_us:g} us"
-            f"{range_us if self._maestro else ''}"
-        )
-
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call."""
         said, self._said = self._said, []
@@ -176,15 +170,17 @@ class OneHobby:
             if not feedback.missing:
                 self._pulse, self._on = int(feedback.position_steps[0]), feedback.torque[0]
                 if feedback.rearmed[0]:
-                    self._begin_anew(self._pulse)
+                    # It stays where the board holds it, whatever the reason.
+                    sent_us, self._goal = self.place_us, self._pulse
+                    remedy = (
+                        ": if it never comes farther, widen the range of its channel in "
+                        "Pololu's program"
+                    )
+                    self._said.append(
+                        f"{self.who} was sent to {sent_us:g} us and is held at "
+                        f"{self.pulse_us:g} us{remedy if self._maestro else ''}"
+                    )
                 return self._pulse
             if self._clock.now_s() > end_s:
                 raise BusLost(f"{self.who}: the board does not answer: check its cable and power")
             self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
-
-
-def _bus(port: BusPort, setup: ServoConfig, params: MaestroParams | Pca9685Params) -> ServoBus:
-    """Return the bus of one servo on its board."""
-    if isinstance(params, Pca9685Params):
-        return Pca9685Bus(port, [setup], params)
-    return MaestroBus(port, [setup], params)

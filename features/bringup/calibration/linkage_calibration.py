@@ -274,7 +274,17 @@ def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> 
         CalibrationStopped: the person wants it to end.
     """
     placer.begin()
-    marked = _lid(placer, person) if is_lid(placer.name) else _turning(placer, person)
+    positive, negative = ends_of(placer.name)
+    if is_lid(placer.name):
+        shut = next(where for part, where in SHUT_WHERE.items() if placer.name.endswith(part))
+        marked, ends = [], (("to where it is fully OPEN", 1), (shut, -1))
+    else:
+        end = "to its {} end, as far as it goes freely"
+        marked = [(0.0, placer.mark(zero_of(placer.name)))]
+        ends = ((end.format(positive), 1), (end.format(negative), -1))
+    for where, sign in ends:
+        at = placer.mark(where)
+        marked.append((_angle(placer, person, at, sign * abs(angle_now(placer.joint, at))), at))
     marked.sort()
     all_places = list(marked)
     for one, other in zip(marked, marked[1:], strict=False):
@@ -286,26 +296,6 @@ def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> 
     # A lid stays shut, so that the other one can be brought to meet it.
     placer.leave(marked[0][1] if is_lid(placer.name) else dict(marked)[0.0])
     return made
-
-
-def _turning(placer: Placer, person: Steerer) -> list[Place]:
-    """Mark straight ahead, which is 0 deg, and both ends."""
-    positive, negative = ends_of(placer.name)
-    marked = [(0.0, placer.mark(zero_of(placer.name)))]
-    for end, sign in ((positive, 1), (negative, -1)):
-        at = placer.mark(f"to its {end} end, as far as it goes freely")
-        marked.append((_angle(placer, person, at, sign * abs(angle_now(placer.joint, at))), at))
-    return marked
-
-
-def _lid(placer: Placer, person: Steerer) -> list[Place]:
-    """Mark a lid open and shut."""
-    shut = next(where for part, where in SHUT_WHERE.items() if placer.name.endswith(part))
-    marked = []
-    for where, sign in (("to where it is fully OPEN", 1), (shut, -1)):
-        at = placer.mark(where)
-        marked.append((_angle(placer, person, at, sign * abs(angle_now(placer.joint, at))), at))
-    return marked
 
 
 def _angle(placer: Placer, person: Steerer, at: float, proposed: float) -> float:

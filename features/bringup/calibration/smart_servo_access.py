@@ -97,9 +97,22 @@ class SingleServo:
         """
         # A servo may be set to answer questions alone; this takes no answer and ends that.
         self._registers.write_all((self._id,), "status_return_level", self._family.answer_level)
-        firmware = self._refuse_another()
+        found = self._registers.identify(self._id)
+        if found is None:
+            raise ServoMissing(f"{self.who} does not answer: check power, cable, id and baud rate")
+        if found.model_number != self._family.models[self._model].number:
+            raise ServoMissing(
+                f"{self.who} is {self._family.model_name(found.model_number)}, "
+                f"not {self._model}: correct the rig file, or check the ids"
+            )
         value, driving = self._value, self._driving
-        self._refuse_errors(value(self._family.error_register))
+        status = value(self._family.error_register)
+        if status:
+            remedy = "let it cool, free it, check its supply"
+            if self._family.faults_latch:
+                remedy = f"find the cause, then gazerig reboot {self._id}"
+            names = " and ".join(self._family.name_errors(status))
+            raise ServoFault(f"{self.who}: {names}: {remedy}")
         low, high = (value(name) for name in LIMITS)
         for setting in driving.settings:
             now = value(setting.register)
@@ -115,29 +128,7 @@ class SingleServo:
                 "firmware loses by a whole turn as the torque comes on: set it to 0 "
                 "(--clear-offset), the calibration makes up for it"
             )
-        return ServoCheck(firmware, (low, high), offset)
-
-    def _refuse_another(self) -> int:
-        """Return the firmware of the servo, which is of the model that is wanted."""
-        found = self._registers.identify(self._id)
-        if found is None:
-            raise ServoMissing(f"{self.who} does not answer: check power, cable, id and baud rate")
-        if found.model_number != self._family.models[self._model].number:
-            raise ServoMissing(
-                f"{self.who} is {self._family.model_name(found.model_number)}, "
-                f"not {self._model}: correct the rig file, or check the ids"
-            )
-        return found.firmware
-
-    def _refuse_errors(self, status: int) -> None:
-        if status:
-            remedy = (
-                f"find the cause, then gazerig reboot {self._id}"
-                if self._family.faults_latch
-                else "let it cool, free it, check its supply"
-            )
-            names = " and ".join(self._family.name_errors(status))
-            raise ServoFault(f"{self.who}: {names}: {remedy}")
+        return ServoCheck(found.firmware, (low, high), offset)
 
     def clear_offset(self) -> int:
         """Set the offset of its position to 0, torque off; return what it was."""

@@ -80,10 +80,16 @@ def difference_table(rig: str, loaded: Rig, changes: Mapping[str, Any]) -> Table
     for key, new in changes.items():
         old: Any = loaded
         for step in key.split("."):
-            old = getattr(old, step, "-")
-        table.add_row(key, _text(old), _text(new))
+            old = old.get(step, "-") if isinstance(old, Mapping) else getattr(old, step, "-")
+        style = "bold" if key.endswith("sign") else None
+        table.add_row(key, _text(old), _text(new), style=style)
     return table
 
 
 def _text(value: Any) -> str:
-    return " ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value}"
+    """Write a value; the places of a linkage one below the other."""
+    if not isinstance(value, tuple):
+        return f"{value}"
+    if any(isinstance(one, tuple) for one in value):
+        return "\n".join(f"{angle:g} deg: {at:g}" for angle, at in value)
+    return " ".join(f"{v:g}" for v in value)

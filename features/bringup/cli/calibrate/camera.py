@@ -24,11 +24,10 @@ from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
 from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.features.bringup.calibration.camera_calibration import LensCalibration
+from gazerig.features.bringup.calibration.camera_calibration import LensCalibration, lens_params
 from gazerig.features.bringup.calibration.camera_procedure import (
     LensSteps,
     Neck,
-    NeckStep,
     neck_angles,
     neck_steps,
 )
@@ -38,7 +37,7 @@ from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams
 from gazerig.features.bringup.cli.calibrate.oak import (
     as_seen,
     calibration_of_file,
-    lens_params,
+    lens_keys,
     oak_changes,
     say_calibration,
     upright_calibration,
@@ -155,7 +154,9 @@ def calibrate_camera(
             )
         if not dry_run:
             refuse_unwritable(rig, out)
-        job = _Job(loaded, board, stopped, _kinematics(loaded))
+        job = _Job(
+            loaded, board, stopped, Kinematics(loaded.geometry, loaded.joints, lid_ends(loaded))
+        )
         if oak_calibration is not None:
             changes = _oak_lens(job, calibration_of_file(oak_calibration, loaded.oak)).changes
         else:
@@ -234,17 +235,7 @@ def _field_changes(
 
 def lens_changes(lens: LensCalibration) -> dict[str, Any]:
     """Return a measured lens as dotted keys of a rig file and values."""
-    params = lens.params()
-    return {
-        "camera.horizontal_field_deg": round(lens.horizontal_field_deg, 2),
-        "camera.lens.width_px": params.width_px,
-        "camera.lens.height_px": params.height_px,
-        "camera.lens.fx_px": params.fx_px,
-        "camera.lens.fy_px": params.fy_px,
-        "camera.lens.cx_px": params.cx_px,
-        "camera.lens.cy_px": params.cy_px,
-        "camera.lens.distortion": params.distortion,
-    }
+    return lens_keys(lens.params(), lens.horizontal_field_deg)
 
 
 def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
@@ -253,15 +244,10 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
     With it goes the lens that belongs to this place, at the size it was measured on.
     """
     params, lens = found.mounted(camera), found.lens
-    return {
-        "camera.position_mm": params.position_mm,
-        "camera.yaw_deg": params.yaw_deg,
-        "camera.pitch_deg": params.pitch_deg,
-        "camera.roll_deg": params.roll_deg,
-        "camera.lens.fx_px": round(lens.fx_px, 2),
-        "camera.lens.fy_px": round(lens.fy_px, 2),
-        "camera.lens.cx_px": round(lens.cx_px, 2),
-        "camera.lens.cy_px": round(lens.cy_px, 2),
+    place = ("position_mm", "yaw_deg", "pitch_deg", "roll_deg")
+    return {f"camera.{key}": getattr(params, key) for key in place} | {
+        f"camera.lens.{key}": round(getattr(lens, key), 2)
+        for key in ("fx_px", "fy_px", "cx_px", "cy_px")
     }
 
 
@@ -372,7 +358,7 @@ def _oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) ->
     found = upright_calibration(delivered, orientation_of(job.rig.camera))
     found = as_seen(found, shot.lens if shot is not None else None)
     say_calibration(found, job.rig.oak)
-    camera = replace(job.rig.camera, lens=lens_params(found))
+    camera = replace(job.rig.camera, lens=lens_params(found.lens, found.width_px, found.height_px))
     return _KnownLens(camera, oak_changes(found), HandEyeParams())
 
 
@@ -428,7 +414,12 @@ def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEye
     planned = neck_angles((yaw, pitch, roll), lens, width, height)
     views = []
     for step in neck_steps(neck, eye.look, eye.now_s, job.board, job.kinematics, planned):
-        _tell_step(step)
+        yaw_deg, pitch_deg, roll_deg = map(degrees, step.asked_rad)
+        what = f"{step.corners} corners" if step.view is not None else step.why
+        say(
+            f"{step.number}/{step.of}: yaw {yaw_deg:+.0f}, pitch {pitch_deg:+.0f}, "
+            f"roll {roll_deg:+.0f}: {what}"
+        )
         if step.view is not None:
             views.append(step.view)
     found = camera_on_head(views, lens, width, good)
@@ -446,12 +437,6 @@ def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEye
     return found
 
 
-def _tell_step(step: NeckStep) -> None:
-    yaw, pitch, roll = map(degrees, step.asked_rad)
-    what = f"{step.corners} corners" if step.view is not None else step.why
-    say(f"{step.number}/{step.of}: yaw {yaw:+.0f}, pitch {pitch:+.0f}, roll {roll:+.0f}: {what}")
-
-
 def _first(job: _Job, eye: _Eye) -> Shot:
     """Wait for a frame."""
     give_up_s = eye.now_s() + 5.0
@@ -462,10 +447,6 @@ def _first(job: _Job, eye: _Eye) -> Shot:
             return shot
         eye.rest(0.02)
     raise SetupError("the camera gives no frames: check its cable, or name another (--camera N)")
-
-
-def _kinematics(rig: Rig) -> Kinematics:
-    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
 
 
 def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:

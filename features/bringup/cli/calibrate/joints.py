@@ -1,10 +1,7 @@
 """The command calibrate joints: zero, sign and range of each joint, found and written down."""
 
-from collections.abc import Mapping
-
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from gazerig.config.rig import Rig
 from gazerig.config.save import propose, rig_file
@@ -18,7 +15,6 @@ from gazerig.features.bringup.cli.calibrate.joint import (
     By,
     CalibrationJob,
     CalibrationOptions,
-    Made,
     ZeroBy,
     measure,
     refuse_impossible,
@@ -30,6 +26,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     AllYesOption,
     DryRunOption,
     OutOption,
+    difference_table,
     refuse_unwritable,
     write_found,
 )
@@ -66,9 +63,10 @@ def calibrate_joints(
         search = StopSearchParams(strength=strength)
         span_us = _span(pulses)
         how = CalibrationOptions(by, margin, zero, search, clear_offset, set_middle, span_us, more)
-        if dry_run:
-            _refuse_writes(how)
-        else:
+        if dry_run and (clear_offset or set_middle):
+            option = "--clear-offset" if clear_offset else "--set-middle"
+            raise SetupError(f"--dry-run and {option} exclude each other: that is a write")
+        if not dry_run:
             refuse_unwritable(rig, out)
             if out is None:
                 _refuse_long_lists(rig, loaded, names)
@@ -78,11 +76,12 @@ def calibrate_joints(
             with rig_ports(loaded, mock, port) as wire:
                 found, refused = measure(CalibrationJob(loaded, wire, how, person, stopped), names)
             if found:
-                wanted = _wanted(loaded, found)
-                Console().print(_table(rig, wanted))
+                wanted: dict[str, Value] = {}
+                for name, made in found.items():
+                    wanted |= changes(name, loaded.joints[name], made, loaded.park_deg)
+                Console().print(difference_table(rig, loaded, wanted))
                 if not dry_run:
-                    values = {key: new for key, (_, new) in wanted.items()}
-                    write_found(rig, values, out, person)
+                    write_found(rig, wanted, out, person)
         except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None
@@ -112,17 +111,6 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     return tuple(name for name in rig.names if name not in coupled and (not asked or name in asked))
 
 
-def _refuse_writes(how: CalibrationOptions) -> None:
-    """Refuse what would write into servos, where nothing is to be written.
-
-    Raises:
-        SetupError: names the option.
-    """
-    if how.clear_offset or how.set_middle:
-        option = "--clear-offset" if how.clear_offset else "--set-middle"
-        raise SetupError(f"--dry-run and {option} exclude each other: that is a write")
-
-
 def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:
     """Find out before anything moves that places could not be written where they stand.
 
@@ -148,36 +136,3 @@ def _span(pulses: str) -> tuple[float, float]:
         return float(low), float(high)
     except ValueError:
         raise SetupError(f"--pulses {pulses}: two pulse widths in us, e.g. 900:2100") from None
-
-
-def _wanted(rig: Rig, found: Mapping[str, Made]) -> dict[str, tuple[object, Value]]:
-    """Return key -> old and new value for all joints found."""
-    wanted: dict[str, tuple[object, Value]] = {}
-    for name, made in found.items():
-        for key, value in changes(name, rig.joints[name], made, rig.park_deg).items():
-            wanted[key] = (_old(rig, key), value)
-    return wanted
-
-
-def _old(rig: Rig, key: str) -> object:
-    """Follow a dotted key through mappings and attributes."""
-    value: object = rig
-    for step in key.split("."):
-        value = value[step] if isinstance(value, Mapping) else getattr(value, step)
-    return value
-
-
-def _table(rig: str, wanted: Mapping[str, tuple[object, Value]]) -> Table:
-    table = Table(caption=f"what was found, against {rig}")
-    for name in ("key", "old", "new"):
-        table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
-    for key, (old, new) in wanted.items():
-        table.add_row(key, _text(old), _text(new), style="bold" if key.endswith("sign") else None)
-    return table
-
-
-def _text(value: object) -> str:
-    """Write a value; the places of a linkage one below the other."""
-    if not isinstance(value, tuple):
-        return f"{value}"
-    return "\n".join(f"{angle:g} deg: {at:g}" for angle, at in value)

@@ -1,6 +1,6 @@
 """Calibrating by what an OAK camera's own memory says: gazerig calibrate camera --oak."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import CameraError
+from gazerig.features.bringup.calibration.camera_calibration import lens_params
 from gazerig.robot.cli.terminal import say
 from gazerig.robot.model.frames import LensParams
 
@@ -99,33 +100,15 @@ def say_calibration(found: OakCalibration, params: OakParams) -> None:
 
 def oak_changes(found: OakCalibration) -> dict[str, Any]:
     """Return a calibration as dotted keys of a rig file and values."""
-    lens = lens_params(found)
-    changes: dict[str, Any] = {
-        "camera.horizontal_field_deg": round(found.horizontal_field_deg, 2),
-        "camera.lens.width_px": lens.width_px,
-        "camera.lens.height_px": lens.height_px,
-        "camera.lens.fx_px": lens.fx_px,
-        "camera.lens.fy_px": lens.fy_px,
-        "camera.lens.cx_px": lens.cx_px,
-        "camera.lens.cy_px": lens.cy_px,
-        "camera.lens.distortion": lens.distortion,
-    }
+    lens = lens_params(found.lens, found.width_px, found.height_px)
+    changes = lens_keys(lens, found.horizontal_field_deg)
     if found.imu_rotation_deg is not None:
         x, y, z = (round(value, 3) + 0.0 for value in found.imu_rotation_deg)
         changes["oak.imu_rotation_deg"] = (x, y, z)
     return changes
 
 
-def lens_params(found: OakCalibration) -> LensParams:
-    """Return the lens as the rig's file holds it."""
-    i = found.lens
-    a, b, c, d, e = (round(value, 6) + 0.0 for value in i.distortion)
-    return LensParams(
-        found.width_px,
-        found.height_px,
-        round(i.fx_px, 2),
-        round(i.fy_px, 2),
-        round(i.cx_px, 2),
-        round(i.cy_px, 2),
-        (a, b, c, d, e),
-    )
+def lens_keys(lens: LensParams, horizontal_field_deg: float) -> dict[str, Any]:
+    """Return a lens as dotted keys of a rig file and values."""
+    keys = {f"camera.lens.{key}": value for key, value in asdict(lens).items()}
+    return {"camera.horizontal_field_deg": round(horizontal_field_deg, 2), **keys}
