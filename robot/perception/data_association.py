@@ -1,9 +1,9 @@
 """Data association: the pairing of tracks and detections that is likeliest as a whole.
 
-A pair is judged by the distance between where the track is expected and where the detection is,
-in standard deviations of their difference: a handful of pairs one by one, many in one expression
-of arrays. Taking the nearest pair first gives each of two people who pass each other the other's
-detection whenever one of them happens to be nearer to both places.
+A pair is weighed by the distance from the track's expected position to the detection, in standard
+deviations of their difference. A handful of pairs is computed one by one, many in one expression of
+arrays. A greedy choice of the nearest pair would exchange the detections of two people who pass
+each other whenever one of them is nearer to both positions.
 """
 
 from collections.abc import Sequence
@@ -18,65 +18,66 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.model.track_params import TrackParams
 
 FORBIDDEN: Final = 1e6
-"""Cost of a pair that cannot be; larger than that of all pairs that can."""
+"""Cost of an impossible pair; larger than the cost of all possible pairs."""
 NO_MARK = -1
-"""Stands for the number of a detection to which its detector gives none."""
+"""Mark of a detection that its detector did not number."""
 UNPAIRED: Final = 30.0
-"""Cost of a track that is not seen and a detection of somebody new; no possible pair costs more.
-Were every pair preferred, somebody new would push others on, each to the place of the next."""
+"""Cost of an unseen track and a detection of a new person; no possible pair costs more. Without
+this limit a new person would push the others on, each to the position of the next."""
 # Above this, costs approach that limit more and more slowly.
 _NEARLY_UNPAIRED = 25.0
 _SLOWLY = _NEARLY_UNPAIRED * (UNPAIRED - _NEARLY_UNPAIRED)
-# What people do that no filter expects, a lunge or a jump of the detector, happens in one frame of
-# twenty; as a cost: minus twice the logarithm.
+# A motion that no filter expects (a lunge, a jump of the detector) happens in one frame of twenty.
+# The cost is minus twice the logarithm of that.
 _SURPRISE = 6.0
-# Who is out of sight is found again in one frame of ten.
+# A person out of sight is found again in one frame of ten.
 _BACK = 4.6
-# What is found in one or two frames is nobody in one case of ten, as between two who overlap.
+# A detection of one or two frames is false in one case of ten, as between two people who overlap.
 _UNPROVED = 4.6
-# Nobody's height surprises by more than about this, in one frame.
+# A person's height changes by at most about this in one frame.
 _BOB_M = 0.1
-# Nor by more than this who is about to be hidden.
+# A person who is about to be hidden moves by at most this.
 _HIDDEN_M = 0.05
-# Of two about as far away each may hide the other.
+# Two people at about the same distance may each hide the other.
 _NEARER = 1.1
 # Nothing is measured better than this.
 _LEAST_SD_M = 1e-4
-# Two numbers of the detector for one thing, as a cost: 4 standard deviations.
+# Cost of two detector numbers for one thing: 4 standard deviations.
 _OTHER_MARK = 16.0
-# Within so many radii of its middle is about where something is.
+# Extent of a thing about its middle, in radii.
 _OUTLINE = 1.5
-# What the Hellinger distance of two clothings tells, as a cost: nothing at .105, where one person
-# from time to time is found as often as two people at once; nearer and farther by so much. Measured
-# on people in a square (75 tracks: half of one person's below .044, of two people's below .13).
+# Hellinger distance of two clothings at which the cost is 0, and the slopes of the cost below and
+# above it. At .105, one person at two times is as frequent as two people at one time. Measured on
+# people in a square (75 tracks; medians: .044 for one person, .13 for two people).
 _AS_LIKELY, _NEARER_COST, _FARTHER_COST = 0.105, 55.0, 14.0
-# In frames one after the other they err alike, by the light and by what covers them: each counts
-# for so much of one alone.
+# The errors of successive frames are correlated (light, covers): each frame counts for this share
+# of an independent one.
 _CLOTHES = 0.6
-# Clothes of which this share is seen tell as much as all of them.
+# Clothes of which this share is visible count as fully visible.
 _ENOUGH = 0.4
-# Those who are dressed so much alike may have gone on out of sight, and come out elsewhere.
+# A person dressed this similarly may have moved on out of sight, and reappear elsewhere.
 _ALIKE = -2.0
-# Noise of ranges: no two of one place differ by more of its standard deviations.
+# Largest difference of two ranges of one position, in standard deviations.
 _RANGE_SIGMA = 3.0
-# Up to here plain numbers cost less than arrays, which take as long for one pair as for fifty.
+# Up to this number of pairs plain numbers are faster than arrays, which take as long for one pair
+# as for fifty.
 _FEW_PAIRS = 25
 
 
 class TrackRow(NamedTuple):
-    """What counts of a track in data association, as plain numbers.
+    """Track in data association, as plain numbers.
 
     kind, mark: numbers of its kind and of the detector
-    x, y, z, range_m: unit vector from the camera to where it is expected, and the distance
+    x, y, z, range_m: unit vector from the camera to its expected position, and the distance
     across_m2, along_m2: variances of its position
     radius_m: half its size
-    size: by which distances from the size of a face are multiplied
-    moved_m: how much farther off it may be for each time it was not seen
-    in_sight: whether it was seen a short while ago
-    gone_m: how much farther off it may be if it is dressed alike
-    fastest_m: how far it may have moved along the view
-    upright_m2: variance of its height, where that changes less than its place does
-    proved: whether it was seen in some frames, and is no chance find of the detector
+    size: factor of distances that come from the size of a face
+    moved_m: extra distance allowed because it was not seen
+    in_sight: whether it was seen recently
+    gone_m: extra distance allowed if the clothes match
+    fastest_m: largest motion along the view since it was seen
+    upright_m2: variance of its height, if smaller than that of its position
+    proved: whether several frames confirm it, so that it is no false detection
     """
 
     kind: int
@@ -98,11 +99,11 @@ class TrackRow(NamedTuple):
 
 
 class DetectionRow(NamedTuple):
-    """What counts of a detection in data association, as plain numbers.
+    """Detection in data association, as plain numbers.
 
     kind, mark, x, y, z, range_m, radius_m: as of a track
     across_sd_m, along_sd_m: standard deviations of its position
-    by_size: 1 where its distance is from the size of a face, else 0
+    by_size: 1 if its distance comes from the size of a face, else 0
     """
 
     kind: int
@@ -123,20 +124,21 @@ def pair_costs(
     par: TrackParams,
     clothing: Sequence[Sequence[float]] | None = None,
 ) -> list[list[float]]:
-    """Return how unlikely it is that tracks are seen so: minus twice the log likelihoods.
+    """Return the cost of each pair: minus twice the log likelihood.
 
-    A track long unseen could be anywhere; without the logarithm that would make it the best match
-    of everything. A detector that tells things apart in the image has already judged; what it gave
-    another number is the same only about where the track's own outline is.
+    A track long unseen could be anywhere; without the logarithm it would match everything best. A
+    detector that separates things in the image has already decided: a detection with another number
+    can match only within the track's own outline.
 
     Args:
         tracks: n of them.
         detections: m of them.
         par: gates.
-        clothing: what clothes tell of each pair, as ``clothing_costs`` returns it; None: nothing.
+        clothing: costs of the clothes of each pair, from ``clothing_costs``; None: no clothes
+            known.
 
     Returns:
-        n rows of m, FORBIDDEN where a pair cannot be.
+        n rows of m, FORBIDDEN for an impossible pair.
     """
     if len(tracks) * len(detections) > _FEW_PAIRS:
         return _all_pairs(tracks, detections, par, clothing)
@@ -152,14 +154,14 @@ def pair_costs(
 def clothing_costs(
     tracks: Sequence[Floats | None], detections: Sequence[Clothing | None]
 ) -> list[list[float]] | None:
-    """Return what the clothes of each pair tell, as a cost: below 0 where they are alike.
+    """Return the cost of the clothes of each pair, below 0 if they are similar.
 
     Args:
-        tracks: colours of n tracks, None where they are not known.
-        detections: of m detections, None where they are not seen.
+        tracks: colours of n tracks, None for unknown ones.
+        detections: clothes of m detections, None for invisible ones.
 
     Returns:
-        n rows of m; None where they tell nothing.
+        n rows of m; None if no pair has known clothes.
     """
     rows = [k for k, colours in enumerate(tracks) if colours is not None]
     columns = [j for j, one in enumerate(detections) if one is not None]
@@ -227,10 +229,10 @@ def _all_pairs(
 
 
 def _hidden(t: Floats) -> NDArray[np.bool_]:
-    """Return which tracks are expected behind or just beside a nearer one.
+    """Return which tracks are expected behind or right next to a nearer one.
 
-    Who is about to be hidden is not seen somewhere else all of a sudden: that is another person,
-    unless the detector gave both one number.
+    A person who is about to be hidden does not appear somewhere else suddenly: that is another
+    person, unless the detector gave both the same number.
 
     Args:
         t: columns of the rows of tracks.
@@ -246,7 +248,7 @@ def _hidden(t: Floats) -> NDArray[np.bool_]:
 def _pair_cost(
     k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: TrackParams, worn: float
 ) -> float:
-    """Return what ``_all_pairs`` does, for track k and one detection."""
+    """Return the cost of track k and one detection; same rules as ``_all_pairs``."""
     kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, in_sight, *_ = (
         tracks[k]
     )
@@ -282,7 +284,7 @@ def _pair_cost(
     most_across, most_along = across_sum + surprise, along_sum + surprise
     far = aside / most_across + deep / most_along
     if not (far <= par.gate_sigma * par.gate_sigma and across_sum > 0.0 and along_sum > 0.0):
-        return FORBIDDEN  # too far off, or no numbers
+        return FORBIDDEN  # too far away, or not finite
     upright_sum, higher = min(across_m2, upright_m2) + across, range_m * range_m * dz * dz
     cost = (aside - higher) / across_sum + higher / upright_sum + deep / along_sum
     cost += log(across_sum * upright_sum * along_sum / exact)
@@ -307,7 +309,7 @@ def _pair_cost(
 
 
 def _is_hidden(k: int, tracks: Sequence[TrackRow]) -> bool:
-    """Return what ``_hidden`` does, for one track."""
+    """Return whether track k is expected behind a nearer one; same rules as ``_hidden``."""
     _, _, x, y, z, range_m, _, _, radius_m, *_ = tracks[k]
     far_m = _NEARER * range_m
     for i, (_, _, its_x, its_y, its_z, its_m, _, _, its_radius_m, _, _, in_sight, *_) in enumerate(
@@ -322,14 +324,14 @@ def _is_hidden(k: int, tracks: Sequence[TrackRow]) -> bool:
 
 
 def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> list[tuple[int, int]]:
-    """Return the pairs (row, column) that cost least together.
+    """Return the pairs (row, column) with the smallest sum of costs.
 
-    SciPy has this too, but loading it takes half a second of processor at every start.
+    SciPy has this too, but its import takes half a second of CPU time at every start.
 
     Args:
-        costs: n rows of m, FORBIDDEN or not a number where a pair cannot be.
-        unpaired: what a row and a column cost that stay alone together; by default so much that
-            there are as many pairs as can be.
+        costs: n rows of m; FORBIDDEN or NaN for an impossible pair.
+        unpaired: cost of leaving a row and a column unpaired; by default so high that the number of
+            pairs is maximal.
     """
     if not len(costs) or not len(costs[0]):
         return []
@@ -347,9 +349,9 @@ def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> lis
 def _shortest_paths(costs: list[list[float]]) -> list[int]:
     """Return the column of each row in the cheapest pairing; no fewer columns than rows.
 
-    Rows whose cheapest columns differ have them. Each other row in turn is paired along the path of
-    least reduced cost to a free column, which moves the rows on that path to their next columns.
-    Column 0 stands for the row to be paired.
+    Rows whose cheapest columns differ get them. Each other row is paired along the path of least
+    reduced cost to a free column, which moves the rows on that path to their next columns. Column 0
+    represents the row being paired.
 
     Source: Jonker and Volgenant, "A shortest augmenting path algorithm for dense and sparse
     linear assignment problems" (1987).

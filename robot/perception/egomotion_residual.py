@@ -1,13 +1,13 @@
-"""How fast still things seem to move while the head turns: what is left of a wrong time or place.
+"""Apparent speed of stationary things while the head turns: the residual of a wrong time or pose.
 
-A frame placed by the head's pose of another moment puts everything off by the head's
-speed times the error in time. As the head's speed changes, the world seems to move with
-it: the seen shifts against the changes of the head's speed give that time. Both figures
-are 0 for a camera whose times, mounting and lens are as the rig says.
+A frame placed by the head's pose of another moment shifts everything by the head's speed times the
+error in time. As the head's speed changes, the world seems to move with it: a fit of the observed
+shifts to the changes of the head's speed gives that error. Both figures are 0 for a camera whose
+times, mounting and lens agree with the rig.
 
-Only what stood still before a turn and is at the same place after it is believed to have
-stood still meanwhile. So while the head stands only the newest frame counts, as the one before a
-turn that may follow: it is kept as it came, and evaluated when the head turns.
+A thing counts as stationary only if it was still before a turn and is at the same position after
+it. So while the head is still only the newest frame counts, as the last one before a possible turn:
+it is stored as received, and evaluated when the head turns.
 """
 
 from collections import deque
@@ -21,21 +21,21 @@ from gazerig.gaze.angles import compose, cross, dot, norm, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import NeckAngles
 
-# The head turns or stands: rad/s.
+# Speeds above which the head turns, and below which it is still, rad/s.
 _TURNS_RAD_S, _STANDS_RAD_S = 0.35, 0.09
-# What moved slower than this before a turn, and is no farther off after it, stood still;
-# a turn that takes longer tells nothing.
+# A thing that moved slower than this before a turn, and is within this distance after it, was
+# still; a longer turn is ignored.
 _STILL_M_S, _STILL_RAD, _LONGEST_S = 0.15, 0.02, 1.5
 _SAMPLES = 90
 _FORGET = 0.99
 
 
 class ResidualFigures(NamedTuple):
-    """The figures so far; None before anything still was seen while the head turned.
+    """Figures so far; None before a stationary thing was seen while the head turned.
 
     speed_deg_s: median speed at which still things seemed to move
-    late_ms: time by which frames seem to be older than they say; below 0: younger
-    samples: how many pairs of frames the median is of
+    late_ms: how much older frames seem to be than their time stamps; below 0: younger
+    samples: number of pairs of frames in the median
     """
 
     speed_deg_s: float | None
@@ -44,7 +44,7 @@ class ResidualFigures(NamedTuple):
 
 
 class TrackedPoint(NamedTuple):
-    """A tracked thing in one image: where this frame alone puts it, and its velocity."""
+    """A tracked thing in one image: its position from this frame alone, and its velocity."""
 
     id: int
     p_world_m: Vec3
@@ -52,7 +52,7 @@ class TrackedPoint(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """One frame as it came.
+    """One frame as received.
 
     turn_rad_s: returns the angular velocity of the camera at the capture, along the world's axes
     """
@@ -65,7 +65,7 @@ class _Frame(NamedTuple):
 
 @dataclass(slots=True)
 class _Turn:
-    """What one thing seemed to do since the head stood last.
+    """Apparent motion of one thing since the head was last still.
 
     shifts: (seen shift, shift that the head's change of speed makes in a second, seconds
     between the frames, whether the head was turning)
@@ -100,14 +100,14 @@ class EgomotionResidual:
         Args:
             t_s: time of the capture.
             turn_rad_s: returns the angular velocity of the camera then, along the world's axes.
-            p_world_eye_m: where the camera was.
-            seen: what was tracked in the frame.
-            at_most_rad_s: what the camera's speed of turning does not exceed, however roughly.
+            p_world_eye_m: position of the camera.
+            seen: the things tracked in the frame.
+            at_most_rad_s: rough upper bound of the camera's speed of turning.
         """
         frame = _Frame(t_s, turn_rad_s, p_world_eye_m, seen)
         stands = at_most_rad_s < _STANDS_RAD_S
         if stands and self._stood:
-            self._waiting = frame  # the one that waited neither begins nor ends a turn
+            self._waiting = frame  # the waiting frame neither begins nor ends a turn
             return
         if self._waiting is not None:
             self._evaluate(self._waiting)
@@ -116,7 +116,7 @@ class EgomotionResidual:
         self._stood = stands
 
     def _evaluate(self, frame: _Frame) -> None:
-        """Compare where things seem to be with the frame evaluated before."""
+        """Compare the apparent positions of things with the frame evaluated before."""
         t_s, turn_rad_s, seen = frame.t_s, frame.turn_rad_s(), frame.seen
         views = {s.id: unit(sub(s.p_world_m, frame.p_world_eye_m)) for s in seen}
         before, self._before = self._before, (t_s, turn_rad_s, views)
@@ -141,7 +141,7 @@ class EgomotionResidual:
         )
 
     def _stands(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
-        """Use the turns of things that are where they were before, and begin new ones."""
+        """Use the turns of things that are at their former positions, and begin new ones."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]
             same = norm(sub(views[id_], turn.view)) < _STILL_RAD
@@ -168,7 +168,7 @@ def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
 
 
 def turned_at_most(before: NeckAngles, after: NeckAngles) -> float:
-    """Return an angle that the head has not turned by more than, between two poses of the neck."""
+    """Return an upper bound of the head's turn between two poses of the neck."""
     (a, b, c), (d, e) = before[0], before[1]
     (f, g, h), (i, j) = after[0], after[1]
     return abs(f - a) + abs(g - b) + abs(h - c) + abs(i - d) + abs(j - e)

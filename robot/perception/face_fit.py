@@ -1,10 +1,10 @@
 """The most probable pose of a face from five points, by Gauss-Newton steps in plain arithmetic.
 
-Seven numbers are fitted: a rotation, a position and the length of the face. The width of the
-mouth over the distance of the eyes, which no turn of the face changes much, tells how much it
-smiles, and so where its corners are; how high they lie is free within wide bounds beside. NumPy
-and OpenCV spend most of their time on calls where matrices are so small, and round otherwise on
-other processors.
+Seven numbers are fitted: a rotation, a position and the length of the face. The width of the mouth
+over the distance of the eyes hardly depends on the turn of the face. It gives the strength of a
+smile, and so the positions of the mouth's corners; their height is free within wide bounds. On
+matrices this small NumPy and OpenCV spend most of their time on calls, and they round differently
+on other processors.
 
 Frame: of a camera that looks at the face with its eyes level; x right, y down, z forward. Points
 are seen on the plane z = 1.
@@ -18,7 +18,7 @@ from gazerig.robot.model.face_geometry import EYES_TO_MOUTH_M, LANDMARKS_FACE_M,
 
 Points = tuple[tuple[float, float], ...]
 Five = tuple[float, float, float, float, float]
-"""Of the three components of a turn, the distance along the optical axis, and the length."""
+"""Three components of a turn, the distance along the optical axis, and the length."""
 
 # Usual landmark error, as a part of the distance between the eyes.
 _NOISE_OF_EYES = 0.04
@@ -26,16 +26,16 @@ _NOISE_OF_EYES = 0.04
 # face lengths at a given distance between the eyes: as information, 1 / spread^2.
 _PITCH_INFO, _YAW_INFO = radians(22.0) ** -2, radians(30.0) ** -2
 _LENGTH_INFO = 0.1**-2
-# A smile: spread of mouth widths over the usual one; and how far a corner goes up and back on its
-# way out, as a dense mesh shows it on a laughing and a calm face (7.6 mm out, 7.6 up, 6.6 back).
+# A smile: spread of mouth widths over the usual one; and the motion of a corner up and back per
+# motion outward, from the dense mesh of a laughing and a calm face (7.6 mm out, 7.6 up, 6.6 back).
 # The narrowest and the widest mouths that are believed: parts of the usual width beyond it.
 _WIDTH_SPREAD, _UP_OF_OUT, _BACK_OF_OUT = 0.18, 1.0, 0.87
 _NARROWEST, _WIDEST = -0.3, 0.5
-# Spread of how high corners of the mouth lie beside that, as a part of the distance of the eyes.
+# Spread of the remaining height of the mouth's corners, as a part of the distance of the eyes.
 _MOUTH_HEIGHT_OF_EYES = 0.2
-# Each step is a part of the one before, so what remains after the last is known: it may be a
-# thousandth (0.06 deg, 1 mm at 1 m). 2 steps are usual. Where the noise is a tenth of the face,
-# one try in a hundred is not done after 20.
+# Each step is a part of the one before, so the remainder after the last is known: it may be a
+# thousandth (0.06 deg, 1 mm at 1 m). 2 steps are usual. With noise of a tenth of the face, one fit
+# in a hundred has not converged after 20.
 _REMAINS, _MOST_STEPS = 1e-3, 20
 _SMALL_TURN_RAD = 1e-4
 # Variance of the nose's distance from the middle of the four others, over that of one point.
@@ -82,20 +82,20 @@ class _Sums(NamedTuple):
 
 
 def fitted_face(seen: Points, noise: float) -> FittedFace | None:
-    """Return the most probable face, None where the points settle none.
+    """Return the most probable face, None if the points determine none.
 
     Args:
         seen: right eye, left eye, nose, right and left mouth corner on the plane z = 1.
-        noise: usual error of a point on that plane, beside the part that grows with the face.
+        noise: usual error of a point on that plane, without the part that grows with the face.
     """
     (ax, ay), (bx, by), nose, (cx, cy), (ex, ey) = seen
     eyes = hypot(bx - ax, by - ay)
     height = hypot(0.5 * (cx + ex - ax - bx), 0.5 * (cy + ey - ay - by))
     variance = noise * noise + (_NOISE_OF_EYES * eyes) ** 2
-    # A turned face shows one of its two lengths shortened, so the longer one tells more.
+    # A turn shortens one of the face's two lengths, so the longer one is more reliable.
     away_m = 1.0 / max(eyes / PUPIL_DISTANCE_M, height / EYES_TO_MOUTH_M)
     others = (*seen[:2], *seen[3:])
-    # The nose stands out from the plane of eyes and mouth: where it appears tells the turn.
+    # The nose projects from the plane of eyes and mouth: its image position shows the turn.
     aside = nose[0] - 0.25 * (ax + bx + cx + ex), nose[1] - 0.25 * (ay + by + cy + ey)
     per_rad = _NOSE_OUT_M / away_m
     turn: Vec3 = (
@@ -123,10 +123,10 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
         turn = _turned_on(turn, (w0, w1, w2))
         R = rotation_by(turn)
         x, y, z, length = x + dx, y + dy, z + dz, length + dl
-        if not z > 0.0:  # behind the camera, or no number
+        if not z > 0.0:  # behind the camera, or not finite
             return None
         shift = max(abs(dx), abs(dy), abs(dz)) / away_m
-        # As wide as the mouth is seen, at this pose.
+        # The observed width of the mouth at this pose.
         last, wider = (
             wider,
             (1.0 + wider) * width / _mouth_width(frontal, R, (x, y, z), length) - 1.0,
@@ -141,7 +141,7 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
 
 
 def _width_believed(width: float, variance: float) -> float:
-    """Return the share of a mouth's width beyond the usual one that is believed.
+    """Return the believed excess of a mouth's width over the usual one.
 
     Args:
         width: seen, over the distance of the eyes.
@@ -178,9 +178,9 @@ def _mouth_width(frontal: tuple[Vec3, ...], R: Mat3, p_m: Vec3, length: float) -
 
 
 def turn_sd_rad(away_m: float, noise: float) -> float:
-    """Return the standard deviation of a face's yaw, which is known less well than its pitch.
+    """Return the standard deviation of a face's yaw, which is less certain than its pitch.
 
-    The nose stands out from the plane of eyes and mouth, and where it appears tells the turn.
+    The nose projects from the plane of eyes and mouth, and its image position shows the turn.
 
     Args:
         away_m: distance of the face.
@@ -211,7 +211,7 @@ def rotation_by(turn_rad: Vec3) -> Mat3:
 
 
 def nearest_m(R_camera_face: Mat3, p_camera_m: Vec3, length: float) -> float:
-    """Return how far before the camera the nearest landmark of a face is, metres."""
+    """Return the distance of a face's nearest landmark along the optical axis, metres."""
     x_z, y_z, z_z = R_camera_face[2]
     along = [x * x_z + y * y_z + z * z_z * length for x, y, z in _LANDMARKS_M]
     return p_camera_m[2] + min(along)
@@ -239,7 +239,7 @@ def _sums(
 ) -> _Sums:
     """Return the normal equations at a pose.
 
-    A point P turned by a small w moves by w x P; a row of the equations is how its picture moves.
+    A point P turned by a small w moves by w x P; a row of the equations is the motion of its image.
     Each point has a row of x, of weight k, and one of y, of weight h.
 
     Args:
@@ -306,10 +306,10 @@ def _sums(
 
 
 def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | None:
-    """Return the most probable step, None where the equations have no solution.
+    """Return the most probable step, None if the equations have no solution.
 
-    The steps of x and y are eliminated first: each appears in its own rows alone. What is
-    believed of faces counts by the variance of the points.
+    The steps of x and y are eliminated first: each appears only in its own rows. The prior on faces
+    is weighted by the variance of the points.
     """
     a00, a01, a02, a03, a04, a11, a12, a13, a14, a22, a23, a24, a33, a34, a44 = sums.products
     b0, b1, b2, b3, b4 = sums.errors
@@ -317,7 +317,7 @@ def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | Non
     y0, y1, y2, y3, y4 = sums.to_y
     ex, ey, over_x, over_y = sums.errors_x, sums.errors_y, 1.0 / sums.n_x, 1.0 / sums.n_y
     pitch, yaw, long = variance * _PITCH_INFO, variance * _YAW_INFO, variance * _LENGTH_INFO
-    # Row by row: without x and y, with beliefs, and less the rows that are solved already (LDL^T).
+    # Row by row: without x and y, with the prior, minus the rows solved already (LDL^T).
     fx, fy = x0 * over_x, y0 * over_y
     d0 = a00 + pitch - fx * x0 - fy * y0
     a01, a02 = a01 - fx * x1 - fy * y1, a02 - fx * x2 - fy * y2

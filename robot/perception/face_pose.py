@@ -1,17 +1,17 @@
-"""Five landmarks in an image -> where a face is and how it is turned.
+"""Pose of a face from five landmarks in an image.
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up.
 Camera frame: optical, x right, y down, z forward. Metres; pixels have their centres at
 whole numbers.
 
-Five points that lie nearly in one plane say much about place and roll, and little about
-yaw and pitch; and faces differ, in length and about the mouth most of all: a smile widens it,
-raises its corners and draws them back, which a fixed face would have to explain by a nod of ten
-degrees and more. The pose is therefore the most probable one: reprojection errors weighted by
-what landmarks are usually off by, a mouth as wide as it is seen with corners where a smile so
-wide puts them, their height and the face's length free within what is usual, and a weak belief
-that a face which a camera finds is turned towards it. The search starts from a face that looks
-into the camera, so it ends at the nearer of the two mirror poses of a flat set of points.
+Five points nearly in one plane determine position and roll well, and yaw and pitch poorly. Faces
+also differ, in length and most of all about the mouth: a smile widens it, raises its corners and
+draws them back, which a fixed face could explain only by a nod of ten degrees and more. The pose is
+therefore the most probable one. It combines reprojection errors weighted by usual landmark errors,
+a mouth of the observed width with corners at the positions of such a smile, priors on their height
+and on the face's length, and a weak prior that a detected face is turned towards the camera. The
+search starts from a face that looks into the camera, so it ends at the nearer of the two mirror
+poses of a flat set of points.
 """
 
 from math import cos, isfinite, radians, sqrt
@@ -26,16 +26,16 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.intrinsics import rays as rays_through
 from gazerig.robot.perception.face_fit import Points, fitted_face, nearest_m, turn_sd_rad
 
-# Usual landmark error beside the part that grows with the face.
+# Usual landmark error, without the part that grows with the face.
 _NOISE_PX = 1.0
-# Twice the triangle of eyes and mouth, below which points have run into one.
+# Twice the area of the triangle of eyes and mouth, below which the points have merged.
 _LEAST_AREA_PX2 = 1.0
-# Nothing beyond this angle from the line of sight is taken for a face that is seen.
+# A face turned farther than this from the line of sight is not accepted.
 _MOST_TURNED_RAD = radians(75.0)
 
 
 class FacePose(NamedTuple):
-    """Where a face is and how it is turned.
+    """Position and turn of a face.
 
     p_camera_m:    tip of the nose
     R_camera_face: face axes in the camera frame
@@ -50,7 +50,7 @@ class FacePose(NamedTuple):
 
 
 def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | None:
-    """Return the pose of an adult face, or None where the points show none from its front.
+    """Return the pose of an adult face, or None if the points show no front of a face.
 
     Args:
         landmarks_px: (5, 2) in the order of DetectedFace.
@@ -67,7 +67,7 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
             _seen_from(R_face_camera, rays),
             _NOISE_PX / sqrt(intrinsics.fx_px * intrinsics.fy_px),
         )
-    except (ArithmeticError, ValueError):  # points so far from a face that they settle nothing
+    except (ArithmeticError, ValueError):  # points too far from a face to determine a pose
         return None
     if found is None:
         return None
@@ -83,10 +83,10 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
 
 
 def _front_seen(points: list[list[float]]) -> bool:
-    """Return whether eyes and mouth run round the way they do on a face seen from its front.
+    """Return whether eyes and mouth have the orientation of a face seen from its front.
 
-    The sign of a projected triangle tells exactly which side of its plane is seen; one
-    without any size tells nothing.
+    The sign of a projected triangle's area shows exactly which side of its plane is visible; a
+    degenerate triangle shows neither.
     """
     (ax, ay), (bx, by), (nx, ny), (cx, cy), (dx, dy) = points
     if not isfinite(ax + ay + bx + by + nx + ny + cx + cy + dx + dy):
@@ -104,9 +104,9 @@ def _rays(points: list[list[float]], lens: Intrinsics) -> list[Vec3]:
 
 
 def _facing_camera(rays: list[Vec3]) -> Mat3:
-    """Turn the camera towards the face and roll it so that the eyes lie level: a rotation.
+    """Return the rotation that turns the camera to the face and rolls it until the eyes are level.
 
-    Seen so, poses near "looks at me" are small rotations wherever the face appears.
+    In this view, poses near "looks at me" are small rotations wherever the face appears.
     """
     a, b, c, d, e = rays
     z = unit((a[0] + b[0] + c[0] + d[0] + e[0], a[1] + b[1] + c[1] + d[1] + e[1], 5.0))
@@ -116,7 +116,7 @@ def _facing_camera(rays: list[Vec3]) -> Mat3:
 
 
 def _seen_from(R_face_camera: Mat3, rays: list[Vec3]) -> Points:
-    """Return where rays meet the plane z = 1 of the camera turned towards the face."""
+    """Return the points of rays on the plane z = 1 of the camera turned towards the face."""
     (a, b, c), (d, e, f), (g, h, i) = R_face_camera
     found = []
     for x, y, _ in rays:  # z is 1
@@ -134,7 +134,7 @@ def _face_axes(R: Mat3) -> Mat3:
     """Return a turned face's axes from its turn.
 
     A face that looks straight into a camera has its left at the image's right, its up at the
-    image's up, and what comes out of it comes towards the camera.
+    image's up, and its outward axis points to the camera.
     """
     (a, b, c), (d, e, f), (g, h, i) = R
     return (-c, a, -b), (-f, d, -e), (-i, g, -h)

@@ -1,8 +1,8 @@
-"""What an image shows, located in the camera's axes: by the image and the calibration alone.
+"""Location of an image's contents in the camera's axes, by the image and the calibration alone.
 
-This is done beside the detector, in the camera's process. Across the line of view a place is
-known to about a pixel. Along it, a distance is as good as the camera's depth where it has one
-there, else as what is known of the size of faces.
+It runs next to the detector, in the camera's process. Across the line of view a position is exact
+to about a pixel. Along it, the distance is as good as the camera's depth if the camera measures one
+there, else as good as the spread of face sizes.
 """
 
 from collections.abc import Callable
@@ -39,48 +39,52 @@ Box = tuple[float, float, float, float]
 Reading = tuple[float | None, float, float]
 """Distance along the optical axis (m), its spread (m), and the share of pixels with any."""
 DepthAt = Callable[[NDArray[Any], Box], Reading]
-"""Reads the distance of what a box of pixels shows from a depth image."""
+"""Function that reads the distance of a box of pixels from a depth image."""
 
 _FACE_RADIUS_M = 0.1
-# From the hips of a person to the top of the head as their detector sees it, and how much people
-# and postures differ in it; how well the middle of the head is known. Measured on three people
-# before webcams, by the distance of their eyes: .76 to .87 m, and 2 cm.
+# Length from the hips of a person to the top of the head in the detector's terms, its spread over
+# people and postures, and the error of the head's middle. Measured on three people in front of
+# webcams, by the distance of their eyes: .76 to .87 m, and 2 cm.
 _TRUNK_M, _TRUNK_SPREAD, _HEAD_SD_M = 0.83, 0.15, 0.05
-# From the wrist of an adult to the root of the middle finger, how much people and postures differ
-# in it, and how well its middle is known; a hand.
+# Length from the wrist of an adult to the root of the middle finger, its spread over people and
+# postures, and the error of its middle; radius of a hand.
 _PALM_M, _PALM_SPREAD, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.15, 0.03, 0.07
-# A head beyond the picture is taken to be this part of its width inside: what is seen of the body.
+# A head beyond the image is placed inside it by this part of its width: over the visible body.
 _EDGE = 0.02
-# A face so near to the middle of a person's head, in trunks, is theirs.
+# A face within this distance of the middle of a person's head, in trunk lengths, is theirs.
 _OWN_FACE = 0.25
-# A face printed on a shirt is none: one less sure than this, so many times less than another, whose
-# middle is so far below and aside of the other's, in heights of that.
+# A face printed on a shirt is rejected: its confidence is below this, and below another's divided
+# by this factor, and its middle is within these distances below and aside of the other's, in
+# heights of that one.
 _DOUBTFUL, _SURER, _ON_CHEST, _ASIDE = 0.9, 10.0, (1.0, 3.0), 1.0
 # Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
 _CENTRE_PX, _CENTRE_OF_EYES = 0.4, 0.015
-# Error of its size from frame to frame, the same way. People's eyes themselves lie 6 %
-# nearer or farther apart than usual (Gordon et al., ANSUR): that stays, and no filter helps.
+# Error of its size from frame to frame, in the same units. The eyes of a person are typically 6 %
+# nearer or farther apart than the mean (Gordon et al., ANSUR): this error is constant, and no
+# filter removes it.
 _SIZE_PX, _SIZE_OF_EYES = 0.7, 0.03
 SIZE_SPREAD = 0.06
-# Depth of a face: refused where too few of its pixels have one, or where they belong to
-# more than a face; never better than a part of itself.
+# Depth of a face: rejected if too few of its pixels have one, or if they spread over more than a
+# face; its error is at least a part of itself.
 _LEAST_SHARE, _MOST_SPREAD_M, _LEAST_SD = 0.3, 0.12, 0.01
-# The size of a face, over an adult's, that is believed.
+# Accepted sizes of a face, over an adult's.
 _SMALLEST, _LARGEST = 0.3, 3.0
-# A blob's middle wanders about in it; its flow is off by part of itself and of the search.
+# The middle of a patch wanders within it; its flow has an error in proportion to itself and to the
+# search.
 _MIDDLE_OF_RADIUS, _PLACED_M = 0.3, 0.002
 _FLOW_SHARE, _FLOW_RAD_S, _LOOM_SD_1_S = 0.1, 0.03, 0.5
-# Legs that stride and people who part grow and shrink a patch that comes no nearer; where
-# no distance bears a growth out, it is believed the less.
+# Striding legs and people who part grow and shrink a patch that comes no nearer; a growth that no
+# measured distance confirms gets less weight.
 _SHAPE_1_S = 0.3
-# A patch so many times as high as wide is a person who walks; the head's middle is this part of the
+# A patch this many times as high as wide is a walking person; the head's middle is this part of the
 # height below its upper edge.
 _UPRIGHT, _HEAD_DOWN = 1.4, 1.0 / 14.0
-# Things of a frame that are passed on; of more, the largest and fastest.
+# Largest number of things of a frame that are passed on: the largest and fastest ones.
 _MOST_THINGS = 24
-# A patch so nearly square that so much of its box is full (of a disc's: .79) is compact.
+# A patch is compact if its aspect ratio and the filled share of its box (of a disc's: .79) are
+# above these.
 _LEAST_ASPECT, _LEAST_FILL = 0.87, 0.6
-# A place is all that is known of a face's motion; the fields stand for a velocity's errors.
+# A face has no measured velocity; these fields are a velocity's errors.
 _NO_SPEED_SDS = (0.1, 0.5)
 
 
@@ -88,7 +92,7 @@ _NO_SPEED_SDS = (0.1, 0.5)
 class FrameLocator:
     """Locates faces and things in the camera's axes by one calibration; picklable.
 
-    lens: as measured; field_rad: horizontal field of view, where the lens was not measured
+    lens: as measured; field_rad: horizontal field of view, used without a measured lens
     depth_at: reads depth images; None: distances come from the size of faces
     """
 
@@ -97,16 +101,16 @@ class FrameLocator:
     depth_at: DepthAt | None = depth_roi.depth_at
 
     def __call__(self, found: Detections) -> LocatedFrame:
-        """Return what a frame shows in the camera's axes."""
+        """Return a frame's contents in the camera's axes."""
         return self.locate(found, self.intrinsics(found))
 
     def intrinsics(self, found: Detections) -> Intrinsics:
-        """Return the calibration of a frame: as measured, as the camera says, or by its field."""
+        """Return the calibration of a frame: measured, the camera's own, or by its field."""
         size_px = found.width_px, found.height_px
         return intrinsics_of_lens(self.lens, self.field_rad, *size_px, found.lens)
 
     def fault(self, found: Detections) -> str:
-        """Return why the measured lens is not used for a frame, as one line; "" where it is."""
+        """Return why the measured lens is not used for a frame, as one line; "" if it is used."""
         if self.lens is None:
             return ""
         why = lens_fault(self.lens, found.width_px, found.height_px)
@@ -122,7 +126,7 @@ class FrameLocator:
         return f"the field of view of {degrees(self.field_rad):.0f} deg"
 
     def locate(self, found: Detections, intrinsics: Intrinsics) -> LocatedFrame:
-        """Return what a frame of known intrinsics shows in the camera's axes."""
+        """Return the contents of a frame of known intrinsics in the camera's axes."""
         inside = [
             face
             for face in found.faces
@@ -151,7 +155,7 @@ class FrameLocator:
     def _face(
         self, face: DetectedFace, found: Detections, lens: Intrinsics
     ) -> DetectionInCamera | None:
-        """Locate a face, None where its landmarks show none from its front."""
+        """Locate a face, None if its landmarks show no front of a face."""
         reading = read_mesh(face.mesh, lens) if face.mesh is not None else None
         pose = face_pose(face.landmarks_px, lens) if reading is None else reading.pose
         if pose is None:
@@ -195,7 +199,7 @@ class FrameLocator:
     def _person(
         self, person: DetectedPerson, found: Detections, lens: Intrinsics
     ) -> DetectionInCamera:
-        """Locate the head of a person whose face is not seen, or what is seen nearest to it."""
+        """Locate the head of a person without a visible face, or the visible part nearest to it."""
         (x, y), edge = person.head_px, _EDGE * found.width_px
         at_px = (
             min(max(x, edge), found.width_px - edge),
@@ -212,7 +216,7 @@ class FrameLocator:
         )  # fmt: skip
 
     def _palm(self, palm: DetectedPalm, found: Detections, lens: Intrinsics) -> DetectionInCamera:
-        """Locate a palm, by its size where its depth is not measured."""
+        """Locate a palm, by its size if its depth is not measured."""
         z, sd = sqrt(lens.fx_px * lens.fy_px) * _PALM_M / palm.size_px, _PALM_SPREAD
         depth = self._depth_about(found, palm.centre_px, 0.25 * palm.size_px)
         if depth is not None:
@@ -231,7 +235,7 @@ class FrameLocator:
         return self._depth(found, (x - half_px, y - half_px, side, side))
 
     def _depth(self, found: Detections, box: Box) -> tuple[float, float] | None:
-        """Return the measured depth of what a box shows and its spread, None where it is unsure."""
+        """Return the measured depth in a box and its spread, None if it is uncertain."""
         if found.depth_m is None or self.depth_at is None:
             return None
         z, spread, valid = self.depth_at(found.depth_m, box)
@@ -244,7 +248,7 @@ class FrameLocator:
     ) -> tuple[float, float] | None:
         """Return the measured distance over that from the size, and its relative deviation.
 
-        None where the camera's depth does not tell the distance of this face.
+        None if the camera's depth does not give the distance of this face.
         """
         if found.depth_m is None:
             return None
@@ -254,7 +258,7 @@ class FrameLocator:
         if depth is None:
             return None
         z, spread = depth
-        # Between eyes and mouth the surface lies behind the tip of the nose, the face's place.
+        # Between eyes and mouth the surface is behind the tip of the nose, the face's position.
         behind = float((LANDMARKS_FACE_M @ np.array(pose.R_camera_face).T)[:, 2].mean())
         share = (z - behind) / pose.p_camera_m[2]
         if not _SMALLEST < share < _LARGEST:
@@ -263,13 +267,13 @@ class FrameLocator:
 
 
 def _on_ray(at_px: tuple[float, float], z_m: float, lens: Intrinsics) -> Vec3:
-    """Return the place that a pixel shows so far away along the optical axis."""
+    """Return the position of a pixel at a depth along the optical axis."""
     x, y, z = rays(np.array([at_px]), lens)[0].tolist()
     return scale((x, y, z), z_m)
 
 
 def _lower_face(face: DetectedFace) -> float:
-    """Return how large the lower half of a face is for its eyes; see ``DetectionInCamera``."""
+    """Return the size of a face's lower half over its eyes; see ``DetectionInCamera``."""
     (ax, ay), (bx, by), (x, y), (cx, cy), (dx, dy) = face.landmarks_px.tolist()
     middle_x, middle_y = 0.5 * (ax + bx), 0.5 * (ay + by)
     eyes, mouth = hypot(bx - ax, by - ay), hypot(dx - cx, dy - cy)
@@ -280,14 +284,14 @@ def _lower_face(face: DetectedFace) -> float:
 
 
 def _is_of(person: DetectedPerson, face: DetectedFace) -> bool:
-    """Return whether a face is that of a person."""
+    """Return whether a face belongs to a person."""
     x, y = face.landmarks_px.mean(axis=0).tolist()
     apart = hypot(x - person.head_px[0], y - person.head_px[1])
     return apart < _OWN_FACE * person.trunk_px
 
 
 def _is_on_chest(face: DetectedFace, other: DetectedFace) -> bool:
-    """Return whether an unsure face is where a surer one has its chest."""
+    """Return whether an uncertain face is on the chest of a more certain one."""
     if face.confidence > _DOUBTFUL or 1.0 - face.confidence < _SURER * (1.0 - other.confidence):
         return False
     (x, y, wide, high), (its_x, its_y, its_wide, its_high) = face.box_px, other.box_px
@@ -298,11 +302,11 @@ def _is_on_chest(face: DetectedFace, other: DetectedFace) -> bool:
 
 
 def thing_in_camera(blob: MovingBlob, lens: Intrinsics | None = None) -> DetectionInCamera | None:
-    """Return something that moves with the errors of its place, None where it has no place.
+    """Return a moving thing with the errors of its position, None if it has no position.
 
     Args:
         blob: as detected.
-        lens: of the frame; None: nothing is said about its upper end.
+        lens: of the frame; None: its upper end stays unknown.
     """
     far = norm(blob.p_camera_m)
     if not (isfinite(far) and isfinite(blob.radius_m)):
@@ -340,7 +344,7 @@ def thing_in_camera(blob: MovingBlob, lens: Intrinsics | None = None) -> Detecti
 
 
 def _upper_end(blob: MovingBlob, lens: Intrinsics, far_m: float) -> Vec3 | None:
-    """Return the place of the head if a patch is somebody upright, None if it is not so tall."""
+    """Return the position of the head if a patch is an upright person, else None."""
     if blob.box_px is None:
         return None
     x, y, width, height = blob.box_px
@@ -351,7 +355,7 @@ def _upper_end(blob: MovingBlob, lens: Intrinsics, far_m: float) -> Vec3 | None:
 
 
 def _swept_m(blob: MovingBlob) -> float:
-    """Return how large a thing is with the way it makes in a tenth of a second."""
+    """Return the radius of a thing plus its path in a tenth of a second."""
     return blob.radius_m + (0.1 * norm(blob.v_camera_m_s) if blob.v_camera_m_s else 0.0)
 
 
@@ -367,5 +371,5 @@ def _is_compact(blob: MovingBlob) -> bool:
 
 
 def _finite(vector: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-    """Return a vector, None if it is none or no number."""
+    """Return a vector, None if it is missing or not finite."""
     return vector if vector is not None and isfinite(norm(vector)) else None

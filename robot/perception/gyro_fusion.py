@@ -1,8 +1,8 @@
-"""The camera's orientation by the joints and by its own gyro, each where it is right.
+"""Camera orientation from the joints and from the camera's own gyro, each used for its strength.
 
-The joints know where the camera looks, but not that the table was bumped, nor what happens within
-play and between their readings; the gyro knows every turn, but drifts. A complementary filter
-takes quick turns from the gyro and, over about a second, leans on the joints. Pure.
+The joints give the direction of the camera, but not a bump of the table, nor motion within play and
+between their readings. The gyro measures every turn, but drifts. A complementary filter takes quick
+turns from the gyro and, over about a second, follows the joints. Pure.
 """
 
 from collections.abc import Callable
@@ -14,9 +14,9 @@ from gazerig.gaze.types import Mat3, Vec3
 
 _SETTLE_S = 1.0
 """In this time a difference between gyro and joints falls to a third."""
-# Frames farther apart than this are placed by the joints anew.
+# After a longer gap between frames the joints alone give the orientation.
 _GAP_S = 0.5
-# A larger difference is no bump: the joints count, and if it comes back, the gyro is wrong.
+# A larger difference is no bump: the joints count, and if it recurs, the gyro is wrong.
 _MOST_RAD = radians(15.0)
 _MOST_TIMES, _WITHIN_S = 3, 30.0
 _WITHOUT_S = 60.0
@@ -37,7 +37,7 @@ class GyroFusion:
         self._reported = False
 
     def reset(self) -> None:
-        """Begin with the joints: the camera sits otherwise from now on."""
+        """Restart from the joints, as the camera's mounting has changed."""
         self._before = None
 
     def orientation(self, t_s: float, R_world_camera: Mat3, turn: CameraTurn | None) -> Mat3:
@@ -46,7 +46,7 @@ class GyroFusion:
         Args:
             t_s: time of the exposure.
             R_world_camera: by the joints at that time.
-            turn: by the gyro, None where there is none.
+            turn: by the gyro; None without a gyro.
         """
         if turn is None or t_s < self._without_until_s:
             self._before = None
@@ -60,7 +60,7 @@ class GyroFusion:
     def _turned_on(
         self, t_s: float, before: tuple[float, CameraTurn, Mat3], R_joints: Mat3, turn: CameraTurn
     ) -> Mat3:
-        """Return the last orientation turned on by the gyro and drawn to the joints'."""
+        """Return the last orientation, advanced by the gyro and pulled to the joints'."""
         before_s, before_turn, R_before = before
         step = compose(_transposed(before_turn.R_start_camera), turn.R_start_camera)
         R = compose(R_before, step)
@@ -71,9 +71,9 @@ class GyroFusion:
         return compose(R, turned_by(scale(off, 1.0 - exp((before_s - t_s) / _SETTLE_S))))
 
     def _disagree(self, t_s: float) -> None:
-        """Count how often gyro and joints part; if again and again, do without for a while.
+        """Count disagreements of gyro and joints; after several, ignore the gyro for a while.
 
-        A base that is carried about parts them too, so the gyro is tried again.
+        A base that is carried about causes them too, so the gyro is tried again.
         """
         self._too_far_s = [s for s in self._too_far_s if t_s - s < _WITHIN_S] + [t_s]
         if len(self._too_far_s) < _MOST_TIMES:
@@ -97,7 +97,7 @@ def rotation_vector(R: Mat3) -> Vec3:
 
 
 def turned_by(vector: Vec3) -> Mat3:
-    """Return the rotation about a vector by its length (Rodrigues' formula)."""
+    """Return the rotation about a vector by its length in radians (Rodrigues' formula)."""
     angle = norm(vector)
     if angle < 1e-12:
         return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -2,9 +2,8 @@
 
 A person who walks is detected twice, as a face and as a patch of optical flow. The patch would
 compete with the face, and would often win because it is larger. A patch therefore belongs to the
-person if it is on the head, or is below it and moves along with it. A waving arm moves
-otherwise and remains a body of its own (gazerig.robot.perception.hands), so that a wave draws the
-gaze.
+person if it is on the head, or is below it and moves along with it. A waving arm moves differently
+and remains a body of its own (gazerig.robot.perception.hands), so that a wave attracts the gaze.
 """
 
 from collections.abc import Iterable
@@ -17,7 +16,7 @@ from gazerig.robot.perception.hands import Known
 from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
 
 _HEAD_M, _HALF_WIDTH_M, _BELOW_M, _ABOVE_M = 0.25, 0.35, 1.7, 0.25
-# Beside that in depth, and two standard deviations of it.
+# Tolerance in depth, in addition to two standard deviations.
 _DEEP_M = 0.5
 _ALONG_WITH_M_S, _ALONG_WITH_SHARE = 0.3, 0.5
 
@@ -28,9 +27,9 @@ def without_own_motion(
     before: Iterable[Known],
     p_camera: Vec3,
 ) -> tuple[list[LocalisedDetection], list[LocalisedDetection]]:
-    """Return the faces with the spin of their own motion, and the things that are not theirs.
+    """Return the faces with the spin of their own motion, and the things that belong to no face.
 
-    before: tracked faces, where they are expected now
+    before: tracked faces at their positions expected now
     """
     spins = [0.0] * len(faces)
     known = known_faces(faces, before)
@@ -51,21 +50,21 @@ def without_own_motion(
 def known_faces(faces: list[LocalisedDetection], before: Iterable[Known]) -> list[Known]:
     """Return the faces of a frame with the velocities of their tracks, and those tracks.
 
-    A face that the detector has just missed still owns its body.
+    A face that the detector has just missed still owns its body's motion.
     """
     tracked = list(before)
     return [*[(face.p_world_m, _velocity(face, tracked)) for face in faces], *tracked]
 
 
 def _velocity(face: LocalisedDetection, tracked: list[Known]) -> Vec3 | None:
-    """Return the velocity of the tracked face at a detection's place, None where there is none."""
+    """Return the velocity of the tracked face at a detection's position, None without one."""
     near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
     away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
     return v if away < _HEAD_M else None
 
 
 def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int | None:
-    """Return the index of the face to which a patch belongs, None where it belongs to none."""
+    """Return the index of the face to which a patch belongs, None without one."""
     if thing.kind != UNNAMED:
         return None
     for k, (p_face, v_face) in enumerate(faces):
@@ -83,15 +82,15 @@ def _on_head(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> bool:
 
 
 def _below(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> bool:
-    """Return whether a patch's middle is where the body of a face is."""
+    """Return whether a patch's middle is on the body of a face."""
     off = _off(thing, p_face, p_camera)
     return off is not None and off[0] < _HALF_WIDTH_M and -_BELOW_M < off[1] < _ABOVE_M
 
 
 def _off(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
-    """Return how far aside of and above a face a patch is, None where it is nearer or farther.
+    """Return the offset of a patch from a face, aside and above; None if its depth differs.
 
-    A patch whose distance is only assumed is taken to be as far as the face.
+    A patch whose distance is only assumed is placed at the face's distance.
     """
     far = norm(sub(p_face, p_camera))
     way = sub(thing.p_world_m, p_camera)
@@ -105,7 +104,7 @@ def _off(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> tuple[float
 def _goes_along(
     thing: LocalisedDetection, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3
 ) -> bool:
-    """Return whether a patch moves across the view as the face does; unknown counts as so."""
+    """Return whether a patch moves across the view as the face does; also if unknown."""
     if thing.v_world_m_s is None or v_face is None:
         return True
     way = sub(thing.p_world_m, p_camera)

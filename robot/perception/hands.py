@@ -1,21 +1,21 @@
-"""Hands: what moves otherwise than a person, within their reach, and is shown to be a hand.
+"""Recognition of hands: patches that move relative to a person, within reach, with evidence.
 
 A camera without a hand detector shows a moving arm as one patch of flow. The quarter of it that
-moves fastest is taken to be the hand, as far away as the person's face is, unless the distance was
-measured. A patch is a hand by evidence: it leads to the person's shoulder and is fastest at the
-other end, it reaches in from the side before everybody, it comes at the camera, or the detector of
-palms has found one there. Curtains, trunks and other people's sleeves stay things that move.
+moves fastest is taken as the hand, at the distance of the person's face unless the distance was
+measured. A patch is a hand by evidence: it points to the person's shoulder and is fastest at the
+other end, it reaches in from the side in front of all people, it approaches the camera, or the palm
+detector found a palm there. Curtains, trunks and other people's sleeves remain moving things.
 
-What a hand is called it keeps for as long as the detector's number of it lasts and it moves now and
-then; so a track does not break where a hand turns or passes before the face. What is left of an arm
-that was a hand is one, too. A hand that has come to rest is still there for a while, though flow
-shows nothing that stands still. A palm is there whether it moves or not, from search to search.
+A patch remains a hand while the detector keeps its number and it moves now and then; so a track
+does not break when a hand turns or passes in front of the face. The remainder of an arm that was a
+hand is a hand, too. A hand at rest is kept for a while, although flow shows nothing that is still.
+A palm is kept from search to search, whether it moves or not.
 
-A hand that comes towards the camera, or reaches in from the side near it, is nearer than the person
-it is taken to be of. Where depth is not measured its size tells: what is compact, and not an arm,
-and too large for a hand at the person's distance is as near as makes it a hand's size. An arm that
-comes in at the side of the image, and not from the person's shoulder, is as near as makes it as
-wide as a hand.
+A hand that approaches the camera, or reaches in from the side near it, is nearer than its person.
+Without measured depth the size gives the distance. A compact patch that is no arm and too large for
+a hand at the person's distance is placed so near that it has the size of a hand. An arm that enters
+at the side of the image, and not from the person's shoulder, is placed so near that it is as wide
+as a hand.
 """
 
 from collections.abc import Iterable, Sequence
@@ -30,47 +30,47 @@ from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
 
 HAND = "hand"
 Known = tuple[Vec3, Vec3 | None]
-"""Place of a face in the world, and its velocity where it is known."""
+"""Position of a face in the world, and its velocity, None if unknown."""
 
-# Where hands are, from the face: aside, and above; legs and feet are below.
+# Range of hands about the face: aside, above, and below; legs and feet are lower.
 _REACH_M, _ABOVE_M, _BELOW_M = 0.85, 0.7, 0.8
-# An arm, a hand: as large as this at most (radius of a disc of the same area).
+# Largest arm or hand (radius of a disc of the same area).
 _LARGEST_M = 0.24
-# How much faster than the person across the view: to be taken for a hand, to remain one, and to be
-# taken for one before the head, which moves itself when it turns or nods.
+# Speed across the view relative to the person: to become a hand, to remain one, and to become one
+# in front of the head, which moves itself when it turns or nods.
 _BEGINS_M_S, _STAYS_M_S, _BEFORE_HEAD_M_S = 0.4, 0.2, 1.5
 _HEAD_M = 0.25
 _SHOULDER_ASIDE_M, _SHOULDER_BELOW_M = 0.19, 0.17
 _SAME_M = 0.3
-"""A face so near to where one was a frame ago is the same."""
-# The arm of a person leads to within this of the shoulder, and is no smaller than this (as
-# _LARGEST_M). Of rendered people who wave, point and box 98 % of the arms lead to within .26 m.
+"""Largest motion of a face from frame to frame."""
+# The line of an arm passes the shoulder within this distance, and an arm is no smaller than this
+# (as _LARGEST_M). For rendered people who wave, point and box 98 % of the arms pass within .26 m.
 _ATTACHED_M, _SMALLEST_M = 0.27, 0.04
-# Its end is as fast as all of it, within rounding, and hardly nearer to the shoulder than the
-# middle.
+# Its end is at least as fast as its whole, within rounding, and hardly nearer to the shoulder than
+# its middle.
 _AS_FAST, _AS_FAR_M = 0.95, 0.1
-# A patch is at a palm that is so near to its end or, with its radius, to its middle. Between two
-# searches a palm goes on by the patch's flow, and is there for so long.
+# Distance of a patch's end or, plus its radius, of its middle to its palm; time for which a palm
+# moves on with the patch's flow between two searches; confidence of a certain palm.
 _AT_PALM_M, _PALM_S, _SURE = 0.1, 0.3, 0.7
-# What is as large as a hand and surely grows in the image at this rate comes at the camera: a hand
-# from the first frame on, as nothing else of a person in view comes nearer so fast.
+# A patch of a hand's size that certainly grows in the image at this rate approaches the camera: it
+# is a hand from the first frame on, as no other part of a person in view approaches so fast.
 _COMES_1_S, _SURE_SD = 2.5, 2.0
-# Seen to move so in so many frames within the time for which a rest is bridged.
+# Number of frames with such a motion that make a hand, and the longest rest between them.
 _FRAMES, _RESTS_S = 2, 0.4
-# A hand that was last seen slower than this has come to rest, and is there for so long; what moves
-# so near to it is the hand again.
+# A hand last seen slower than this is at rest, and is kept for this time; a motion within this
+# distance of it is the hand again.
 _AT_REST_M_S, _HELD_S, _AGAIN_M = 0.4, 2.0, 0.3
 _HAND_RADIUS_M = 0.07
-# A hand or fist as flow shows it when it is all that moves, and how many times that size at the
-# person's distance, in how many frames, means that it is nearer: other people's hands are not so
-# much larger.
+# Size of a hand or fist in the flow if nothing else moves; the multiple of that size at the
+# person's distance, and the number of frames, that show that it is nearer: other people's hands are
+# not so much larger.
 _ALONE_M, _TOO_LARGE, _LARGE_FRAMES = 0.065, 1.6, 2
-# Width of a hand; how many times as wide an arm that comes in at the side has to be, in how many
-# frames that is measured, and how far from the person's shoulder the arm has to lead. If its
-# fastest part is so near to its middle, it hardly tells where it leads to, and less far will do.
+# Width of a hand; least width of an arm that enters at the side, in such widths; number of frames
+# in which it is measured; and least distance of its line from the person's shoulder. If its fastest
+# part is this near to its middle, its direction is uncertain, and a smaller distance suffices.
 _WIDE_M, _TOO_WIDE, _WIDE_FRAMES, _ANOTHERS_M = 0.085, 1.4, 3, 0.165
 _SHORT_M, _ANOTHERS_SHORT_M = 0.1, 0.11
-# What is found of that counts by this share of the way in each frame, as in frames without.
+# Gain per frame with which a change of this distance is adopted.
 _NEARER_GAIN = 0.5
 _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
 
@@ -79,12 +79,12 @@ _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
 class _Moving:
     """A patch that may be a hand.
 
-    at_s: when it last moved as one; p_face: of whom it is; frames: in how many it moved so
-    hand: where it was then
-    large: frames in a row in which it was too large for a hand as far away as the person
-    wide: in how many it came in at the side and was too wide for that
+    at_s: last time of a hand's motion; p_face: face of its person; frames: number of frames with it
+    hand: the hand at that time
+    large: successive frames in which it was too large for a hand at the person's distance
+    wide: number of frames in which it entered at the side and was too wide for that
     nearer: its distance over that of the person, by its size or that of the palm
-    palm_s: when a palm was found there
+    palm_s: last time at which a palm was found there
     """
 
     at_s: float
@@ -97,18 +97,19 @@ class _Moving:
     palm_s: float = -inf
 
     def sized(self, thing: LocalisedDetection, arm: "_Arm") -> None:
-        """Update how far away it is by its size.
+        """Update the distance by the size.
 
         Args:
             thing: the patch.
-            arm: the same as far away as the person.
+            arm: the patch at the person's distance.
         """
         if thing.depth_measured:
             return
         radius_m, wide_m = arm.ratio * thing.radius_m, arm.ratio * thing.thickness_m
         if arm.comes_in:
             # The first frames decide. An arm that slows down looks thinner, as less of it moves,
-            # and does not go away; what changed its distance later would seem to come or to go.
+            # but does not recede; a later change of its distance would look like motion along the
+            # view.
             self.wide += 1
             if self.wide <= _WIDE_FRAMES:
                 before = self.nearer if self.wide > 1 else 0.0
@@ -125,14 +126,14 @@ class _Moving:
 
 
 class _Held(NamedTuple):
-    """A hand that does not move, and until when it is taken to be there."""
+    """A hand at rest, and the time until which it is kept."""
 
     hand: LocalisedDetection
     until_s: float
 
 
 class Hands:
-    """Which moving patches are hands of the people in view."""
+    """Recognition of moving patches as hands of the people in view."""
 
     def __init__(self) -> None:
         self._moving: dict[int, _Moving] = {}
@@ -147,14 +148,14 @@ class Hands:
         t_s: float,
         palms: Sequence[LocalisedDetection] | None = None,
     ) -> list[LocalisedDetection]:
-        """Return the things, those that are hands by this name and where the hand is.
+        """Return the things; hands get the kind HAND and the position of the hand.
 
-        Behind them come hands that do not move any more.
+        Hands at rest follow behind them.
 
         Args:
-            things: what moves in a frame.
+            things: moving things of a frame.
             faces: of the people in view.
-            p_camera: from where it was seen.
+            p_camera: position of the camera.
             t_s: when.
             palms: of the nearest person, None in a frame that was not searched for them.
         """
@@ -171,16 +172,16 @@ class Hands:
 
     @property
     def held(self) -> bool:
-        """Return whether there are hands that do not move any more."""
+        """Return whether there are hands at rest."""
         return bool(self._held)
 
     def _nearest(
         self, palms: Sequence[LocalisedDetection], faces: list[Known], p_camera: Vec3
     ) -> list[LocalisedDetection]:
-        """Return palms that are believed, no farther away than the nearest person.
+        """Return the accepted palms, no farther away than the nearest person.
 
-        A hand that is turned aside looks smaller. What is like one on the head, as necks are, or
-        hardly so is believed where a hand was.
+        A hand that is turned aside looks smaller. A palm on the head (often a neck) or of low
+        confidence is accepted only at the position of a recent hand.
         """
         if not palms or not faces:
             return [one for one in palms if one.confidence >= _SURE]
@@ -196,7 +197,7 @@ class Hands:
         return found
 
     def _known(self, thing: LocalisedDetection, p_camera: Vec3) -> bool:
-        """Return whether something is where a hand was just now."""
+        """Return whether something is at the position of a recent hand."""
         hands = [one.hand for one in self._moving.values() if one.frames >= _FRAMES]
         hands += [one.hand for one in self._held.values()]
         return any(_apart(thing, hand, p_camera) < _AGAIN_M for hand in hands)
@@ -204,7 +205,7 @@ class Hands:
     def _hold(
         self, palm: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
     ) -> None:
-        """Take a palm that no patch is at to be there until the next search, as the hand it was."""
+        """Keep a palm without a patch until the next search, under the number of its hand."""
         if any(_is_at(palm, thing, p_camera) for thing in found if thing.kind == HAND):
             return
         mark = next((m for m, o in self._held.items() if _is_at(palm, o.hand, p_camera)), None)
@@ -217,9 +218,9 @@ class Hands:
     def _at_rest(
         self, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
     ) -> list[LocalisedDetection]:
-        """Return the hands that have come to rest and are not seen to move."""
+        """Return the hands at rest that show no motion."""
         marks = {thing.mark for thing in found}
-        # What the detector itself knows as a hand, it would know again.
+        # The detector would recognise its own hands again.
         moving = [thing for thing in found if thing.mark in self._moving]
         self._held = {
             mark: one
@@ -237,7 +238,7 @@ class Hands:
         t_s: float,
         palms: list[LocalisedDetection],
     ) -> LocalisedDetection:
-        """Return a patch as what it is; the palm that it is at is taken from those given."""
+        """Return a patch with its kind; its palm, if any, is removed from those given."""
         if thing.kind != UNNAMED or thing.mark is None or not faces:
             return thing
         known = self._moving.get(thing.mark)
@@ -248,7 +249,7 @@ class Hands:
         speed = _across(arm, v_face, p_camera)
         named = known is not None and known.frames >= _FRAMES
         begins = _BEFORE_HEAD_M_S if hypot(*_off(arm.tip_m, p_face)) < _HEAD_M else _BEGINS_M_S
-        # Legs and parts of the trunk of somebody who walks are no faster than that, seen from them.
+        # Relative to a walking person, their legs and parts of the trunk are no faster than that.
         comes = arm.ratio * thing.radius_m >= _ALONE_M and _comes(thing, p_camera)
         palm = next((one for one in palms if _is_at(one, thing, p_camera)), None)
         if (
@@ -268,7 +269,7 @@ class Hands:
             if palm is not None:
                 hand = replace(hand, p_world_m=palm.p_world_m, along_sd_m=palm.along_sd_m)
             elif t_s - known.palm_s <= _PALM_S:
-                # The end of an arm is the hand less surely than the palm that was seen.
+                # The palm that was seen is more certain than the end of the arm.
                 way = scale(hand.v_world_m_s or (0.0, 0.0, 0.0), t_s - before_s)
                 hand = replace(hand, p_world_m=add(known.hand.p_world_m, way))
             known.hand = hand
@@ -281,8 +282,8 @@ class Hands:
         if speed >= _AT_REST_M_S:
             self._held.pop(thing.mark, None)
             return known.hand
-        # A patch that hardly moves may be all of the person: the hand is where it moved last, and
-        # is there no longer than a palm, where palms are searched.
+        # A patch that hardly moves may be the whole person: the hand stays at its last motion, and
+        # is kept no longer than a palm if palms are searched.
         until_s = t_s + _HELD_S
         if t_s - self._searched_s < _HELD_S:
             until_s = max(known.at_s, known.palm_s) + _PALM_S
@@ -294,7 +295,7 @@ class Hands:
         return known.hand if known.at_s == t_s else still
 
     def _is_arm(self, thing: LocalisedDetection, arm: "_Arm", p_camera: Vec3) -> bool:
-        """Return whether a patch is an arm, at a palm, or what is left of a hand of just now."""
+        """Return whether a patch is an arm, at a palm, or the remainder of a recent hand."""
         if arm.attached or arm.comes_in:
             return True
         small = arm.ratio * thing.radius_m <= _TOO_LARGE * _ALONE_M
@@ -317,13 +318,13 @@ def _is_at(palm: LocalisedDetection, thing: LocalisedDetection, p_camera: Vec3) 
 
 
 def _apart(thing: LocalisedDetection, hand: LocalisedDetection, p_camera: Vec3) -> float:
-    """Return how far something is from a hand, as far away as that unless it was measured."""
+    """Return the distance of a thing from a hand; unmeasured depth counts as the hand's."""
     place = _place_as_far(thing, _level(hand.p_world_m, p_camera), p_camera)
     return norm(sub(place, hand.p_world_m))
 
 
 def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3) -> bool:
-    """Return whether a hand moves where one has come to rest, as far as that is known."""
+    """Return whether a hand moves at the position of one at rest, as far as known."""
     for one in found:
         if one.kind == HAND:
             nearer, farther = sorted((hand, one), key=lambda each: _level(each.p_world_m, p_camera))
@@ -335,11 +336,12 @@ def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection], p_ca
 class _Arm(NamedTuple):
     """A patch as the arm of a person.
 
-    face: of the person; tip_m, tip_m_s: place and velocity of its fastest part, as far away as they
-    ratio: how many metres there one of the patch is
-    shoulder_m: how far from the person's shoulder it leads
-    attached: it is one by its size, leads to the shoulder and is fastest at the other end
-    comes_in: it comes in at the side, not from the shoulder, too wide for an arm as far away
+    face: of the person; tip_m, tip_m_s: position and velocity of its fastest part, at their
+        distance
+    ratio: length at that distance per length of the patch
+    shoulder_m: distance of its line from the person's shoulder
+    attached: it has an arm's size, points to the shoulder and is fastest at the other end
+    comes_in: it enters at the side, not from the shoulder, too wide for an arm at that distance
     """
 
     face: Known
@@ -354,9 +356,9 @@ class _Arm(NamedTuple):
 def _owned(
     thing: LocalisedDetection, faces: list[Known], p_camera: Vec3, last: Vec3 | None
 ) -> _Arm | None:
-    """Return a patch as an arm of the person whose it may be, None where it is nobody's.
+    """Return a patch as an arm of its likely person, None without one.
 
-    last: face of the owner in the frame before; they remain it
+    last: face of the owner in the frame before, who remains the owner
     """
     p_tip = thing.p_world_m if thing.fastest_m is None else thing.fastest_m
     v_tip = thing.v_world_m_s if thing.fastest_m_s is None else thing.fastest_m_s
@@ -373,7 +375,7 @@ def _owned(
         large = ratio * thing.radius_m >= _LARGEST_M
         if large or not -_BELOW_M < up < _ABOVE_M or hypot(aside, up) >= _REACH_M:
             continue
-        # The arm goes on from the hand over the patch's middle to the shoulder.
+        # The arm continues from the hand through the patch's middle to the shoulder.
         middle = add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
         shoulder_m = _off_shoulder(sub(scale(middle, 2.0), tip), face[0])
         off_m = shoulder_m
@@ -397,7 +399,7 @@ def _owned(
 
 
 def _off_shoulder(p_m: Vec3, p_face: Vec3) -> float:
-    """Return how far from the shoulder on its side of a person a place is."""
+    """Return the distance of a position from the person's shoulder on its side."""
     aside, up = _off(p_m, p_face)
     return hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
 
@@ -409,9 +411,9 @@ def _as_hand(
 
     Args:
         thing: the patch.
-        arm: the same as far away as the person.
-        nearer: its distance over that.
-        p_camera: from where it was seen.
+        arm: the patch at the person's distance.
+        nearer: its distance over the person's.
+        p_camera: position of the camera.
     """
     return replace(
         thing,
@@ -428,7 +430,7 @@ def _as_hand(
 
 
 def _place_as_far(thing: LocalisedDetection, far_m: float, p_camera: Vec3) -> Vec3:
-    """Return the place of something whose distance was not measured if it is so far away."""
+    """Return the position of a thing at a distance, unless its own was measured."""
     if thing.depth_measured:
         return thing.p_world_m
     ratio = far_m / _level(thing.p_world_m, p_camera)
@@ -436,18 +438,18 @@ def _place_as_far(thing: LocalisedDetection, far_m: float, p_camera: Vec3) -> Ve
 
 
 def _level(p_m: Vec3, p_camera: Vec3) -> float:
-    """Return how far away a place is, its height apart."""
+    """Return the horizontal distance of a position."""
     return max(hypot(p_m[0] - p_camera[0], p_m[1] - p_camera[1]), 1e-6)
 
 
 def _off(p_m: Vec3, p_face: Vec3) -> tuple[float, float]:
-    """Return how far aside of and above a face a place is."""
+    """Return the offset of a position from a face: aside and above."""
     x, y, z = sub(p_m, p_face)
     return hypot(x, y), z
 
 
 def _comes(thing: LocalisedDetection, p_camera: Vec3) -> bool:
-    """Return whether a patch surely grows as what comes at the camera does."""
+    """Return whether a patch certainly grows as fast as an approaching hand."""
     if thing.v_world_m_s is None:
         return False
     way = sub(thing.p_world_m, p_camera)
@@ -456,7 +458,7 @@ def _comes(thing: LocalisedDetection, p_camera: Vec3) -> bool:
 
 
 def _across(arm: _Arm, v_face: Vec3, p_camera: Vec3) -> float:
-    """Return how fast a hand moves across the view, seen from the person."""
+    """Return the speed of a hand across the view, relative to the person."""
     view = unit(sub(arm.tip_m, p_camera))
     other = sub(arm.tip_m_s, v_face)
     return norm(sub(other, scale(view, dot(other, view))))

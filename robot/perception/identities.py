@@ -1,4 +1,4 @@
-"""Identities: people who were confused while they were hidden get their numbers back.
+"""Correction of identities: people who were confused while hidden get their numbers back.
 
 The colours of their clothes, learned over many frames, distinguish them.
 """
@@ -11,7 +11,7 @@ from gazerig.robot.perception.data_association import FORBIDDEN, assign
 from gazerig.robot.perception.track import KnownClothes, LocalisedDetection, Track
 
 # Number of frames with clothes after which they identify a person; number below which the person
-# may be one who was here before.
+# may be a person who was here before.
 _PROVED, _OWN = 3, 60
 # A person who is not seen for longer than this is lost.
 _LOST_S = 0.25
@@ -49,7 +49,7 @@ def settle(
         clothing, known = detections[j].clothing, track.clothes
         if clothing is None or not track.is_person:
             continue
-        new = max(own, 0.0) if known.frames < _OWN else own  # may be one who was here before
+        new = max(own, 0.0) if known.frames < _OWN else own  # may be a person who was here before
         if new < _FITS:
             known.confirmed = min(known.confirmed + clothing.share, _MOST_CONFIRMED)
         elif own > _MISFITS:
@@ -102,11 +102,11 @@ def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> No
             one.id = number
             one.clothes = KnownClothes(colours, frames, lost_sight=one.clothes.lost_sight)
             if one.seen_s < one.at_s and frames < _OWN:
-                tracks.remove(one)  # nobody new came: that was this one
+                tracks.remove(one)  # no new person came: it was this one
 
 
 def _reachable(one: Track, other: Track, params: TrackParams) -> bool:
-    """Return whether a person out of sight can have come to where a track is."""
+    """Return whether a person out of sight can have reached the position of a track."""
     known = 2.0 * sqrt(one.filter.along.p + other.filter.along.p)
     gone = params.gate_speed_m_s * (other.at_s - other.seen_s)
     reach = params.gate_m * max(1.0, one.filter.range_m) + gone + known

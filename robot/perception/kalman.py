@@ -1,19 +1,19 @@
-"""One thing's position and velocity through time: a Kalman filter of direction and log range.
+"""Kalman filter of one thing's position and velocity, in direction and log range.
 
-A camera knows where something is across its view to millimetres, and along it often to no better
-than a metre. In x, y, z that is a long thin ellipsoid, and two of them that point a little apart
-meet nearer to the camera than either of their middles: a linear filter would take every jump of the
-direction for an approach. Direction and logarithm of the range keep the two apart, and nothing gets
-behind the camera (modified spherical coordinates: Aidala and Hammel, "Utilization of modified
-polar coordinates for bearings-only tracking", 1983).
+A camera measures positions across its view to millimetres, and along it often to a metre only. In
+x, y, z that is a long thin ellipsoid, and two of them in slightly different directions meet nearer
+to the camera than either of their middles: a linear filter would take every jump of the direction
+for an approach. Direction and logarithm of the range separate the two, and no estimate gets behind
+the camera (modified spherical coordinates: Aidala and Hammel, "Utilization of modified polar
+coordinates for bearings-only tracking", 1983).
 
 Position and velocity are kept in the world, in metres and seconds; variances are kept across the
 view, the same for all directions there, and along it. They turn with the direction and grow with
 the range.
 
-What moves changes its velocity at random: little most of the time, and much at once when a person
-starts or stops. One noise for both is either nervous or late, so there are two, and an innovation
-too large for the quiet one brings the lively one in (Bar-Shalom, Li & Kirubarajan, "Estimation with
+A velocity changes at random: little most of the time, and abruptly when a person starts or stops.
+One noise for both is either nervous or late, so there are two, and an innovation too large for the
+quiet one raises the noise towards the lively one (Bar-Shalom, Li & Kirubarajan, "Estimation with
 Applications to Tracking and Navigation", 11.6).
 """
 
@@ -23,28 +23,27 @@ from typing import NamedTuple
 from gazerig.gaze.angles import add, dot, norm, scale, sub
 from gazerig.gaze.types import Vec3
 
-# Accelerations are taken to last this long, which makes the noise one of the time and not
-# of the rate of frames.
+# Assumed duration of an acceleration, which makes the noise independent of the frame rate.
 _ACCELERATION_LASTS_S = 0.1
-# Squared Mahalanobis distance that one innovation of 3 numbers in 100 exceeds by chance.
+# Squared Mahalanobis distance that 1 of 100 innovations (of 3 numbers) exceeds by chance.
 _SURPRISING = 11.3
-# The squared distance of an ordinary one: its mean is 3.
+# Squared distance of an ordinary innovation: its mean is 3.
 _EXPECTED = 4.0
-# What has changed its speed goes on changing it for about so long.
+# Usual duration of a change of speed.
 _CHANGES_FOR_S = 0.5
-# What is not seen moves on, but less and less surely: people stop.
+# An unseen thing moves on, but less and less certainly: people stop.
 _STOPS_WITHIN_S = 1.0
-# And they turn and hurry, which is not seen either: noise of the acceleration.
+# They also turn and hurry unseen: noise of the acceleration.
 _UNSEEN_M_S2 = 1.0
 NEAREST_M = 0.05
-"""Nothing is believed nearer to the camera."""
-# Range changes in one step by no larger factor than e to this.
+"""Least distance of a thing from the camera."""
+# Largest change of the range's logarithm in one step.
 _LARGEST_LOG_STEP = 3.0
 _TINY_RAD = 1e-12
 
 
 class ProcessNoise(NamedTuple):
-    """Standard deviations of the acceleration, m/s2: quiet, and when something happens."""
+    """Standard deviations of the acceleration, m/s2: ordinary, and at a change of motion."""
 
     quiet_m_s2: float
     lively_m_s2: float
@@ -59,11 +58,11 @@ class Variances(NamedTuple):
 
 
 class Offset(NamedTuple):
-    """How far a place is from where a track is expected, as seen from the camera.
+    """Offset of a position from the expected one of a track, as seen from the camera.
 
-    across_m: from the one line of view to the other, tangent to the sphere about the camera
+    across_m: from one line of view to the other, tangent to the sphere about the camera
     along_m: logarithm of the ratio of the ranges, times the range of the track
-    ratio: range of the track over that of the place: how many metres at the track one is there
+    ratio: range of the track over that of the position
     """
 
     across_m: Vec3
@@ -76,7 +75,7 @@ class TrackFilter:
 
     Args:
         p_m: first position.
-        p_camera_m: where it was seen from.
+        p_camera_m: position of the camera.
         sds_m: its standard deviations across and along the view.
         speed_sd_m_s: standard deviation of the velocity, which begins at 0.
         noise: of the process.
@@ -116,14 +115,14 @@ class TrackFilter:
     def predict(
         self, dt_s: float, seen: bool = True, range_known: bool = True, level: bool = False
     ) -> None:
-        """Go on by a time; what is not seen slows down.
+        """Advance by a time; an unseen thing slows down.
 
         Args:
             dt_s: the time.
             seen: whether it was seen in the last frame.
-            range_known: False where its range is only assumed: what crosses the view then
-                stays as far away, as neither a straight line nor its speed is known.
-            level: whether it stays as high while it is not seen, as people do.
+            range_known: False if its range is only assumed: a thing that crosses the view then
+                stays at its range, as neither its line nor its speed is known.
+            level: whether it keeps its height while unseen, as people do.
         """
         if dt_s <= 0.0:
             return
@@ -144,7 +143,7 @@ class TrackFilter:
         self.along = _wandered(_gone_on(self.along, dt_s, kept), accel, dt_s)
 
     def look_from(self, p_camera_m: Vec3) -> None:
-        """See it from another place: what was along the view is partly across it now."""
+        """Move the camera: part of the component along the view is now across it."""
         if p_camera_m == self._camera:
             return
         before, self._camera = self.view, p_camera_m
@@ -157,7 +156,7 @@ class TrackFilter:
             self.along = _mixed(b, a, turned)
 
     def offset(self, p_m: Vec3) -> Offset:
-        """Return how far a place is from where this is expected."""
+        """Return the offset of a position from the expected one."""
         view, range_m = sight(p_m, self._camera)
         ahead = dot(view, self.view)
         aside = sub(view, scale(self.view, ahead))
@@ -187,10 +186,10 @@ class TrackFilter:
         self._move(scale(e, of_p), along_p * l_)
 
     def _adapt(self, aside: float, deep: float, across: float, along: float) -> None:
-        """Raise the noise until an innovation is no surprise.
+        """Raise the noise until an innovation is plausible.
 
-        No higher than that: the largest noise at once would take a small change of speed for a
-        large one, and the velocity would overshoot by as much as it had lagged behind.
+        No higher than that: the full noise would take a small change of speed for a large one, and
+        the velocity would overshoot by as much as it had lagged behind.
 
         Args:
             aside: the innovation across the view, squared.
@@ -198,8 +197,8 @@ class TrackFilter:
             across: variance of what was measured across the view.
             along: the same along it.
         """
-        # Whatever happened may have happened at any time since the last look: a place
-        # that was long unseen and is off tells less of the velocity of now.
+        # The change may have happened at any time since the last detection: after a long gap, an
+        # offset says less about the present velocity.
         accel, most = max(self._accel_m_s2, self._noise.quiet_m_s2), self._noise.lively_m_s2
         while True:
             before, accel = accel, min(2.0 * accel, most)
@@ -215,10 +214,10 @@ class TrackFilter:
     def correct_velocity(
         self, p_m: Vec3, v_m_s: Vec3, across_sd_m_s: float, along_sd_m_s: float
     ) -> None:
-        """Update with a velocity that was measured at a place, and its standard deviations.
+        """Update with a velocity that was measured at a position, and its standard deviations.
 
-        What a camera sees is an angle and a share of the size a second: farther away or nearer
-        than where it was measured, that is another speed.
+        A camera measures an angle and a relative growth per second: at another range than the
+        measured one they are another speed.
         """
         view, range_m = sight(p_m, self._camera)
         at = self.range_m / range_m
@@ -236,24 +235,24 @@ class TrackFilter:
         self._move(scale(off, of_p), along_p * deep)
 
     def slow_to(self, most_m_s: float) -> None:
-        """Believe no higher speed than this."""
+        """Limit the speed."""
         speed = norm(self.v_m_s)
         if speed > most_m_s:
             self.v_m_s = scale(self.v_m_s, most_m_s / speed)
 
     def _place(self, p_m: Vec3) -> None:
-        """Put it at a place, which is no nearer than things are believed."""
+        """Set the position, no nearer than the least distance."""
         way = sub(p_m, self._camera)
         ahead = dot(way, self.view)
         if ahead < NEAREST_M and norm(sub(way, scale(self.view, ahead))) < NEAREST_M:
-            p_m = add(self._camera, scale(self.view, NEAREST_M))  # not through the camera
+            p_m = add(self._camera, scale(self.view, NEAREST_M))  # not behind the camera
         self.p_m = p_m
         self.view, self.range_m = sight(p_m, self._camera)
 
     def _move(self, across_m: Vec3, along_m: float) -> None:
-        """Move it on the sphere about the camera and along its view; all it has turns along.
+        """Move it on the sphere about the camera and along its view; its velocity turns with it.
 
-        A velocity across the view stays an angle a second and one along it a share of the range.
+        A velocity across the view stays an angle per second, and one along it a share of the range.
         """
         here, range_m = self.view, self.range_m
         aside = norm(across_m)
@@ -277,7 +276,7 @@ class TrackFilter:
 
 
 def sight(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
-    """Return the direction in which a place is seen, and its distance, never below the nearest."""
+    """Return the direction of a position and its distance, at least NEAREST_M."""
     x, y, z = p_m[0] - p_camera_m[0], p_m[1] - p_camera_m[1], p_m[2] - p_camera_m[2]
     far = sqrt(x * x + y * y + z * z)
     if far == 0.0:
@@ -286,20 +285,20 @@ def sight(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
 
 
 def _gone_on(C: Variances, dt_s: float, kept: float) -> Variances:
-    """Return a covariance after a time in which a share of the velocity is kept."""
+    """Return a covariance after a time, with the share of the velocity that is kept."""
     p, pv, v = C
     both = pv + dt_s * v
     return Variances(p + dt_s * (pv + both), kept * both, kept * kept * v)
 
 
 def _wandered(C: Variances, accel_m_s2: float, dt_s: float) -> Variances:
-    """Return a covariance with what random acceleration makes in a time."""
+    """Return a covariance plus the effect of random acceleration in a time."""
     v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
     return Variances(C.p + v * dt_s * dt_s / 3.0, C.pv + v * dt_s / 2.0, C.v + v)
 
 
 def _mixed(C: Variances, D: Variances, share: float) -> Variances:
-    """Return a covariance a share of the way to another."""
+    """Return a covariance interpolated towards another by a share."""
     kept = 1.0 - share
     return Variances(kept * C.p + share * D.p, kept * C.pv + share * D.pv, kept * C.v + share * D.v)
 

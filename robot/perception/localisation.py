@@ -1,4 +1,4 @@
-"""Detections in the camera's axes, placed in the world by where the camera was."""
+"""Transformation of detections from the camera's axes to the world."""
 
 from gazerig.drivers.types import DetectionInCamera
 from gazerig.gaze.angles import add, compose, rotate
@@ -7,7 +7,7 @@ from gazerig.robot.perception.track import LocalisedDetection
 
 
 def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> LocalisedDetection:
-    """Return a detection placed in the world by the camera's pose at the exposure."""
+    """Return a detection in the world, by the camera's pose at the exposure."""
     R, v, gaze = found.R_camera_face, found.v_camera_m_s, found.gaze_camera
     fastest, faster, upper = found.fastest_m, found.fastest_m_s, found.upper_m
     return LocalisedDetection(

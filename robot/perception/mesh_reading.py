@@ -1,10 +1,10 @@
-"""What a dense mesh of a face tells: pose, gaze of the eyes, lids and lips.
+"""Reading of a dense face mesh: pose, gaze of the eyes, lids and lips.
 
-The pose is the similarity that brings a rigid part of a usual face (nose, forehead, temples,
-cheekbones; neither mouth nor jaw nor brows) onto the mesh, whose third coordinate the network
-guesses in the scale of the other two; it is one towards the line of sight. The position follows
-from the points in the image. An eye looks from the centre of its ball, which lies behind the
-middle between the corners of the lids, through the middle of the iris.
+The pose is the similarity that maps a rigid part of an average face (nose, forehead, temples,
+cheekbones; neither mouth nor jaw nor brows) onto the mesh. The network estimates the mesh's third
+coordinate in the scale of the other two, along the line of sight. The position follows from the
+points in the image. An eye looks from the centre of its ball, which is behind the middle between
+the corners of the lids, through the middle of the iris.
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up.
 """
@@ -25,8 +25,8 @@ from gazerig.robot.perception.face_pose import FacePose
 EYES_SHUT = 0.35
 """Eye opening below which eyes count as shut."""
 
-# Points of the mesh on a usual face, mm: out of the face and up of those in its middle; out, aside
-# and up of pairs (right, left). The mean of the meshes of two people, as the network sees them.
+# Points of the mesh on an average face, mm: out of the face and up for those in its middle; out,
+# aside and up for pairs (right, left). Mean of the network's meshes of two people.
 _MIDDLE_MM = {
     168: (-20.9, 37.6), 6: (-16.7, 30.5), 197: (-11.9, 23.9), 195: (-6.6, 17.8), 5: (-1.1, 11.3),
     4: (1.1, 3.1), 1: (-1.1, -3.1), 2: (-16.8, -8.9), 10: (-24.1, 81.9), 151: (-21.1, 67.5),
@@ -51,10 +51,10 @@ _LIPS, _FOREHEAD, _CHIN, _HEIGHT_M = (13, 14), 10, 152, 0.152
 # Lids along the contour of an eye: middle of the upper and of the lower one.
 _UPPER_LID, _LOWER_LID, _CORNERS = 12, 4, (0, 8)
 
-# Centre of the eyeball behind the middle between the corners; from it to the iris; and how much
-# of the place of the corners is taken from the image, the rest from the pose.
+# Distance of the eyeball's centre behind the middle between the corners; distance from it to the
+# iris; and weight of the corners' positions in the image, the rest from the pose.
 _BALL_BEHIND_M, _IRIS_FROM_BALL_M, _SEEN_SHARE = 0.007, 0.0105, 0.75
-# Gap between the lids as the network gives it of eyes that are shut, and open as usual.
+# Gap between the lids in the network's mesh, for shut eyes and for usually open ones.
 _LIDS_SHUT_M, _LIDS_OPEN_M = 0.0043, 0.0088
 # Usual error of a turn, and of a point in pixels, which grows with the turn's share of the face.
 _TURN_SD_RAD, _POINT_PX, _DEEP_M = radians(3.0), 0.7, 0.03
@@ -63,10 +63,10 @@ _LONGEST = 1.35
 
 
 class MeshReading(NamedTuple):
-    """What a mesh tells.
+    """Contents of a mesh.
 
-    gaze_camera: unit vector along which the eyes look, camera frame; None where the irises are
-        not seen or the eyes are shut
+    gaze_camera: unit vector of the eyes' gaze, camera frame; None if the irises are not visible or
+        the eyes are shut
     """
 
     pose: FacePose
@@ -75,7 +75,7 @@ class MeshReading(NamedTuple):
 
 
 def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
-    """Return what a mesh tells, None where its points are no face seen from its front."""
+    """Return the contents of a mesh, None if its points show no front of a face."""
     points = mesh.points.astype(np.float64)
     if points.shape != (468, 3) or not np.isfinite(points).all():
         return None
@@ -105,7 +105,7 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
 
 
 def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
-    """Return the rotation of a face whose points are seen along rays, towards its middle.
+    """Return the rotation of a face from the rays of its points, about the ray of its middle.
 
     Args:
         rays: (n, 3) through the points; z along the line of sight.
@@ -118,7 +118,7 @@ def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
 
 
 def _rotation(face: Floats, seen: Floats) -> Floats | None:
-    """Return the rotation of the similarity that brings a face onto points (Kabsch)."""
+    """Return the rotation of the similarity that maps a face onto points (Kabsch)."""
     a, b = face - face.mean(axis=0), seen - seen.mean(axis=0)
     u, _, vt = np.linalg.svd(a.T @ b)
     flip = float(np.sign(np.linalg.det(vt.T @ u.T)))
@@ -133,7 +133,7 @@ def _towards(ray: Floats) -> Floats:
 
 
 def _position(R: Floats, seen: Floats) -> Floats | None:
-    """Return the place of a face of known turn whose points appear along rays, by least squares."""
+    """Return the position of a face of known turn from the rays of its points, by least squares."""
     turned = _RIGID_M @ R.T
     u, v = seen[:, 0], seen[:, 1]
     one, none = np.ones_like(u), np.zeros_like(u)
@@ -144,12 +144,12 @@ def _position(R: Floats, seen: Floats) -> Floats | None:
 
 
 def _gap_m(points: Floats, pair: tuple[int, int], apart: float) -> float:
-    """Return the distance of two points, where the eyes are an adult's distance apart."""
+    """Return the distance of two points, scaled to an adult's distance of the eyes, metres."""
     return float(np.linalg.norm(points[pair[0]] - points[pair[1]])) / apart * PUPIL_DISTANCE_M
 
 
 def _eye_opening(lids_px: NDArray[np.float32], apart: float) -> float:
-    """Return how far the eyes are open, 1 as usual, by the contours of the lids.
+    """Return the opening of the eyes over the usual one, by the contours of the lids.
 
     The points of the mesh itself hardly follow the lids.
     """
@@ -160,7 +160,7 @@ def _eye_opening(lids_px: NDArray[np.float32], apart: float) -> float:
 
 
 def _gaze(mesh: FaceMesh, R: Floats, p: Floats, intrinsics: Intrinsics) -> Vec3 | None:
-    """Return where both eyes look; the one that is seen wider counts more."""
+    """Return the gaze of both eyes; the eye that appears wider has more weight."""
     if mesh.irises_px is None or mesh.lids_px is None:
         return None
     corners = mesh.lids_px[:, list(_CORNERS)].astype(np.float64)

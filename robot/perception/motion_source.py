@@ -1,4 +1,4 @@
-"""What moves in an image, the camera's own turn taken out by where the head was."""
+"""Motion detection in images, compensated for the camera's turn by the head's pose."""
 
 from gazerig.drivers.camera.frame_analysis import Motion
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
@@ -14,11 +14,11 @@ class MotionSource:
     """Finds what moves from one frame to the next.
 
     Args:
-        params: of the detection.
-        lens: for frames that do not bring their own lens.
+        params: parameters of the detection.
+        lens: for frames without a lens of their own.
         field_rad: horizontal field of view, likewise.
         turns: rotation of a camera that turns with the head; None: it is not measured, and the
-            image alone tells whether the camera stands.
+            image alone shows whether the camera is still.
     """
 
     def __init__(
@@ -28,7 +28,7 @@ class MotionSource:
         field_rad: float,
         turns: PoseBuffer | None,
     ) -> None:
-        # Here, with OpenCV: the control loop's process only tells another to make one.
+        # Imported here, with OpenCV: the control loop's process only has another process make one.
         from gazerig.drivers.vision.motion.detector import MotionDetector
 
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
@@ -37,14 +37,14 @@ class MotionSource:
         self._detector = MotionDetector(params)
 
     def retune(self, params: MotionParams, lens: LensParams | None, field_rad: float) -> None:
-        """Use new parameters from the next frame on; what is tracked stays."""
+        """Use new parameters from the next frame on; tracks stay."""
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
         self._detector.retune(params)
         if not params.enabled:
             self._detector.forget()
 
     def __call__(self, shot: Shot) -> tuple[MovingBlob, ...]:
-        """Find what has moved since the frame before; nothing while not enabled."""
+        """Find motion since the frame before; empty while not enabled."""
         if not self._enabled:
             return ()
         height, width = shot.image.shape[:2]
@@ -53,7 +53,7 @@ class MotionSource:
         return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
 
     def _turned(self, shot: Shot) -> Floats | None:
-        """Return R_now_before by the camera's gyro, else by the joints; None where unknown."""
+        """Return R_now_before by the camera's gyro, else by the joints; None if unknown."""
         before, self._before_turn = self._before_turn, shot.turn
         before_s = self._detector.before_s
         if before_s is None:
@@ -66,7 +66,7 @@ class MotionSource:
 def motion_finder(
     params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseBuffer | None
 ) -> Motion:
-    """Return what finds motion, for the process that will look at the frames."""
+    """Return the motion detector, for the process that receives the frames."""
     return MotionSource(params, lens, field_rad, turns)
 
 

@@ -1,8 +1,8 @@
-"""The robot's own head and neck in its camera's view: known by the kinematics, not looked at.
+"""The robot's own head and neck in its camera's view: known by the kinematics, and ignored.
 
-A camera on the base sees the head turn, a camera on the head may see parts of it; both are patches
-that move by themselves. What is seen in a direction in which a part of the head is in the way is
-that part, unless its distance was measured and is another.
+A camera on the base sees the head turn, and a camera on the head may see parts of it; both appear
+as independently moving patches. A patch in the direction of a part of the head is that part, unless
+its distance was measured and differs.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
 OWN = "own"
 
 OwnParts = Callable[[Mat3, Vec3], Sequence[Capsule]]
-"""Gives the parts of the head in the world for its pose."""
+"""Function that returns the parts of the head in the world for its pose."""
 
 _MARGIN_M = 0.05
 
@@ -24,13 +24,12 @@ _MARGIN_M = 0.05
 def own_named(
     things: list[LocalisedDetection], parts: Sequence[Capsule], p_camera: Vec3
 ) -> list[LocalisedDetection]:
-    """Return the things, those that are the robot's own body by this name.
+    """Return the things, with the kind OWN for those that are the robot's own body.
 
     Args:
-        things: what moves in a frame.
-        parts: of the head, where they were at its exposure. One that the camera is inside of is
-            not seen.
-        p_camera: from where it was seen.
+        things: moving things of a frame.
+        parts: of the head, at its exposure. A part around the camera is not visible.
+        p_camera: position of the camera.
     """
     seen = [part for part in parts if not part.holds(p_camera)]
     if not seen:
@@ -44,7 +43,7 @@ def own_named(
 
 
 def _is(thing: LocalisedDetection, part: Capsule, p_camera: Vec3) -> bool:
-    """Return whether a part of the head is what is seen."""
+    """Return whether a thing is a part of the head."""
     way = sub(thing.p_world_m, p_camera)
     hit_m = part.hit_m(p_camera, unit(way))
     if hit_m is None:

@@ -1,8 +1,8 @@
-"""From detections and the head's pose at their capture time to a percept in the world.
+"""Perception: detections and the head's pose at their capture time give a percept in the world.
 
-Faces and moving things are localised in the world by the camera's pose when the frame was
-taken, not by its present one (localisation); motion of a person's own body is separated from
-that of other things (hand_ownership); a tracker gives all of them identities and velocities.
+Faces and moving things are localised in the world by the camera's pose at the exposure, not by its
+present one (localisation). Motion of a person's own body is separated from that of other things
+(hand_ownership). A tracker gives all of them identities and velocities.
 """
 
 from collections.abc import Mapping
@@ -41,9 +41,9 @@ from gazerig.robot.perception.own_body import OwnParts, own_named
 from gazerig.robot.perception.track import UNNAMED, LocalisedDetection, Track
 from gazerig.robot.perception.tracker import Tracker
 
-# The head's turn at a capture is taken over so long before and after it.
+# The head's turn at a capture is taken over this time before and after it.
 _HALF_TURN_S = 0.015
-# A camera that turned farther between two frames shows another part of the same room.
+# A camera that turned farther than this between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
 
 
@@ -51,7 +51,7 @@ class Perception:
     """Makes one percept of each new frame.
 
     Args:
-        mount: where the camera sits.
+        mount: position and orientation of the camera.
         horizontal_field_deg: its field of view.
         tracker: tracks people and things.
         parts_face_m: measured positions of one person's face parts in the face frame, instead of
@@ -59,7 +59,7 @@ class Perception:
         lens: as calibrated, used for frames of the aspect ratio at which it was calibrated.
         depth_at: reads depth images; without it, distances come from the size of faces.
         gyro: places frames by the camera's own gyro as well; None: by the joints alone.
-        own_parts: where the robot's own head and neck are; None: they are things as others.
+        own_parts: positions of the robot's own head and neck; None: they are things like others.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Perception:
         parts_face_m: Mapping[str, Vec3] | None,
         lens: LensParams | None,
     ) -> None:
-        """Change field of view, parts and lens, from the next frame on; the camera may sit anew."""
+        """Change field of view, parts and lens from the next frame; the mount may change too."""
         if self._gyro is not None:
             self._gyro.reset()
         own = parts_face_m or {}
@@ -158,8 +158,8 @@ class Perception:
     def _located(self, found: Detections) -> LocatedFrame:
         """Return a frame's contents in the camera's axes.
 
-        The camera's process has located them. A camera of another package need not, and a frame
-        that was under way while the lens was changed was located by the lens of before.
+        The camera's process has located them. A camera of another package need not do so, and a
+        frame in transit during a change of the lens was located by the former lens.
         """
         intrinsics = self._locator.intrinsics(found)
         located = found.located
@@ -172,11 +172,11 @@ class Perception:
     def _is_cut(self, scene: int, axis: Vec3) -> bool:
         """Return whether a frame shows another scene although the camera was hardly turned.
 
-        After a camera's process was started again it does so wherever the camera looks.
+        A restarted camera process always counts as another scene.
 
         Args:
-            scene: as counted from the images.
-            axis: where the camera looks, in the world.
+            scene: number of the scene, counted from the images.
+            axis: optical axis of the camera, in the world.
         """
         before, self._scene = self._scene, (scene, axis)
         if before is None or before[0] == scene:
@@ -185,7 +185,7 @@ class Perception:
         return restarted or dot(before[1], axis) > _COS_SAME_VIEW
 
     def _known(self, t_s: float) -> list[Known]:
-        """Return where the faces of the last frame are expected now."""
+        """Return the expected positions of the last frame's faces."""
         return [
             (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
             for t in self._tracks
@@ -193,7 +193,7 @@ class Perception:
         ]
 
     def _note_residual(self, t_s: float, poses: PoseHistory) -> None:
-        """Record where things seem to be while the head turns; evaluated where it turns."""
+        """Record the apparent positions of things; they are evaluated while the head turns."""
         if not self._mount.on_head:
             return
         before, after = poses.angles(t_s - _HALF_TURN_S), poses.angles(t_s + _HALF_TURN_S)
@@ -220,7 +220,7 @@ class Perception:
         eyes = _eyes(track)
         gaze = found.gaze_world if eyes is None else eyes.gaze_world
         off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))
-        # A blink takes no look away.
+        # A blink does not end a look.
         blinks = eyes is not None and eyes.opening < EYES_SHUT
         if track.seen_s == track.at_s and not blinks:
             track.looks_at_head = looks_at_head(
@@ -251,7 +251,7 @@ class Perception:
     def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:
         """Return the eight parts of a face in the world.
 
-        A measured part is where it was measured; a canonical one is stretched with the face.
+        A measured part keeps its measured position; a canonical one is stretched with the face.
         """
         (a, b, c), (d, e, f), (g, h, i) = R
         px, py, pz = p
@@ -272,7 +272,7 @@ class Perception:
 
 
 def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) -> bool:
-    """Return whether a place appears in a picture; who has left it is not seen, only remembered."""
+    """Return whether a position is inside the image; people who left it are only remembered."""
     if not p_camera_m[2] > 0.0:
         return False
     x, y = project([p_camera_m], lens)[0].tolist()
@@ -280,7 +280,7 @@ def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) ->
 
 
 def _at_head(thing: LocalisedDetection) -> LocalisedDetection:
-    """Return a patch that may be somebody who walks where their head is: not at the feet."""
+    """Return a patch that may be a walking person at the position of the head, not at the feet."""
     if thing.kind != UNNAMED or thing.upper_m is None:
         return thing
     return replace(thing, p_world_m=thing.upper_m)
@@ -289,8 +289,8 @@ def _at_head(thing: LocalisedDetection) -> LocalisedDetection:
 def _deviations(track: Track) -> tuple[float, float]:
     """Return how well a face's position is known, across and along the view.
 
-    The filter knows of what changes from frame to frame; that this person's face is
-    not of the usual size is the same in all of them.
+    The filter covers errors that change from frame to frame; the unknown size of this person's face
+    is a constant error.
     """
     across, along = track.filter.across.p, track.filter.along.p
     unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * track.filter.range_m
@@ -298,7 +298,7 @@ def _deviations(track: Track) -> tuple[float, float]:
 
 
 def _eyes(track: Track) -> SeenEyes | None:
-    """Update what mouth and eyes of a face do; return the eyes, None where they are not known."""
+    """Update mouth and eyes of a face; return the eyes, None if unknown."""
     signs, t_s = track.detection.signs, track.at_s
     if signs is None:
         return None
@@ -310,7 +310,7 @@ def _eyes(track: Track) -> SeenEyes | None:
 
 
 def _bodies(tracks: tuple[Track, ...]) -> Bodies:
-    """List faces and moving things alike; a spin seen in the image is about the view line."""
+    """Return faces and moving things as bodies; a spin in the image is about the view line."""
     if not tracks:
         return Bodies(pv_cov=np.zeros((0, 6, 6)))
     numbers: list[float] = []

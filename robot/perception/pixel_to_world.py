@@ -1,4 +1,4 @@
-"""A pixel of a camera frame -> the point of the world that is seen there."""
+"""Conversion of a pixel of a camera frame to a point in the world."""
 
 from collections.abc import Callable
 from math import hypot, radians
@@ -14,20 +14,20 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 
 NEAR_RAD = 0.12
-"""A pixel within 7 deg of a person means something as far away as they are."""
+"""A pixel within this angle (7 deg) of a person gets the person's distance."""
 USUAL_M = 1.5
-"""How far away a thing counts as where none is known: across a desk and a step more."""
+"""Assumed distance of an unknown thing: across a desk and a step more."""
 
-_PATCH = 0.03  # of the frame's width, the square whose depth is read
+_PATCH = 0.03  # side of the square whose depth is read, over the frame's width
 
 
 class PixelToWorld:
-    """Places pixels by the lens, the camera's mount and the head's pose at the exposure.
+    """Locates pixels by the lens, the camera's mount and the head's pose at the exposure.
 
     Args:
-        mount: where the camera sits on the head.
-        poses: where the head was when.
-        camera: returns the lens as it is believed now.
+        mount: position and orientation of the camera on the head.
+        poses: history of the head's pose.
+        camera: returns the present lens.
     """
 
     def __init__(
@@ -47,9 +47,10 @@ class PixelToWorld:
 
         Args:
             pixel: (x, y) from the centre of the upper left one, x right, y down.
-            found: the newest frame, whose size and lens count.
-            percept: what it showed, for the distance of a pixel beside a person.
-            distance_m: from the camera; None: the depth measured there, or that of what is near.
+            found: the newest frame, whose size and lens are used.
+            percept: its percept, for the distance of a pixel next to a person.
+            distance_m: from the camera; None: the measured depth there, or that of a near person or
+                thing.
             captured_s: exposure of the frame with the pixel; None: the newest frame.
         """
         newest = captured_s is None or captured_s == found.captured_s
@@ -73,11 +74,11 @@ class PixelToWorld:
 
 
 def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: Vec3) -> float:
-    """Return how far away what is at a pixel counts as: as far as what is seen there.
+    """Return the distance of a pixel: that of the person or thing seen there.
 
     Args:
-        percept: what was seen.
-        p_world_m: where the camera is.
+        percept: of the frame.
+        p_world_m: position of the camera.
         direction_world: unit vector through the pixel.
     """
     near, best = USUAL_M, NEAR_RAD
@@ -94,7 +95,7 @@ def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: V
 
 
 def _depth_m(found: Detections, pixel: tuple[float, float]) -> float | None:
-    """Return the measured depth about a pixel of the camera frame, None where there is none."""
+    """Return the measured depth about a pixel of the camera frame, None without one."""
     if found.depth_m is None:
         return None
     height, width = found.depth_m.shape[:2]

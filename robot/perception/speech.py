@@ -1,21 +1,21 @@
-"""Whether a person speaks: from how the gap between the lips goes up and down.
+"""Detection of speech from the motion of the gap between the lips.
 
 Speech opens and closes the mouth three to six times a second; a smile, a yawn and a mouth that
-stays open do not. A person speaks while the gap has crossed its own mean several times lately, each
-time by more than the mesh is usually off by.
+stays open do not. A person speaks while the gap has recently crossed its own mean several times,
+each time by more than the usual error of the mesh.
 """
 
 from dataclasses import dataclass, replace
 from typing import Self
 
-# Time constant of the mean; least distance from it that counts; crossings within a window that
-# make speech; no crossing for so long ends it.
+# Time constant of the mean; least distance from it that counts; crossings within a window that make
+# speech; time without a crossing that ends it.
 _MEAN_S, _LEAST_M, _WINDOW_S, _CROSSINGS = 0.6, 0.0012, 1.5, 4
 
 
 @dataclass(frozen=True, slots=True)
 class Speech:
-    """How a mouth has moved lately; a value.
+    """Recent motion of a mouth; a value.
 
     mean_m: running mean of the gap, None before the first; above: the side of it that was last
     crossed to; crossed_s: times of the last crossings; at_s: of the last gap
@@ -27,7 +27,7 @@ class Speech:
     at_s: float = 0.0
 
     def seen(self, gap_m: float, t_s: float) -> Self:
-        """Return it after another frame."""
+        """Return the motion after another frame."""
         if self.mean_m is None:
             return replace(self, mean_m=gap_m, at_s=t_s)
         share = min(1.0, max(0.0, t_s - self.at_s) / _MEAN_S)
@@ -39,7 +39,7 @@ class Speech:
         return replace(self, mean_m=mean_m, above=not self.above, crossed_s=crossed, at_s=t_s)
 
     def speaks(self, t_s: float) -> bool:
-        """Return whether it moves as of a speaking person."""
+        """Return whether it moves like the mouth of a speaking person."""
         return len(self.crossed_s) == _CROSSINGS and t_s - self.crossed_s[0] <= _WINDOW_S
 
 

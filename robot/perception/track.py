@@ -1,4 +1,4 @@
-"""What tracking is about: a detection in the world, one person or thing, and a person's clothes."""
+"""Data of tracking: a detection in the world, one person or thing, and a person's clothes."""
 
 from dataclasses import dataclass, field
 from math import inf, sqrt
@@ -12,16 +12,16 @@ from gazerig.robot.perception.kalman import TrackFilter
 from gazerig.robot.perception.speech import NO_SPEECH, Speech
 
 FACE = "face"
-"""What people are called, also while their face is not seen."""
+"""Kind of people, also while their face is not visible."""
 UNNAMED = "thing"
-"""What a moving patch is called whose kind is not known; a named one is always itself."""
-# Gain with which the colours of clothes are learned, and gain if they do not fit.
+"""Kind of a moving patch that is not recognised; a patch of another kind keeps it."""
+# Gain with which the colours of clothes are learned, and gain if they do not match.
 _COLOURS_GAIN, _UNFIT_GAIN = 0.15, 0.005
-# Inner product of colours that are much alike.
+# Inner product of colours above which they are similar.
 _LIKE = 0.9
 # A person who was not seen for longer than this was out of sight.
 _GAP_S = 0.12
-# The lower half of a face in one frame is about so uncertain, as a part.
+# Relative standard deviation of the lower half of a face in one frame.
 _SHAPE_SD = 0.1
 
 
@@ -32,7 +32,7 @@ class KnownClothes:
     colours: their mean, as in ``Clothing``
     frames: number of frames with clothes; a frame that shows a part counts as that part
     confirmed: number of frames in which they fitted since the person was out of sight
-    lost_sight: whether the person was out of sight, and they were not confirmed since
+    lost_sight: whether the person was out of sight and the clothes are unconfirmed since
     doubts: by the number of another person, how much better that person's clothes fit, as a cost
     """
 
@@ -48,7 +48,7 @@ class KnownClothes:
             self.confirmed, self.lost_sight = 0.0, True
 
     def learn(self, clothing: Clothing | None) -> None:
-        """Learn how the person is dressed, the slower the less of it is seen."""
+        """Learn the clothes, the slower the less of them is visible."""
         if clothing is None:
             return
         self.frames += clothing.share
@@ -66,28 +66,28 @@ class KnownClothes:
 
 @dataclass(slots=True)
 class LocalisedDetection:
-    """One thing as one frame shows it, placed in the world.
+    """Detection of one thing in one frame, in the world.
 
     R_world_face: axes of a face, None of anything else and of a person whose face is not seen
     face_length: of a face, in lengths of the canonical one
-    depth_measured: whether the distance was measured by the camera; else a face's is from
-        its size and a thing's is assumed
+    depth_measured: whether the camera measured the distance; else a face's comes from its size and
+        a thing's is assumed
     across_sd_m, along_sd_m: standard deviations of the place, across and along the view
-    v_world_m_s: velocity as measured in the image, None where only the place is known;
+    v_world_m_s: velocity measured in the image, None if only the position is known;
         across_sd_m_s, along_sd_m_s: its standard deviations
-    size_depth: of a face, its distance if it were of an adult's size, over the distance
-        measured; None where the camera measured none
-    mark: the detector's own number of it, None where it gives none
+    size_depth: of a face, its distance at an adult's size over the measured distance; None without
+        a measured distance
+    mark: the detector's own number of it, None without one
     turn_sd_rad: of a face, standard deviation of its turn
-    gaze_world: of a face, direction of the gaze of the eyes, None where it is unknown
-    fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part
-    signs: of a face, what eyes and mouth do, None where they are not found
-    upper_m: of what moves and is upright, place of its upper end, where a person's head is
-    compact: of what moves, whether its patch is about as wide as high and full, as a fist's or a
-        hand's alone is and an arm's is not
-    thickness_m: of what moves, diameter of the largest disc within its patch, as far away as its
-        place; from_side: the patch goes on beyond the left or right edge of the image
-    clothing: of a person, colours of the clothes, None where they are not seen
+    gaze_world: of a face, direction of the gaze of the eyes, None if unknown
+    fastest_m, fastest_m_s: of a moving thing, position and velocity of its fastest part
+    signs: of a face, state of eyes and mouth, None if not found
+    upper_m: of an upright moving thing, position of its upper end, the head of a person
+    compact: of a moving thing, whether its patch is about as wide as high and full, like that of a
+        fist or a hand alone and unlike that of an arm
+    thickness_m: of a moving thing, diameter of the largest disc within its patch, at its distance;
+        from_side: the patch goes on beyond the left or right edge of the image
+    clothing: of a person, colours of the clothes, None if not visible
     box_m, lower_face: of a face, as in ``DetectionInCamera``
     """
 
@@ -126,19 +126,19 @@ class Track:
 
     R_world_face: axes of a face; None of anything else, and while the person's face is not seen
     seen_s, at_s: capture times of its last detection and of its place
-    frames: in how many it was detected
+    frames: number of frames in which it was detected
     faced_s: of a person, capture time of the last detection of the face
-    face_size: of a face, its size over an adult's, learned where the camera measures depth
+    face_size: of a face, its size over an adult's, learned if the camera measures depth
     depth_s: capture time of the last measured distance, None before the first
-    looks_at_head: of a face, whether the person looked at the head in its last frame; None where
-        that was too uncertain
-    speech: of a face, how its mouth has moved lately
-    eyes: of a face, what its eyes did when they were seen last
-    clothes: of a person, as they usually are seen
-    box_m, lower_face: as of a detection, of the face as it usually is; bare: in how many frames
-        they were seen; lower_var: its variance from frame to frame, as a part of it
-    covered: for how many frames the lower half of the face has been covered; covered_s: capture
-        time of the last of them; cover_share: by which its distance is multiplied since
+    looks_at_head: of a face, whether the person looked at the head in its last frame; None if that
+        was too uncertain
+    speech: of a face, recent motion of the mouth
+    eyes: of a face, last seen state of the eyes
+    clothes: of a person, as learned
+    box_m, lower_face: as of a detection, usual values of the face; bare: number of frames with
+        them; lower_var: relative variance from frame to frame
+    covered: number of frames with a covered lower half of the face; covered_s: capture time of the
+        last of them; cover_share: factor of its distance since
     """
 
     id: int
@@ -178,7 +178,7 @@ class Track:
     def depth_from(self) -> str:
         """Return the source of its distance: "camera", "face size" or "assumed".
 
-        That of a person whose face is not seen is from the size of the body.
+        Without a visible face it is the size of the body.
         """
         if self.detection.depth_measured:
             return "camera"

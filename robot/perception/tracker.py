@@ -1,9 +1,9 @@
-"""Tracking: identities, positions and velocities of what is seen, from frame to frame.
+"""Tracking: identities, positions and velocities of people and things, from frame to frame.
 
-World frame, metres. Every detection brings its own uncertainty, which along the line of
-view may be many times that across it; a pair of track and detection is judged by the
-distance in these terms, all pairs together (data_association), and the track is updated with
-the detection by a Kalman filter of direction and range (kalman).
+World frame, metres. Every detection has its own uncertainty, which along the line of view may be
+many times that across it. All pairs of track and detection are weighed together by the distance in
+these terms (data_association), and a Kalman filter of direction and range (kalman) updates each
+track with its detection.
 """
 
 from math import inf, sqrt
@@ -26,18 +26,18 @@ from gazerig.robot.perception.track import FACE, UNNAMED, LocalisedDetection, Tr
 
 _FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
 _PROVED = 3
-# Below this part of its usual measure the lower half of a face is covered, if that is so many
-# standard deviations of a frame below too.
+# The lower half of a face is covered if it is below this part of its usual size, and by this number
+# of standard deviations of a frame.
 _COVERED, _COVERED_SDS = 0.8, 4.0
-# It must have been seen bare in so many frames, and is learned so fast. What a cover does to the
-# distance is up to this factor, and is learned so fast, at first faster.
+# Number of bare frames needed before, and gain of learning the usual size. Largest factor of a
+# cover on the distance, and its gain of learning, at first higher.
 _BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 8, 0.03, 1.5, 0.03
-# Points that are guessed jump: a face is covered for so long after it was seen to be.
+# Guessed points jump: a face counts as covered for this time after the last covered frame.
 _COVERED_S = 0.3
 
 
 class Tracker:
-    """Keeps identities and velocities of faces and moving things."""
+    """Tracker of faces and moving things: identities and velocities."""
 
     def __init__(self, params: TrackParams) -> None:
         self._tracks: list[Track] = []
@@ -55,12 +55,12 @@ class Tracker:
             track.filter.retune(self._of_faces if track.is_person else self._of_things)
 
     def forget(self) -> None:
-        """End all identities: another scene is shown. Numbers are not used again."""
+        """End all identities, as the scene has changed. Numbers are not used again."""
         self._tracks = []
 
     @property
     def params(self) -> TrackParams:
-        """Return the parameters in force."""
+        """Return the present parameters."""
         return self._params
 
     def step(
@@ -86,7 +86,7 @@ class Tracker:
         renamed = {
             found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
         }
-        # What is known at last to be a hand is no newcomer: it keeps the number that it had.
+        # A thing recognised later as a hand is no newcomer: it keeps its number.
         ids = {t.detection.mark: t.id for t in self._tracks if _became_another(t, renamed)}
         for j, detection in enumerate(detections):
             if j not in taken:
@@ -102,22 +102,22 @@ class Tracker:
         return tuple([t for t in self._tracks if t_s - t.seen_s <= self._coasts_s(t)])
 
     def shows_face(self, track: Track) -> bool:
-        """Return whether the face of a person was seen a short while ago."""
+        """Return whether the face of a person was seen recently."""
         coast_s = self._params.coast_ms / 1e3
         return track.R_world_face is not None and track.at_s - track.faced_s <= coast_s
 
     def _coasts_s(self, track: Track) -> float:
-        """Return how long a track without a detection is still reported."""
+        """Return the time for which a track without a detection is still reported."""
         by_body = track.is_person and track.seen_s > track.faced_s and track.frames > 1
         return (self._params.coast_person_ms if by_body else self._params.coast_ms) / 1e3
 
     def _kept_s(self, track: Track) -> float:
-        """Return how long a track is kept without a detection."""
+        """Return the time for which a track is kept without a detection."""
         par = self._params
         return max(par.forget_ms / 1e3, par.remember_face_s if track.is_person else 0.0)
 
     def _remembered(self, track: Track) -> bool:
-        """Return whether a track is so long out of sight that it is taken to stay where it was."""
+        """Return whether a track is out of sight for a long time, so that it is assumed to stay."""
         return track.at_s - track.seen_s > self._params.forget_ms / 1e3
 
     def _costs(self, detections: list[LocalisedDetection], p_camera: Vec3) -> list[list[float]]:
@@ -164,7 +164,7 @@ class Tracker:
         return pair_costs(tracks, rows, self._params, self._worn)
 
     def _moved_m(self, track: Track) -> float:
-        """Return how much farther a track may be from its expected place for every time unseen."""
+        """Return the extra distance that a track may have from its expected position if unseen."""
         if self._remembered(track):
             return 0.0
         return self._params.gate_speed_m_s * (track.at_s - track.seen_s)
@@ -212,7 +212,7 @@ class Tracker:
         track.clothes.learn(detection.clothing)
         R = detection.R_world_face
         if R is None and self.shows_face(track):
-            return  # the face was missed in this frame
+            return  # the detector missed the face in this frame
         gain = self._params.shape_gain
         if R is None:
             track.R_world_face = track.looks_at_head = None
@@ -228,7 +228,7 @@ class Tracker:
         track.detection = detection
 
     def _learn_size(self, track: Track, detection: LocalisedDetection, gain: float) -> None:
-        """Learn how large a face is where its distance is known otherwise."""
+        """Learn the size of a face whose distance is measured."""
         if detection.size_depth is None:
             return
         gain = 1.0 if track.depth_s is None else gain
@@ -237,10 +237,9 @@ class Tracker:
 
 
 def _is_covered(track: Track, found: LocalisedDetection) -> bool:
-    """Return whether the lower half of a face is covered, as by a hand, and its size misleads.
+    """Return whether the lower half of a face is covered, as by a hand, so that its size misleads.
 
-    A network puts the points it does not see nearer to those it sees: the face seems to be farther
-    away.
+    The network places hidden points nearer to the visible ones: the face seems to be farther away.
     """
     if found.depth_measured or track.bare < _BARE or not found.lower_face > 0.0:
         return False
@@ -252,9 +251,9 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
 
 
 def _held(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) -> Vec3:
-    """Return the place of a face that is covered: as far away as it was, but for how it has moved.
+    """Return the position of a covered face: at its last distance, corrected for its motion since.
 
-    Half of that is told by its points and half by its box, whose error is the opposite one.
+    Half of the correction comes from its points and half from its box, whose error is opposite.
     """
     measured = sub(place, p_camera)
     share = sqrt(track.box_m / found.box_m)
@@ -266,7 +265,7 @@ def _held(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) 
 
 
 def _learn_shape(track: Track, found: LocalisedDetection) -> None:
-    """Learn what the box and the lower half of a face measure while nothing covers it."""
+    """Learn the sizes of the box and the lower half of a face while nothing covers it."""
     if not (found.box_m > 0.0 and found.lower_face > 0.0):
         return
     track.bare += 1
@@ -280,7 +279,7 @@ def _learn_shape(track: Track, found: LocalisedDetection) -> None:
 
 
 def _became_another(track: Track, renamed: set[int]) -> bool:
-    """Return whether the detector's number of a thing is now that of something known."""
+    """Return whether the detector's number of a thing now belongs to a known thing."""
     return track.detection.kind == UNNAMED and track.detection.mark in renamed
 
 
@@ -309,7 +308,7 @@ def sized(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
 
 
 def blended(A: Mat3, B: Mat3, share: float) -> Mat3:
-    """Return a rotation a share of the way from A to B (columns blended, made square again)."""
+    """Return the rotation at a share of the path from A to B (columns blended, orthonormalised)."""
     x = unit(_column(A, B, 0, share))
     z = _column(A, B, 2, share)
     y = unit(cross(z, x))
