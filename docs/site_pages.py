@@ -43,7 +43,7 @@ FIRST = (
         "hardware",
         "raspberry-pi",
     ),
-    *("bringup", "tuning", "lab", "gestures", "world", "study", "plugins"),
+    *("bringup", "tuning", "lab", "gestures", "world", "study", "stop", "plugins", "add-a-panel"),
 )
 """Pages and folders at the head of the navigation, in this order; all others follow by name."""
 

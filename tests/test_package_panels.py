@@ -1,11 +1,12 @@
-"""Packages add panels to the page; one that fails shows why, and the page goes on."""
+"""Panels of one file, ours and those of packages; one that fails shows why, the page continues."""
 
 from pathlib import Path
 
 from outside_package import install, on_path
 from test_page_figures import looking
 
-from gazerig.robot.dashboard.panels.package_panels import PackagePanels
+from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
+from gazerig.robot.dashboard.panels.package_panels import PagePanels, own_panels
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 
 CODE = """
@@ -31,14 +32,26 @@ def test_panels_of_packages_are_drawn_and_failures_named(tmp_path: Path) -> None
     install(tmp_path, "counter", {"gazerig.page_panel": NAMES}, {"counter": CODE})
     with on_path(tmp_path):
         widgets = Widgets()
-        panels = PackagePanels(widgets.panel("watch"))
+        panels = PagePanels(widgets.panel("watch"))
         panels.begin()
         for _ in range(3):
             panels.update(looking(0.0))
-        panels.draw()
+        panels.draw(0)
         shown = " ".join(contents(widgets))
         assert "<p>3</p>" in shown and "RuntimeError: no bulb" in shown
         assert "is no subclass of PagePanel" in shown
         panels.begin()
-        panels.draw()
+        panels.draw(0)
         assert "<p>0</p>" in " ".join(contents(widgets))
+
+
+def test_panels_of_this_folder_are_found_and_drawn_when_they_are_due() -> None:
+    assert list(own_panels()) == [Timeline]
+    widgets = Widgets()
+    panels = PagePanels(widgets.panel("watch"))
+    panels.begin()
+    panels.update(looking(0.0))
+    panels.draw(Timeline.period - 1)
+    assert not any(contents(widgets))
+    panels.draw(Timeline.period)
+    assert f"the last {STRIP_S:.0f} seconds: looked at" in "".join(contents(widgets))

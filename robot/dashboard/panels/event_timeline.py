@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from gazerig.gaze.types import PART_NAMES
+from gazerig.robot.dashboard.panels.package_panels import PagePanel
 from gazerig.robot.dashboard.widgets.html import (
     LEVELS,
     LINE_PX,
@@ -38,8 +39,13 @@ class _Stretch(NamedTuple):
     kind: str
 
 
-class Timeline:
-    """Gathers what the strip shows."""
+class Timeline(PagePanel):
+    """Strip of the last half minute."""
+
+    title = "the last 30 seconds"
+    order = 3.0
+    is_open = True
+    period = 8
 
     def __init__(self) -> None:
         self._rows: dict[str, deque[_Stretch]] = {

@@ -1,6 +1,15 @@
-"""Panels that packages add to the page, by entry points of the group ``gazerig.page_panel``."""
+"""Panels of the drawer Watch that are one file each.
 
+A panel is a subclass of ``PagePanel``, in a module of this folder or behind an entry point of the
+group ``gazerig.page_panel``.
+"""
+
+import inspect
+import pkgutil
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
 
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import PAGE_PANEL, describe_error, registrations
@@ -9,49 +18,71 @@ from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Html
 from gazerig.robot.model.types import Snapshot
 
-_LAST = 8.0
-"""Order of these sections: after ours."""
-
 
 class PagePanel(ABC):
-    """A section of the page's drawer Watch; an entry point names a subclass.
+    """A section of the page's drawer Watch.
 
-    It is made without arguments in the page's process, and again when a run starts again.
+    The page's process constructs it without arguments, and again when a run starts again.
 
     Attributes:
-        title: of the section.
+        title: Title of the section.
+        order: Position in the drawer; sections with a higher number are lower.
+        is_open: Whether the section is unfolded at first.
+        period: Frames of the page between two drawings; the page has at most 25 a second.
     """
 
     title = ""
+    order = 8.0
+    is_open = False
+    period = 25
 
     @abstractmethod
     def update(self, snapshot: Snapshot) -> None:
-        """Add a snapshot of the rig; called with each, also with those that nobody sees."""
+        """Add a snapshot of the rig; called with every snapshot, also while no browser is open."""
 
     @abstractmethod
     def drawing(self) -> str:
-        """Return the section as HTML, without scripts; called about once a second."""
+        """Return the section as HTML without scripts; called once in ``period`` frames."""
 
 
-class PackagePanels:
-    """The panels of all packages, made by ``begin``; one that fails shows why and is dropped."""
+def own_panels() -> Iterator[type[PagePanel]]:
+    """Return the panels of this folder."""
+    package = __name__.rpartition(".")[0]
+    for found in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        module = import_module(f"{package}.{found.name}")
+        for part in vars(module).values():
+            ours = inspect.isclass(part) and part.__module__ == module.__name__
+            if ours and issubclass(part, PagePanel) and not inspect.isabstract(part):
+                yield part
+
+
+class PagePanels:
+    """All panels of the drawer Watch; ``begin`` constructs them.
+
+    A panel that raises shows the reason and is dropped.
+    """
 
     def __init__(self, place: Container) -> None:
         self._shown: list[tuple[type[PagePanel], Html]] = []
+        self._panels: dict[Html, PagePanel] = {}
+        for part in own_panels():
+            self._add(part, part.title, place)
         for one in registrations(PAGE_PANEL):
             try:
                 part = one.load()
                 if not (isinstance(part, type) and issubclass(part, PagePanel)):
                     raise PluginError(f"{one.label} is no subclass of PagePanel")
             except PluginError as error:
-                place.section(one.name, order=_LAST).html(note(str(error)))
-                continue
-            section = place.section(part.title or one.name, is_open=False, order=_LAST)
-            self._shown.append((part, section.html()))
-        self._panels: dict[Html, PagePanel] = {}
+                place.section(one.name, order=PagePanel.order).html(note(str(error)))
+            else:
+                self._add(part, part.title or one.name, place)
+
+    def _add(self, part: type[PagePanel], title: str, place: Container) -> None:
+        section = place.section(title, is_open=part.is_open, order=part.order)
+        self._shown.append((part, section.html()))
 
     def begin(self) -> None:
-        """Start all panels from nothing."""
+        """Construct all panels, without data."""
         self._panels = {}
         for part, html in self._shown:
             try:
@@ -60,18 +91,19 @@ class PackagePanels:
                 html.content = note(f"the panel has failed: {describe_error(error)}")
 
     def update(self, snapshot: Snapshot) -> None:
-        """Give a snapshot to all panels."""
+        """Add a snapshot to all panels."""
         for html, panel in list(self._panels.items()):
             try:
                 panel.update(snapshot)
             except Exception as error:
                 self._drop(html, error)
 
-    def draw(self) -> None:
-        """Draw all panels."""
+    def draw(self, frame: int) -> None:
+        """Draw the panels that are due at a frame of the page, all of them at frame 0."""
         for html, panel in list(self._panels.items()):
             try:
-                html.content = str(panel.drawing())
+                if frame % panel.period == 0:
+                    html.content = str(panel.drawing())
             except Exception as error:
                 self._drop(html, error)
 

@@ -11,11 +11,10 @@ from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
 from gazerig.robot.dashboard.panels.dwell_chart import DwellChart
-from gazerig.robot.dashboard.panels.event_timeline import Timeline
 from gazerig.robot.dashboard.panels.gaze_map import GazeMap
 from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.panels.main_sequence_chart import MainSequenceChart
-from gazerig.robot.dashboard.panels.package_panels import PackagePanels
+from gazerig.robot.dashboard.panels.package_panels import PagePanels
 from gazerig.robot.dashboard.panels.run_figures import HOW_TO, RunFigures
 from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.dashboard.panels.status import alarms, other_heads, silence
@@ -25,7 +24,7 @@ from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
 
 # What is shown by and by, in frames of the page, of which there are at most 25 a second.
-_WORDS_EVERY, _TRACES_EVERY, _STRIP_EVERY, _FIGURES_EVERY = 3, 4, 8, 25
+_WORDS_EVERY, _TRACES_EVERY, _FIGURES_EVERY = 3, 4, 25
 
 
 class PanelView:
@@ -43,14 +42,13 @@ class PanelView:
         self._open: frozenset[str] = frozenset()
         self.depth: Callable[[bool], None] = _ignore
         self.silence = widgets.panel("watch").html(order=0)
-        self.packages = PackagePanels(widgets.panel("watch"))
+        self.panels = PagePanels(widgets.panel("watch"))
         self._begin()
         self.alarms = widgets.panel("headline").html()
         self.image = widgets.panel("camera").image("what the camera sees", pick=True)
         watch = widgets.panel("watch")
         self.winner = watch.html(note("waiting for the rig"), order=1)
         self.saliences = watch.html(order=2)
-        self.strip = watch.section("the last 30 seconds", order=3).html()
         self.traces = JointCharts(watch.section("traces", order=4))
         statistics = watch.section("statistics", is_open=False, order=5)
         self.of_what = statistics.html(order=1)
@@ -70,10 +68,10 @@ class PanelView:
         """Start all that is gathered from the snapshots."""
         self._last_s = -inf
         self._last: Snapshot | None = None
-        self._traces, self._timeline = JointSeries(), Timeline()
+        self._traces = JointSeries()
         self._sequence, self._dwell = MainSequenceChart(), DwellChart()
         self._map, self._figures = GazeMap(), RunFigures()
-        self.packages.begin()
+        self.panels.begin()
 
     def update(self, snapshots: tuple[Snapshot, ...]) -> None:
         """Remember every snapshot for traces and figures, also those that are not drawn.
@@ -87,10 +85,9 @@ class PanelView:
                 self._begin()
             self._last_s, self._last = snapshot.t_s, snapshot
             self._traces.add(snapshot)
-            self._timeline.update(snapshot)
             self._map.update(snapshot)
             self._figures.update(snapshot)
-            self.packages.update(snapshot)
+            self.panels.update(snapshot)
             for event in snapshot.events:
                 if isinstance(event, SeenSaccade):
                     self._sequence.update(event)
@@ -114,8 +111,8 @@ class PanelView:
                 self.health.content = health(snapshot)
         if "watch" in self._open and self._shown % _TRACES_EVERY == 0:
             self.traces.show(self._traces)
-        if "watch" in self._open and self._shown % _STRIP_EVERY == 0:
-            self.strip.content = self._timeline.drawing()
+        if "watch" in self._open:
+            self.panels.draw(self._shown)
         if self._shown % _FIGURES_EVERY == 0:
             self._draw_figures()
         self._shown += 1
@@ -142,7 +139,6 @@ class PanelView:
             self.figures.content = self._figures.table(self._dwell)
         if "watch" not in self._open:
             return
-        self.packages.draw()
         self.dwells.content = self._dwell.drawing()
         self.saccades.content = self._sequence.drawing()
         if self._map.seconds > 0.0:
