@@ -1,1 +1,1 @@
-"""A process beside the program that releases the servos when the program dies or hangs."""
+"""Process that releases the servos when the program dies or hangs."""

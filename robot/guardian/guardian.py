@@ -1,4 +1,4 @@
-"""The program's side of its guardian: the process that it starts, and buses that it guards."""
+"""Program side of the guardian: starts the process and wraps the buses that it guards."""
 
 import os
 import select
@@ -20,32 +20,32 @@ from gazerig.robot.guardian.heartbeat import (
 from gazerig.robot.guardian.release_plan import ReleasePlan, encode
 
 RETRY_S = 1.0
-"""Time between attempts to take hold of servos that refused."""
+"""Time between attempts to switch the torque of servos on again, s."""
 
 _MODULE = "gazerig.robot.guardian.process"
 
 READY_S = 20.0
-"""A guardian starts within 0.1 s; a machine under load may take long."""
+"""Timeout of a guardian's start, s; it takes 0.1 s, on a machine under load much longer."""
 
 GOODBYE_S = 2.0
 CHECK_S = 0.25
-"""Time between two looks whether it is alive."""
+"""Time between two checks of the guardian, s."""
 
 RESTART_S = 5.0
-"""Time between two starts of a guardian that does not stay alive."""
+"""Time between two starts of a guardian that keeps ending, s."""
 
 HUNG_S = 2.0
-"""A guardian that has looked at nothing for so long hangs; it looks 50 times a second."""
+"""A guardian that has not read the heartbeat for this time hangs; it reads 50 times a second."""
 
 
 class Guardian:
-    """One process for all ports of a rig.
+    """Guardian process of all ports of a rig.
 
     Args:
-        plans: what it releases, by port.
+        plans: Servos to release, one plan for each port.
 
     Raises:
-        ValueError: more ports than its memory has room for.
+        ValueError: there are more than ``MAX_PLANS`` ports.
     """
 
     def __init__(self, plans: tuple[ReleasePlan, ...]) -> None:
@@ -61,18 +61,18 @@ class Guardian:
         self._looks = (0, inf)
         self._events: list[str] = []
         self.beat = self._heartbeat.beat
-        """Show a sign of life; for the control loop's thread alone."""
+        """Count one heartbeat; only the control loop's thread may call it."""
 
     def __del__(self) -> None:
         os.close(self._fd)
 
     @property
     def pid(self) -> int | None:
-        """Return the process id of the guardian, None where none runs."""
+        """Return the process id of the guardian, None if it does not run."""
         return None if self._process is None else self._process.pid
 
     def join(self, plan: int) -> None:
-        """Start it where it does not run yet; return at once.
+        """Register one port and start the guardian if it does not run; do not wait for it.
 
         Raises:
             SetupError: no process can be started.
@@ -85,10 +85,10 @@ class Guardian:
                 raise SetupError(f"no guardian can be started: {error.strerror}") from error
 
     def wait_until_ready(self) -> None:
-        """Wait until it watches, where it has just been started.
+        """Wait until a newly started guardian is ready.
 
         Raises:
-            SetupError: it does not start.
+            SetupError: the guardian does not start.
         """
         if self._process is not None and self._process.stdout is not None and not self._ready:
             stdout = self._process.stdout
@@ -101,10 +101,10 @@ class Guardian:
             )
 
     def arm(self, plan: int) -> None:
-        """Start watching, before torque is switched on.
+        """Start to guard one port; must be called before its torque is switched on.
 
         Raises:
-            SetupError: it does not run, and torque must not come on without it.
+            SetupError: the guardian does not run; torque must not be switched on without it.
         """
         self.wait_until_ready()
         self._heartbeat.set_state(plan, IDLE)
@@ -112,26 +112,26 @@ class Guardian:
         self._heartbeat.arm(plan, True)
 
     def disarm(self, plan: int) -> None:
-        """Report to the guardian that the torque is off."""
+        """Report to the guardian that a port's torque is off."""
         self._heartbeat.arm(plan, False)
 
     def releasing(self, plan: int) -> bool:
-        """Return whether it is letting go of a plan's servos at this moment."""
+        """Return whether the guardian is releasing a plan's servos now."""
         return self._heartbeat.state(plan) == RELEASING
 
     def released(self, plan: int) -> bool:
-        """Return whether it has released a plan's servos, or is about to."""
+        """Return whether the guardian has released a plan's servos or is releasing them."""
         return self._heartbeat.state(plan) != IDLE
 
     def acknowledge(self, plan: int) -> None:
-        """Record that the loop knows of it; from now on the guardian may let go again."""
+        """Record that the loop knows of the release; the guardian may release again."""
         self._heartbeat.set_state(plan, IDLE)
 
     def check(self, now_s: float) -> None:
-        """Check four times a second whether it works, and replace it if it has ended or hangs.
+        """Check the guardian four times a second; replace it if it has ended or hangs.
 
         Args:
-            now_s: monotonic seconds.
+            now_s: Time, monotonic seconds.
         """
         if now_s < self._check_s or self._process is None:
             return
@@ -154,7 +154,7 @@ class Guardian:
             self._events.append(f"no guardian: {error.strerror}; tried again in {RESTART_S:g} s")
 
     def events(self) -> tuple[str, ...]:
-        """Return what has happened since the last call."""
+        """Return the events since the last call, one line each."""
         if not self._events:
             return ()
         events = tuple(self._events)
@@ -164,8 +164,8 @@ class Guardian:
     def leave(self, plan: int) -> None:
         """Unregister one port; after the last the guardian ends.
 
-        Where servos of the port are still armed, as they could not be released, it goes on
-        trying for some seconds by itself.
+        If servos could not be released and are still armed, the guardian retries for some
+        seconds.
         """
         self._users.discard(plan)
         if self._users or self._process is None:
@@ -181,10 +181,10 @@ class Guardian:
             ending.wait()
 
     def _hangs(self, pid: int, now_s: float) -> bool:
-        """Return whether it was suspended, or has looked at nothing for too long."""
+        """Return whether the guardian is suspended or has not read the heartbeat for too long."""
         if self._heartbeat.looks != self._looks[0]:
             self._looks = self._heartbeat.looks, now_s
-        # A guardian that is still starting has not looked yet: its last look is at infinity.
+        # A guardian that is still starting has not read yet: its last time is infinity.
         return now_s - self._looks[1] > HUNG_S or child_process.is_suspended(pid)
 
     @staticmethod
@@ -194,7 +194,11 @@ class Guardian:
                 pipe.close()
 
     def _start(self) -> None:
-        """Start the process; raises OSError where the system refuses."""
+        """Start the process.
+
+        Raises:
+            OSError: the system refuses.
+        """
         self._ready = False
         self._looks = self._heartbeat.looks, inf
         self._process = child_process.start(
@@ -208,7 +212,7 @@ class Guardian:
         )
 
     def _end_unfinished(self) -> None:
-        """Treat what a dead guardian was releasing as released."""
+        """Mark plans as released that a dead guardian was releasing."""
         for i in range(len(self.plans)):
             if self.releasing(i):
                 self._heartbeat.set_state(i, RELEASED)
@@ -219,17 +223,17 @@ def _ending(code: int) -> str:
 
 
 class GuardedBus:
-    """Puts signs of life and the guardian's doings into a bus; implements ``ServoBus``.
+    """Servo bus with heartbeats and a guardian; implements ``ServoBus``.
 
-    Every read and write is a sign of life. A loop that hung and wakes again finds the torque
-    off: it switches it off once more, confirmed, then takes hold where the joints are, as
-    after a restart of the servos, and their answers are marked ``rearmed``.
+    Every read and write counts one heartbeat. When a loop resumes after it hung, the guardian has
+    switched the torque off. The bus then switches it off again with confirmation and on at the
+    present positions, as after a restart of the servos, and marks the answers ``rearmed``.
 
     Args:
-        bus: of the servos.
-        count: how many servos.
-        guardian: the process that watches the loop.
-        plan: the number of its plan for this bus's port.
+        bus: Bus of the servos.
+        count: Number of servos.
+        guardian: Guardian of the rig.
+        plan: Index of the release plan of this bus's port.
     """
 
     def __init__(self, bus: ServoBus, count: int, guardian: Guardian, plan: int) -> None:
@@ -242,10 +246,10 @@ class GuardedBus:
         self._events: list[str] = []
 
     def open(self) -> None:
-        """Open the bus, with a guardian started beside it; torque stays off.
+        """Start the guardian and open the bus; torque stays off.
 
         Raises:
-            SetupError: no guardian can be started, or as the bus raises it.
+            SetupError: no guardian can be started, or the bus raises it.
         """
         self._guardian.join(self._plan)
         try:
@@ -255,10 +259,10 @@ class GuardedBus:
             raise
 
     def read(self, now_s: float) -> Feedback:
-        """Read all servos; all are missing while the guardian is letting go of them.
+        """Read all servos; all are missing while the guardian releases them.
 
         Raises:
-            BusLost: no servo has answered for longer than the bus waits.
+            BusLost: no servo has answered for longer than the timeout of the bus.
         """
         self._beat()
         self._guardian.check(now_s)
@@ -270,23 +274,23 @@ class GuardedBus:
         return self._marked(feedback) if self._rearmed else feedback
 
     def enable_torque(self) -> tuple[int, ...]:
-        """Switch torque on where the joints are, under the guardian's eyes.
+        """Arm the guardian and switch torque on at the present positions.
 
         Raises:
-            SetupError: the guardian did not start, or as the bus raises it.
-            DriverError: as the bus raises it.
+            SetupError: the guardian did not start, or the bus raises it.
+            DriverError: the bus raises it.
         """
-        # Before the torque, which comes on servo by servo.
+        # Before the torque, because it comes on servo by servo.
         self._guardian.arm(self._plan)
         goals = self._bus.enable_torque()
         self._holding, self._lost_hold = True, False
         return goals
 
     def write(self, goals_steps: Sequence[int]) -> None:
-        """Send one goal to every servo; nothing to servos that the guardian has released.
+        """Send one goal to every servo; send nothing after the guardian has released them.
 
         Raises:
-            ValueError: a goal is not a number, or there are not as many as servos.
+            ValueError: a goal is not a number, or their number is not that of the servos.
         """
         self._beat()
         if self._lost_hold or self._guardian.released(self._plan):
@@ -294,10 +298,10 @@ class GuardedBus:
         self._bus.write(goals_steps)
 
     def disable_torque(self) -> None:
-        """Torque off on every servo; after that the guardian has nothing to release.
+        """Switch torque off on every servo and disarm the guardian.
 
         Raises:
-            BusLost: the port is gone; the guardian keeps trying.
+            BusLost: the port is lost; the guardian retries.
         """
         self._holding = self._lost_hold = False
         self._rearmed.clear()
@@ -305,24 +309,24 @@ class GuardedBus:
         self._guardian.disarm(self._plan)
 
     def close(self) -> None:
-        """Close the port and say goodbye to the guardian; safe to call twice."""
+        """Close the port and unregister from the guardian; safe to call twice."""
         try:
             self._bus.close()
         finally:
             self._guardian.leave(self._plan)
 
     def faults(self) -> tuple[str, ...]:
-        """Name every latched servo fault found so far."""
+        """Return the latched servo faults, one line each."""
         return self._bus.faults()
 
     def events(self) -> tuple[str, ...]:
-        """Return what has happened since the last call."""
+        """Return the events since the last call, one line each."""
         events = (*self._guardian.events(), *self._events, *self._bus.events())
         self._events.clear()
         return events
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the servos up so when the torque comes on the next time."""
+        """Store setups that take effect when the torque is switched on next."""
         self._bus.retune(setups)
 
     def health(self) -> BusHealth:
@@ -330,7 +334,7 @@ class GuardedBus:
         return self._bus.health()
 
     def _take_hold_again(self, now_s: float) -> None:
-        """Bring servos that the guardian has released back as after a restart."""
+        """Switch the torque of released servos on again, as after a restart of the servos."""
         if not self._lost_hold:
             self._guardian.acknowledge(self._plan)
             if not self._holding:
@@ -341,7 +345,7 @@ class GuardedBus:
             return
         self._retry_s = now_s + RETRY_S
         try:
-            # A packet of goals that was on its way as the loop stopped may have come after.
+            # Goals that were being sent when the loop stopped may have arrived after the release.
             self._bus.disable_torque()
             self._bus.enable_torque()
         except DriverError as error:
@@ -352,7 +356,7 @@ class GuardedBus:
         self._events.append("torque on again where the joints are: going on slowly")
 
     def _marked(self, feedback: Feedback) -> Feedback:
-        """Return feedback in which the first answer of a servo after torque-on says so."""
+        """Return feedback with each servo's first answer after torque-on marked ``rearmed``."""
         here = self._rearmed.difference(feedback.missing)
         self._rearmed -= here
         rearmed = [reset or i in here for i, reset in enumerate(feedback.rearmed)]

@@ -1,22 +1,23 @@
-"""When a control loop counts as hung: numbers in, a verdict out."""
+"""Detection of a control loop that hangs, from its heartbeat counter and the time."""
 
 HANG_S = 0.4
-"""Silence of a loop after which its servos are released.
+"""Time without a heartbeat after which the servos are released, s.
 
-A loop on a busy machine has been seen up to 0.3 s late. Letting go may take 0.1 s more, so
-that the torque of the servos is off half a second after the last sign of life."""
+Loops on a busy machine were up to 0.3 s late. The release may take 0.1 s more, so that the
+torque is off half a second after the last heartbeat."""
 
 MAX_COUNTED_S = 0.1
-"""Silence between two looks counts as no more than this.
+"""Longest time that one interval between two checks counts, s.
 
-Where the whole machine stood still, the guardian slept as well and cannot say what the loop
-would have done meanwhile: it sees at least four times in a row that nothing came."""
+If the whole machine was suspended, the guardian was suspended as well. At least four checks in
+a row must find no heartbeat."""
 
 
 class HangDetector:
-    """Adds up the time without a heartbeat.
+    """Accumulates the time without a heartbeat.
 
-    silent_s: seconds of silence that count
+    Attributes:
+        silent_s: Accumulated time without a heartbeat, s.
     """
 
     def __init__(self, beats: int, now_s: float) -> None:
@@ -27,8 +28,8 @@ class HangDetector:
         """Return whether the loop counts as hung.
 
         Args:
-            beats: its counter now.
-            now_s: the time of this look, monotonic seconds.
+            beats: Present value of the loop's counter.
+            now_s: Present time, monotonic seconds.
         """
         elapsed_s, self._now_s = now_s - self._now_s, now_s
         if beats != self._beats:
@@ -39,5 +40,5 @@ class HangDetector:
         return self.silent_s >= HANG_S
 
     def reset(self) -> None:
-        """Reset, as where nothing is armed."""
+        """Reset the accumulated time to 0."""
         self.silent_s = 0.0

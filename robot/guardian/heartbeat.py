@@ -1,9 +1,9 @@
-"""The memory that a program and its guardian share: two counters, and one record for each port.
+"""Memory that a program and its guardian share: two counters and one record for each port.
 
     offset 0     uint64   beats: counted up by the control loop's thread
     offset 8+2i  uint8    armed: the servos of plan i may be under torque   (the loop writes)
-    offset 9+2i  uint8    state: what the guardian did with plan i          (both write)
-    offset 136   uint64   looks: counted up by the guardian
+    offset 9+2i  uint8    state of plan i: IDLE, RELEASING or RELEASED      (both write)
+    offset 136   uint64   looks: checks of the heartbeat, counted by the guardian
 
 Nothing is locked: every field has one writer at a time. The guardian sets ``RELEASING``
 before its first byte and ``RELEASED`` after the last; the loop alone sets ``IDLE`` again.
@@ -19,10 +19,10 @@ MAX_PLANS = 64
 
 
 class Heartbeat:
-    """One side's view of the shared memory.
+    """View of the shared memory, in the program or in the guardian.
 
     Args:
-        fd: a file of ``SIZE`` bytes, mapped here; it may be closed afterwards.
+        fd: Descriptor of a file of ``SIZE`` bytes; it may be closed afterwards.
     """
 
     def __init__(self, fd: int) -> None:
@@ -34,7 +34,7 @@ class Heartbeat:
         self._count = self._beats[0]
 
     def beat(self) -> None:
-        """Count one sign of life; called by the loop's thread alone."""
+        """Count one heartbeat; only the loop's thread may call it."""
         self._count += 1
         self._beats[0] = self._count
 
@@ -44,20 +44,20 @@ class Heartbeat:
         return self._beats[0]
 
     def look(self) -> None:
-        """Count one look of the guardian; called by the guardian alone."""
+        """Count one check of the heartbeat; only the guardian may call it."""
         self._looks[0] += 1
 
     @property
     def looks(self) -> int:
-        """Return how often a guardian has looked at the beats."""
+        """Return how often a guardian has checked the heartbeat."""
         return self._looks[0]
 
     def arm(self, plan: int, armed: bool) -> None:
-        """Record that servos may be under torque from now on, or are not any more."""
+        """Record whether a plan's servos may be under torque."""
         self._flags[2 * plan] = armed
 
     def armed(self, plan: int) -> bool:
-        """Return whether servos may be under torque."""
+        """Return whether a plan's servos may be under torque."""
         return self._flags[2 * plan] != 0
 
     def state(self, plan: int) -> int:
@@ -65,12 +65,12 @@ class Heartbeat:
         return self._flags[2 * plan + 1]
 
     def set_state(self, plan: int, state: int) -> None:
-        """Record what the guardian does, or that the loop has seen it."""
+        """Set IDLE, RELEASING or RELEASED."""
         self._flags[2 * plan + 1] = state
 
 
 def shared_file() -> int:
-    """Return the descriptor of a new file in memory that another process can be given."""
+    """Return the descriptor of a new file in memory, to be passed to another process."""
     fd = os.memfd_create("gazerig-heartbeat", os.MFD_CLOEXEC)
     os.ftruncate(fd, SIZE)
     return fd

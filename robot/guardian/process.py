@@ -1,16 +1,16 @@
-"""The guardian itself: releases the servos when their program dies or hangs.
+"""Guardian process: releases the servos when their program dies or hangs.
 
 Run by gazerig.robot.guardian.guardian as
 
     python -m gazerig.robot.guardian.process HEARTBEAT_FD PLANS
 
 with one end of a pipe as standard input, whose other end the program holds, and a pipe as
-standard output, on which one byte says that it is ready. It knows nothing of the program
-but the memory with its heartbeat, and opens a port only to let go.
+standard output, to which it writes one byte when it is ready. It shares nothing with the
+program but the memory of the heartbeat, and opens a port only to release servos.
 
-It ends when the program is gone or has closed the pipe: silently where nothing is armed
-any more, else after having let go. Signals to a whole group (Ctrl-C, a closed terminal,
-the end of a service) are for the program: they do not end it.
+It ends when the program has ended or has closed the pipe; servos that are still armed are
+released first. Signals to a whole group (Ctrl-C, a closed terminal, the end of a service) are
+for the program and do not end the guardian.
 """
 
 import base64
@@ -34,26 +34,26 @@ from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe
 from gazerig.robot.model.clock import RealClock
 
 LOOK_S = 0.02
-"""Time between two looks at the heartbeat."""
+"""Time between two checks of the heartbeat, s."""
 
 RETRY_S = 0.25
-"""A port that could not be opened is tried again so much later."""
+"""Time between attempts to open a port, s."""
 
 UNPLUGGED_S = 10.0
-"""An adaptor that was unplugged when the program died is waited for so long."""
+"""Longest wait for an adaptor that was unplugged when the program died, s."""
 
 ALONE_S = 1.0
-"""From so long after the program's death another one may have taken the port: its own now."""
+"""Time after the program's death from which another program may own the port, s."""
 
 
 Releaser = Callable[[BusPort], tuple[int, ...]]
 
 
 def releaser(plan: ReleasePlan) -> Releaser:
-    """Return what releases the servos of a plan through a port of its path.
+    """Return the function that releases the servos of a plan through a port.
 
-    It opens the port and returns the ids that did not confirm; it raises PortError where the
-    port cannot be opened, BusLost where it went away. All that it needs is imported here.
+    The function opens the port and returns the ids that did not confirm. It raises PortError if
+    the port cannot be opened and BusLost if it is lost. Its modules are imported here.
     """
     return RELEASERS.get(plan.kind, _of_package)(plan)
 
@@ -105,21 +105,21 @@ RELEASERS: dict[BusKind, Callable[[ReleasePlan], Releaser]] = {
     "maestro": _maestro,
     "pca9685": _pca9685,
 }
-"""By the kind of bus; each imports what it needs alone."""
+"""Kind of bus -> function that returns the releaser of a plan; it imports its own drivers."""
 
 
 class ProgramWatch:
-    """Watches one program.
+    """Monitor of one program.
 
     Args:
-        heartbeat: the memory shared with it.
-        plans: what to release, one record of the memory each.
-        parent: process id of the program.
+        heartbeat: Memory shared with the program.
+        plans: Servos to release, in the order of the records in the memory.
+        parent: Process id of the program.
     """
 
     def __init__(self, heartbeat: Heartbeat, plans: tuple[ReleasePlan, ...], parent: int) -> None:
         self._heartbeat, self._plans, self._parent = heartbeat, plans, parent
-        # All is imported now: when it is needed, the disk may be gone with the rest.
+        # Imported now: when it is needed, the disk may be unavailable.
         self._releasers = [releaser(plan) for plan in plans]
         self._complained: set[int] = set()
         self._clock = RealClock()
@@ -127,20 +127,20 @@ class ProgramWatch:
         self._retry_s = 0.0
 
     def run(self) -> None:
-        """Watch until the program is gone or says goodbye, and release what is armed then."""
+        """Monitor the program until it ends or closes the pipe, then release armed servos."""
         while not self._gone():
             self._heartbeat.look()
             self._watch(self._clock.now_s())
         self._release_all()
 
     def _gone(self) -> bool:
-        """Wait a moment; return whether the program is gone or has said goodbye."""
+        """Wait for ``LOOK_S``; return whether the program has ended or closed the pipe."""
         readable, _, _ = select.select([sys.stdin.fileno()], [], [], LOOK_S)
-        # A child of the program may hold its end of the pipe open, so its id is asked as well.
+        # A child of the program may hold its end of the pipe open: check the parent's id, too.
         return bool(readable) or os.getppid() != self._parent
 
     def _watch(self, now_s: float) -> None:
-        """Release what is armed where the loop hangs."""
+        """Release armed servos if the loop hangs."""
         armed = self._armed()
         if not armed:
             self._hang.reset()
@@ -154,8 +154,8 @@ class ProgramWatch:
         return [i for i in range(len(self._plans)) if self._heartbeat.armed(i)]
 
     def _release_hung(self, i: int) -> None:
-        """Release one plan's servos beside a program that has the port open."""
-        # Before the first byte: a loop that wakes now keeps its hands off until this is over.
+        """Release one plan's servos while the program has the port open."""
+        # Before the first byte: a loop that resumes now does not write until the release ends.
         self._heartbeat.set_state(i, RELEASING)
         why = f"no sign of life of the control loop for {self._hang.silent_s:.1f} s"
         done = self._release(i, why, exclusive=False)
@@ -164,13 +164,13 @@ class ProgramWatch:
             self._retry_s = self._clock.now_s() + RETRY_S
 
     def _release_all(self) -> None:
-        """Release what the program left, waiting a while for adaptors that are unplugged."""
+        """Release all armed servos; wait up to ``UNPLUGGED_S`` for adaptors that are unplugged."""
         began_s = self._clock.now_s()
         left = self._armed()
         while left:
             since_s = self._clock.now_s() - began_s
             left = [i for i in left if not self._release(i, "the program died", since_s > ALONE_S)]
-            # Only an adaptor can come back; an emulated port ends with its program.
+            # Only an adaptor can be plugged in again; an emulated port ends with its program.
             left = [i for i in left if self._plans[i].port.startswith("/dev/")]
             if since_s > UNPLUGGED_S:
                 return
@@ -178,7 +178,7 @@ class ProgramWatch:
                 self._clock.sleep_until(self._clock.now_s() + RETRY_S)
 
     def _release(self, i: int, why: str, exclusive: bool) -> bool:
-        """Release one plan's servos; return False where the port cannot be used."""
+        """Release one plan's servos; return False if the port cannot be used."""
         plan = self._plans[i]
         port = port_of(plan.port, exclusive)
         try:
@@ -197,14 +197,14 @@ class ProgramWatch:
 
 
 def say(line: str) -> None:
-    """Write a line to standard error, which may have gone with the terminal."""
+    """Write a line to standard error; it may be closed, as with the terminal."""
     with contextlib.suppress(OSError):
         wipe = "\r\x1b[K" if os.isatty(2) else ""
         os.write(2, f"{wipe}{line}\n".encode())
 
 
 def main(heartbeat_fd: int, plans: str) -> None:
-    """Watch the program that started this process."""
+    """Monitor the program that started this process."""
     parent = os.getppid()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)

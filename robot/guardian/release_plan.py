@@ -1,4 +1,4 @@
-"""What must be known to release the servos of one port: data that fits on a command line."""
+"""Data to release the servos of one port, short enough for a command line."""
 
 import base64
 import json
@@ -10,7 +10,7 @@ from gazerig.drivers.maestro.params import Form
 
 
 class ReleasePlan(NamedTuple):
-    """The servos of one port and how they are reached.
+    """Servos of one port and the parameters of its line.
 
     port: path of the serial port
     baud: bit/s
@@ -53,7 +53,7 @@ def decode(text: str) -> tuple[ReleasePlan, ...]:
 
 
 def describe(plan: ReleasePlan) -> str:
-    """Return what letting go of a plan's servos means, e.g. "pulses off on 6 channels of PORT"."""
+    """Return a plan's release as text, e.g. "pulses off on 6 channels of PORT"."""
     count = len(plan.ids)
     if plan.kind in HOBBY_KINDS:
         return f"pulses off on {count} channel{'s' * (count != 1)} of {plan.port}"

@@ -1,1 +1,1 @@
-"""What reaches a running rig from other programs and from its files."""
+"""Requests of other programs to a running rig, and changes of its files."""

@@ -1,7 +1,7 @@
-"""How much processor time other programs may take from the control loop's interpreter.
+"""Limit on the processor time that other programs take from the control loop's interpreter.
 
 Token buckets whose tokens are seconds of processor time: one for each connection, and one for
-all together. Numbers in, numbers out; safe to call from any thread.
+all together. Safe to call from any thread.
 """
 
 import threading
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class RequestRate(NamedTuple):
-    """A share of one processor, and the seconds that may be used at once."""
+    """Share of one processor, and the largest burst, s."""
 
     share: float
     burst_s: float
@@ -20,11 +20,11 @@ ALL = RequestRate(0.1, 0.4)
 
 
 class Budget:
-    """One bucket of processor time.
+    """Token bucket of processor time.
 
     Args:
-        rate: how fast it fills, and how much it holds.
-        now_s: the time it begins at, full.
+        rate: Share and size of the bucket.
+        now_s: Time of the start, at which it is full, s.
     """
 
     def __init__(self, rate: RequestRate, now_s: float) -> None:
@@ -40,7 +40,7 @@ class Budget:
             self._left_s -= used_s
 
     def wait_s(self, now_s: float) -> float:
-        """Return how long to wait until there is something left again."""
+        """Return the time until the bucket is no longer empty, s."""
         with self._lock:
             self._fill(now_s)
             return max(0.0, -self._left_s / self._rate.share)

@@ -1,4 +1,4 @@
-"""Steer and tune a rig that runs in another program of the same user.
+"""Client of a rig that runs in another program of the same user.
 
 from gazerig.robot.remote.client import RobotClient
 
@@ -59,15 +59,15 @@ if TYPE_CHECKING:
 
 
 class RobotClient:
-    """A connection to one running rig; answers come when the rig has done what was asked.
+    """Connection to one running rig; a call returns when the rig has executed it.
 
-    To be made by ``connect``.
+    Use ``connect`` to create one.
 
     Args:
-        wire: the connection.
-        pid: process of the rig.
-        who: the name under which users see this client.
-        dial: opens another connection to the same rig.
+        wire: Connection.
+        pid: Process id of the rig.
+        who: Name of this client in messages.
+        dial: Opens another connection to the same rig.
     """
 
     def __init__(
@@ -81,12 +81,14 @@ class RobotClient:
 
     @classmethod
     def connect(cls, pid: int | None = None, who: str = "") -> "RobotClient":
-        """Find the one rig that runs, or the one of this process.
+        """Connect to the only rig that runs, or to that of a process.
 
-        who: the name of this client in messages, e.g. "my show"; the process is added
+        Args:
+            pid: Process id of the rig; None if only one runs.
+            who: Name of this client in messages, e.g. "my show"; the process is added.
 
         Raises:
-            NoRobotError: none runs, or several and ``pid`` does not say which.
+            NoRobotError: no rig runs, or several run and ``pid`` is None.
         """
         found = running(pid, who)
         for other in found[1:]:
@@ -111,24 +113,24 @@ class RobotClient:
         self.close()
 
     def close(self) -> None:
-        """Hang up; the rig runs on, and leads that were not to stay end."""
+        """Close the connection; the rig continues, and manual control without ``stay`` ends."""
         self._connection.close()
 
     def state(self, after: int = 0) -> "tuple[HeadState | None, tuple[HeadEvent, ...]]":
         """Return the newest tick, None before the first, and events numbered above ``after``."""
         said = cast(dict[str, Any], self._connection.ask("state", after=after))
-        # Here, as who types ``gazerig stop`` must not wait for NumPy.
+        # Imported here, because ``gazerig stop`` must not wait for NumPy.
         from gazerig.robot.control.head_state import HeadEvent, from_json
 
         events = tuple(HeadEvent(*one) for one in said["events"])
         return (from_json(said["state"]) if said["state"] else None), events
 
     def status(self) -> dict[str, Any]:
-        """Return what the rig does: its name, target and why, guard level, joints, what it said."""
+        """Return the rig's status: name, target, reason, guard level, joints, last messages."""
         return cast(dict[str, Any], self._connection.ask("status"))
 
     def get(self, prefix: str = "") -> dict[str, JsonValue]:
-        """Return the values in force of all keys that begin with ``prefix``."""
+        """Return the present values of all keys that begin with ``prefix``."""
         return cast(dict[str, JsonValue], self._connection.ask("get", prefix=prefix))
 
     def parameters(self, prefix: str = "") -> tuple[Parameter, ...]:
@@ -148,10 +150,10 @@ class RobotClient:
         raise RequestRejected(f"{key}: unknown key; gazerig ctl get lists all")
 
     def set(self, key: str, value: Value) -> tuple[str, ...]:
-        """Apply a value; when this returns, the loop uses it. Return what the user should know.
+        """Apply a value; when this returns, the loop uses it. Return notes for the user.
 
         Raises:
-            RequestRejected: the value breaks a rule; all is as before.
+            RequestRejected: the value breaks a rule; nothing was changed.
         """
         return self.set_many({key: value})
 
@@ -159,23 +161,23 @@ class RobotClient:
         """Apply several values in the same tick, or none of them.
 
         Raises:
-            RequestRejected: with every rule that is broken.
+            RequestRejected: a value breaks a rule; the message lists every broken rule.
         """
         return self._notes(self._connection.ask("set", changes=dict(changes)))
 
     def unsaved(self) -> tuple[ParamChange, ...]:
-        """Return what is in force and not in the rig's file."""
+        """Return the present values that differ from the rig's file."""
         return _changes(self._connection.ask("unsaved"))
 
     def differs(self) -> tuple[ParamChange, ...]:
-        """Return what differs from the defaults."""
+        """Return the present values that differ from the defaults."""
         return _changes(self._connection.ask("differs"))
 
     def save(self, path: Path | str | None = None) -> SavedFile:
-        """Write what is in force into the rig's own file, or another of this computer.
+        """Write the present values to the rig's own file, or to another of this computer.
 
         Raises:
-            RequestRejected: the file cannot be written, or comes with the program.
+            RequestRejected: the file cannot be written, or is shipped with the program.
         """
         whole = None if path is None else str(Path(path).expanduser().absolute())
         said = cast(dict[str, Any], self._connection.ask("save", path=whole))
@@ -187,24 +189,24 @@ class RobotClient:
         return self._notes(self._connection.ask("revert"))
 
     def characters(self) -> tuple[str, ...]:
-        """Return the characters that can be laid over the rig."""
+        """Return the names of the characters that can be applied to the rig."""
         return tuple(cast(list[str], self._connection.ask("characters")))
 
     def character(self, name: str) -> tuple[str, ...]:
-        """Lay another character over the rig.
+        """Apply another character to the rig.
 
         Raises:
-            RequestRejected: there is none of that name.
+            RequestRejected: there is no such character.
         """
         return self._notes(self._connection.ask("character", name=name))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return what ``ask`` takes: menu -> choices, the present one first."""
+        """Return the arguments of ``ask``: menu -> choices, the present one first."""
         said = cast(dict[str, list[str]], self._connection.ask("menus"))
         return {menu: tuple(choices) for menu, choices in said.items()}
 
     def ask(self, menu: str, choice: str) -> None:
-        """Choose a behaviour, a mode of conversation, or what the lids do.
+        """Choose a behaviour, a mode of conversation, or a lid movement.
 
         Raises:
             RequestRejected: there is no such menu or choice.
@@ -215,32 +217,32 @@ class RobotClient:
         """Move to a facial expression of the rig's table; strength 0..1.
 
         Raises:
-            RequestRejected: there is no such expression; the message lists those there are.
+            RequestRejected: there is no such expression; the message lists all.
         """
         self._command(Express(expression, strength))
 
     def set_level(self, level: str, value: float) -> None:
-        """Set a level of the rig's table, 0..1; not set for half a second it falls to 0.
+        """Set a level of the rig's table, 0..1; without a new value for .5 s it falls to 0.
 
         Raises:
-            RequestRejected: there is no such level; the message lists those there are.
+            RequestRejected: there is no such level; the message lists all.
         """
         self._command(SetLevel(level, value))
 
     def play(self, gesture: str, speed: float = 1.0, times: int = 0) -> CommandReply:
-        """Play a gesture over gaze; "" ends the one under way.
+        """Play a gesture over gaze; "" ends the present one.
 
         Args:
-            gesture: its name.
-            speed: factor on the speed at which it was written.
-            times: how often; 0: as the gesture says.
+            gesture: Name of the gesture.
+            speed: Factor on the gesture's own speed.
+            times: Number of repetitions; 0: as the gesture defines.
 
         Returns:
-            How long it takes, and what the rig's limits leave of it, under ``gesture``.
+            Reply whose ``gesture`` has the duration and the reductions by the rig's limits.
 
         Raises:
-            RequestRejected: there is no such gesture, this rig cannot do it, the joints are
-                led by hand or the rig is stopped.
+            RequestRejected: there is no such gesture, this rig cannot do it, the joints are under
+                manual control or the rig is stopped.
         """
         return self._command(Play(gesture, speed, times, self.who))
 
@@ -249,26 +251,32 @@ class RobotClient:
         return tuple(cast(list[dict[str, Any]], self._connection.ask("gestures")))
 
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
-        """Look at a point: metres, x ahead, y left, z up of the neck base.
+        """Look at a point in the frame of the neck base: x ahead, y left, z up, m.
 
-        stay: until the lead is ended; else for as long as this connection is open, this
-            program alive, and no other client leads
+        Args:
+            x_m: Distance ahead, m.
+            y_m: Distance to the left, m.
+            z_m: Height, m.
+            stay: Whether the control lasts until it is ended; otherwise it also ends with this
+                connection or program, or when another client takes over.
 
         Returns:
-            How far beside the point the gaze will rest, and the joints at their ends.
+            Reply with the distance between the reachable gaze and the point, and the joints at
+            their limits.
 
         Raises:
-            RequestRejected: it is no point, or the rig is stopped.
+            RequestRejected: a coordinate is not finite, or the rig is stopped.
         """
         return self.give(LookAt((x_m, y_m, z_m), self.who, stay))
 
     def fault(self, text: str) -> str:
-        """Carry out a fault command of the emulated servos; return what was done.
+        """Execute a fault command of the emulated servos; return a description of it.
 
-        text: as ``gazerig emulate`` takes it, e.g. "lose 3 count 2" or "push head 5 left"
+        Args:
+            text: Command of ``gazerig emulate``, e.g. "lose 3 count 2" or "push head 5 left".
 
         Raises:
-            RequestRejected: it is no such command, or the servos are real.
+            RequestRejected: there is no such command, or the servos are real.
         """
         return str(self._connection.ask("fault", text=text))
 
@@ -279,7 +287,10 @@ class RobotClient:
     def jog(self, joint: str, deg: float, stay: bool = False) -> CommandReply:
         """Hold all joints and move one to an angle.
 
-        stay: as in ``look_at``
+        Args:
+            joint: Name of the joint.
+            deg: Angle, deg.
+            stay: As in ``look_at``.
 
         Raises:
             RequestRejected: there is no such joint, the angle is outside its range, or the rig is
@@ -293,14 +304,14 @@ class RobotClient:
 
     @property
     def leads(self) -> bool:
-        """True while this connection renews a lead that the rig still obeys."""
+        """Return whether this connection renews a manual control that the rig still follows."""
         return self._heartbeat is not None and self._heartbeat.leads
 
     def give(self, command: Command) -> CommandReply:
-        """Send any command; one that leads and is not to stay is renewed from now on.
+        """Send any command; manual control without ``stay`` is renewed from now on.
 
         Raises:
-            RequestRejected: it cannot be meant, or the head does not do it.
+            RequestRejected: the command is not valid, or the head refuses it.
         """
         if command == LookAt(None, self.who):
             self._end_heartbeat()
@@ -323,7 +334,7 @@ class RobotClient:
             heartbeat.end()
 
     def stop(self, why: str = "asked for from another program") -> None:
-        """Switch the torque off at once; when this returns, the loop has done it.
+        """Switch the torque off immediately; when this returns, the loop has done it.
 
         Raises:
             ConnectionLost, RequestRejected: it may not have stopped: press the emergency stop.
@@ -331,14 +342,14 @@ class RobotClient:
         self._command(Stop(why, self.who))
 
     def resume(self, confirmed: bool = False) -> None:
-        """Switch the torque on again where the joints are, and go on slowly.
+        """Switch the torque on at the present angles, and continue slowly.
 
-        confirmed: a person has said that no hand is in the mechanism; it is needed where
-            another client has stopped it
+        Args:
+            confirmed: Whether a person has confirmed that no hand is in the mechanism; needed if
+                another client stopped the rig.
 
         Raises:
-            RequestRejected: a servo refuses it, or a rule of stops forbids it; the torque
-                stays off.
+            RequestRejected: a servo or a rule of stops refuses it; the torque stays off.
         """
         self._command(Resume(self.who, confirmed))
 
@@ -361,7 +372,9 @@ class RobotClient:
 def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
     """Connect to every rig of this user that runs, or to that of one process.
 
-    who: as in RobotClient.connect
+    Args:
+        pid: Process id of the rig; None: all.
+        who: As in ``RobotClient.connect``.
     """
     uid = user_id()
     place = folder(os.environ, uid)
@@ -378,12 +391,16 @@ def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
 
 
 def _wire(path: Path) -> Wire:
-    """Connect to a rig's socket; raises OSError if there is no answer."""
+    """Connect to a rig's socket.
+
+    Raises:
+        OSError: there is no answer.
+    """
     return Wire(dial(path, CONNECT_S), ANSWER_BYTES)
 
 
 def _names(rigs: list[RobotClient]) -> str:
-    """Name rigs by process and file, and hang up."""
+    """Return the processes and names of rigs as text, and close the connections."""
     names = []
     for rig in rigs:
         with rig:

@@ -1,4 +1,4 @@
-"""One connection of a client to a running rig: a request, an answer, or why there is none."""
+"""Connection of a client to a running rig: requests, answers and their errors."""
 
 import threading
 from collections.abc import Callable
@@ -11,18 +11,19 @@ from gazerig.robot.remote.socket_io import MalformedMessage, Wire
 CONNECT_S = 1.0
 _ANSWER_S = 10.0
 _FILES_S = 40.0
-"""For what reads or writes files, which the rig leaves to another process."""
+"""Timeout of requests that read or write files, which another process of the rig does, s."""
 _WITH_FILES = {"save", "character"}
 
 
 class NoRobotError(SetupError, NotFound):
-    """No rig runs, or not the one that is meant; the message says which do."""
+    """No rig runs, or not the requested one; the message lists those that run."""
 
 
 class RequestRejected(SetupError, Refused):
-    """The rig runs on as before; the message lists every rule that was broken.
+    """The rig refused a request and is unchanged; the message lists every broken rule.
 
-    reply: what the head made of a command that reached it; None where the request was none
+    Attributes:
+        reply: Reply of the head to a command; None if the request was no command.
     """
 
     def __init__(self, message: str, reply: CommandReply | None = None) -> None:
@@ -31,16 +32,16 @@ class RequestRejected(SetupError, Refused):
 
 
 class ConnectionLost(DriverError, HeadEnded):
-    """The rig ended or does not answer; the message says which."""
+    """The rig ended or does not answer; the message names the reason."""
 
 
 class ClientConnection:
-    """Asks one rig; may be used from several threads.
+    """Client end of a connection to one rig; may be used from several threads.
 
     Args:
-        wire: the connection.
-        pid: process of the rig.
-        ending: called before hanging up.
+        wire: Connection.
+        pid: Process id of the rig.
+        ending: Called before the connection is closed.
     """
 
     def __init__(self, wire: Wire, pid: int, ending: Callable[[], None]) -> None:
@@ -48,16 +49,16 @@ class ClientConnection:
         self._lock = threading.Lock()
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._ending()
         self._wire.close()
 
     def ask(self, do: str, **fields: object) -> object:
-        """Send a request and return what came of it.
+        """Send a request and return its result.
 
         Raises:
             RequestRejected: a rule forbids it.
-            ConnectionLost: the rig has ended, does not answer, or has met an error of its own.
+            ConnectionLost: the rig has ended, does not answer, or failed with an internal error.
         """
         with self._lock:
             answer = self._answer(
@@ -88,7 +89,7 @@ class ClientConnection:
         try:
             return self._wire.read(within_s, within_s)
         except TimeoutError:
-            self.close()  # an answer that comes late would be taken for that of the next request
+            self.close()  # a late answer would be taken for that of the next request
             raise ConnectionLost(f"the rig (process {self.pid}) does not answer") from None
         except (EOFError, OSError):
             raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None

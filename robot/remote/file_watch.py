@@ -1,8 +1,8 @@
-"""Files edited by hand: notices a new content once it is whole.
+"""Watch of files that users edit: reports new content once it is complete.
 
-Editors write in many ways: over the old file, in two steps, into a new file that takes
-the old one's name, or with the old one gone for a moment. So a content counts when two
-looks in a row found the same, and a missing file when it stays away.
+Editors overwrite a file, write it in two steps, rename a new file over it, or delete it for a
+moment. New content therefore counts when two checks in a row found the same, and a missing file
+when it is missing for several checks.
 """
 
 import hashlib
@@ -16,17 +16,21 @@ from gazerig.drivers.files.file_input import read_limited
 EVERY_S = 0.5
 _LARGEST = 10_000_000  # bytes; no rig is as large, so more counts as missing
 _SAME_LOOKS = 1
-"""Looks that must find what the one before found."""
+"""Checks that must find the same as the one before."""
 _SAME_LOOKS_CUT = 5
-"""The same for a text that ends within a line: most likely the rest is still to come."""
+"""The same for a text without a final line end: the rest is probably not written yet."""
 _MISSING_LOOKS = 6
-"""Looks in a row without a file, or with an empty one, before that is news."""
+"""Checks in a row with a missing or empty file before it counts as missing."""
 
 
 class FileState(NamedTuple):
-    """What a file was at one look.
+    """State of a file at one check.
 
-    digest: of its bytes; whole: its last line is ended
+    Attributes:
+        mtime_ns: Time of the last change, ns.
+        size: Size, bytes.
+        digest: SHA-256 of its bytes.
+        whole: Whether its last line has an end.
     """
 
     mtime_ns: int
@@ -68,7 +72,7 @@ class Settling:
         if now is None:
             self._missing += 1
             gone = self._missing == _MISSING_LOOKS
-            # When it comes back it is news, whatever it holds.
+            # A file that appears again is read, whatever it contains.
             self._known = b"" if gone else self._known
             return gone
         self._missing = 0
@@ -80,13 +84,13 @@ class Settling:
 
 
 class FileWatch:
-    """A thread that looks at some files again and again.
+    """Thread that checks some files periodically.
 
     Args:
-        files: returns the files in use.
-        changed: called in this thread with a path of ``files`` that should be read again, also if
-            the file stays missing.
-        every_s: period of the checks.
+        files: Returns the files in use.
+        changed: Called in this thread with a path of ``files`` that should be read again, also if
+            the file is missing.
+        every_s: Period of the checks, s.
     """
 
     def __init__(
@@ -104,7 +108,7 @@ class FileWatch:
         self._thread = threading.Thread(target=self._watch, name="file watch", daemon=True)
 
     def start(self) -> None:
-        """Begin to look; what the files hold now is known."""
+        """Start watching; the present content of the files counts as read."""
         self.look()
         self._thread.start()
 
@@ -117,8 +121,8 @@ class FileWatch:
     def saved(self, path: Path) -> None:
         """Treat a file as known: it was written by this program; for any thread.
 
-        A file that is not watched yet is from now on, so that an edit made before the next
-        look is heard of.
+        A file that is not watched yet is watched from now on, so that an edit before the next check
+        is noticed.
         """
         same = path.resolve()
         with self._lock:
@@ -136,7 +140,7 @@ class FileWatch:
                 path: self._watched.get(path) or Settling(look(path)) for path in files
             }
             new = [path for path, settling in self._watched.items() if settling.update(look(path))]
-        # Not under the lock: the receiver may be waiting for a thread that saves.
+        # Not under the lock: the receiver may wait for a thread that saves.
         for path in new:
             self._changed(path)
 

@@ -1,4 +1,4 @@
-"""A gamepad of this computer, through evdev: an extra, on Linux alone."""
+"""Gamepad of this computer, through evdev: an extra, only on Linux."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -16,15 +16,15 @@ BUTTONS = {
     _SOUTH: "nod", _EAST: "shake", _WEST: "wink", _NORTH: "surprised", _LEFT_SHOULDER: "sleepy",
     _START: STOP,
 }  # fmt: skip
-"""What a button does, by its code."""
+"""Code of a button -> gesture or ``STOP``."""
 
 
 class GamepadLost(DriverError):
-    """The gamepad was unplugged or has run out of power."""
+    """The gamepad is unplugged or its battery is empty."""
 
 
 class GamepadNews(NamedTuple):
-    """What has happened at a gamepad: where its stick is, and what was pressed."""
+    """Position of a gamepad's stick, and the actions of the buttons pressed since the last call."""
 
     stick: Stick
     pressed: tuple[str, ...]
@@ -34,7 +34,7 @@ def load_evdev() -> Any:
     """Import evdev and return the module.
 
     Raises:
-        SetupError: it is not installed, or this is no Linux.
+        SetupError: evdev is not installed, or the system is not Linux.
     """
     try:
         import evdev
@@ -44,10 +44,10 @@ def load_evdev() -> Any:
 
 
 def open_gamepad(path: str | None, load: Callable[[], Any] = load_evdev) -> "Gamepad":
-    """Open the first gamepad there is, or the one at a path.
+    """Open the first gamepad found, or the one at a path.
 
     Raises:
-        SetupError: there is none, or it may not be read.
+        SetupError: no gamepad is found, or it may not be read.
     """
     evdev = load()
     try:
@@ -67,10 +67,10 @@ def open_gamepad(path: str | None, load: Callable[[], Any] = load_evdev) -> "Gam
 
 
 class Gamepad:
-    """One gamepad, read without waiting.
+    """Gamepad, read without waiting.
 
     Args:
-        device: an evdev.InputDevice, or what does as it does.
+        device: evdev.InputDevice or an object with its methods.
     """
 
     def __init__(self, device: Any) -> None:
@@ -85,10 +85,10 @@ class Gamepad:
         self._at = dict.fromkeys((_X, _Y, _HAT_X, _HAT_Y), 0.0)
 
     def news(self) -> GamepadNews:
-        """Return what has happened since the last call.
+        """Return the stick's position and the buttons pressed since the last call.
 
         Raises:
-            GamepadLost: it is gone.
+            GamepadLost: the gamepad is gone.
         """
         pressed = []
         try:
@@ -103,7 +103,7 @@ class Gamepad:
         return GamepadNews(Stick(x, -y), tuple(pressed))
 
     def close(self) -> None:
-        """Close it."""
+        """Close the device."""
         self._device.close()
 
     def _events(self) -> Iterator[Any]:

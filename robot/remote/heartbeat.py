@@ -1,6 +1,6 @@
-"""The heartbeat of a program that leads a running rig: on a connection of its own.
+"""Heartbeat of a program that controls a running rig, on its own connection.
 
-A program that dies, hangs as a whole or is stopped sends none, and the gaze leads again.
+A program that dies, hangs or is suspended sends none, and the gaze models take over again.
 """
 
 import threading
@@ -14,14 +14,14 @@ _EVERY_S = 0.25 * HEARTBEAT_S
 
 
 class LeadHeartbeat:
-    """Renews a lead until it is taken by another client or ended.
+    """Renews manual control until another client takes it or it ends.
 
     Args:
-        dial: connects to the rig.
-        who: as in the order that took the lead.
+        dial: Returns a new connection to the rig.
+        who: Name of the client, as in the command that started the control.
 
     Raises:
-        OSError: the rig is gone.
+        OSError: the connection failed.
     """
 
     def __init__(self, dial: Callable[[], Wire], who: str) -> None:
@@ -33,11 +33,11 @@ class LeadHeartbeat:
 
     @property
     def leads(self) -> bool:
-        """True while the rig has said that this program still leads."""
+        """Return whether the rig confirmed the last heartbeat."""
         return self._thread.is_alive() and not self._over.is_set()
 
     def end(self) -> None:
-        """Send no more."""
+        """Stop the heartbeat."""
         self._over.set()
         self._wire.close()
         self._thread.join(timeout=2.0)
@@ -49,7 +49,7 @@ class LeadHeartbeat:
                 match self._wire.read(10.0, 10.0):
                     case {"ok": _}:
                         self._over.wait(_EVERY_S)
-                    case _:  # another client leads, or none
+                    case _:  # another client is in control, or none
                         return
         except (OSError, EOFError, MalformedMessage):
-            return  # hung up, by either side
+            return  # closed by either side

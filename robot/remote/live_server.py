@@ -1,4 +1,4 @@
-"""What reaches a running rig beside the page: other programs, and its files edited by hand."""
+"""Inputs of a running rig except the page: requests of programs, and edits of its files."""
 
 import contextlib
 from collections.abc import Callable, Iterable, Mapping
@@ -16,29 +16,29 @@ from gazerig.robot.remote.socket_server import RemoteServer
 
 
 class FileTuning(ParamAccess, Protocol):
-    """The parameters of a running rig, and the files they come from."""
+    """Parameters of a running rig, and the files that define them."""
 
     def files(self) -> Iterable[Path]:
-        """Return the files in use: the rig's, and those laid over it."""
+        """Return the files in use: the rig's file and its overlays."""
         ...
 
     def reload(self, path: Path) -> object:
-        """Apply the contents of a file; raise with every fault, and change nothing then."""
+        """Apply the contents of a file; on errors change nothing and raise with all of them."""
         ...
 
 
 class LiveServer:
-    """The remote control and the file watch of one running rig.
+    """Remote control and file watch of one running rig.
 
     Args:
-        robot: executes commands.
-        tuning: the parameters and their files.
-        refusals: what ``tuning`` raises if a value breaks a rule.
-        clock: the clock of the loop.
-        about: what does not change, as {"rig": name, "pid": process}.
-        say: prints a line on the terminal.
-        timing: returns how the loop keeps its time.
-        fault: carries out a fault command of emulated servos; None: the servos are real.
+        robot: Executes commands.
+        tuning: Parameters and their files.
+        refusals: Exceptions that ``tuning`` raises if a value breaks a rule.
+        clock: Clock of the loop.
+        about: Constant fields of the status, as {"rig": name, "pid": process}.
+        say: Prints a line on the terminal.
+        timing: Returns the timing statistics of the loop.
+        fault: Executes a fault command of emulated servos; None if the servos are real.
     """
 
     def __init__(
@@ -64,16 +64,16 @@ class LiveServer:
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:
-        """Listen to other programs and watch the files; says where that cannot be."""
+        """Listen to other programs and watch the files; print a line if listening fails."""
         try:
             self._server.open()
-        except SetupError as error:  # the head runs without
+        except SetupError as error:  # the head runs without remote control
             self._say(f"gazerig ctl set and stop will not find this rig: {error}")
         self._watch.start()
 
     @property
     def update(self) -> Callable[[Tick], None]:
-        """Return what leaves the newest tick; called by the loop."""
+        """Return the function that stores the newest tick, for the loop."""
         return self._pulse.update
 
     def saved(self, path: Path) -> None:
@@ -81,12 +81,12 @@ class LiveServer:
         self._watch.saved(path)
 
     def close(self) -> None:
-        """Hang up on all programs and look at no file any more."""
+        """Close all connections and stop watching the files."""
         self._watch.stop()
         self._server.close()
 
     def _files(self) -> tuple[Path, ...]:
-        """Return the files in use, those from before where a new one cannot be found."""
+        """Return the files in use; if a new one cannot be found, the previous ones."""
         version, files = self._in_use
         now = self._tuning.version
         if now != version:
@@ -96,7 +96,7 @@ class LiveServer:
         return files
 
     def _read_again(self, path: Path) -> None:
-        """Apply a file that was edited, or report everything that is wrong with it."""
+        """Apply an edited file, or report all of its errors."""
         try:
             notes = self._tuning.reload(path)
         except self._refusals as error:

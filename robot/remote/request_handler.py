@@ -1,4 +1,4 @@
-"""What a running rig answers to another program: requests and answers as plain JSON values.
+"""Requests of another program to a running rig, and the answers, as plain JSON values.
 
 {"do": "set", "changes": {"loop.rate_hz": 100.0}}  ->  {"ok": {"notes": []}}
 {"do": "set", "changes": {"loop.rate_hz": 1e9}}    ->  {"refused": "... is above 1000 ..."}
@@ -12,13 +12,13 @@ from pathlib import Path
 
 from gazerig.robot.control.command_handler import (
     FIXED,
-    Answered,
     Commandable,
-    CommandGiven,
     CommandHandler,
     ParamAccess,
     ParamsChanged,
     ParamsSaved,
+    PendingCommand,
+    QuestionAnswer,
     RequestResult,
     as_changes,
 )
@@ -37,9 +37,9 @@ from gazerig.robot.model.reply import CommandReply, Ticket
 from gazerig.robot.model.types import LoopFigures
 
 _TAKEN_UP_S = 1.0
-"""Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""
+"""Timeout of the loop's execution, s; a servo that answers late delays it by some 50 ms."""
 _WORDS = 20
-"""How many of the last things said are kept."""
+"""Number of recent messages in the status."""
 
 _HANGS = (
     f"the control loop has not taken it up within {_TAKEN_UP_S:g} s: it hangs, "
@@ -48,11 +48,11 @@ _HANGS = (
 
 
 class Pulse:
-    """The newest tick, and whether the loop lives.
+    """Newest tick, and whether the loop is running.
 
     Args:
-        clock: the loop's.
-        timing: returns how the loop keeps its time; None where that is not known.
+        clock: Clock of the loop.
+        timing: Returns the timing statistics of the loop, None if unknown.
     """
 
     def __init__(
@@ -64,14 +64,16 @@ class Pulse:
 
     @property
     def update(self) -> Callable[[Tick], None]:
-        """Return what leaves the newest tick; called by the loop."""
+        """Return the function that stores the newest tick, for the loop."""
         return self._feed.update
 
     def taken_up(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
-        """Wait until all commands given before are obeyed; tell whether that came to pass.
+        """Wait until all previous commands are executed; return whether they are.
 
-        ticks: to wait for; the one under way may have looked for commands already, the next
-            one has not
+        Args:
+            within_s: Timeout, s.
+            ticks: Ticks to wait for; the present one may have read the commands already, the next
+                one has not.
         """
         wanted = self._feed.ticks + ticks
         waits = int(within_s / 0.002)
@@ -87,7 +89,7 @@ class Pulse:
         return {"state": state_as_json(head_state(tick)) if tick else None, "events": events}
 
     def as_json(self) -> dict[str, object]:
-        """Return the newest tick as plain values: degrees, seconds, words."""
+        """Return the newest tick as plain values: degrees, seconds, text."""
         tick = self._feed.newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
@@ -127,7 +129,7 @@ class Pulse:
 
 
 class _NotDone(ValueError):
-    """The robot has taken a command up and refused it."""
+    """The robot has received a command and refused it."""
 
     def __init__(self, reply: CommandReply) -> None:
         super().__init__(reply.refused)
@@ -135,17 +137,17 @@ class _NotDone(ValueError):
 
 
 class RequestHandler:
-    """Answers what another program asks of the running rig: {"ok": ...} or {"refused": ...}.
+    """Executes requests of other programs; answers {"ok": ...} or {"refused": ...}.
 
     Args:
-        robot: executes commands.
-        params: the parameters; None if they cannot be seen or changed.
-        pulse: whether the loop is alive.
-        about: what does not change, as {"rig": name, "pid": process}.
-        refusals: what ``params`` raises if a value breaks a rule, besides ValueError.
-        saved: called with each file that was written.
-        fixed: why parameters cannot be changed, if they cannot.
-        fault: carries out a fault command of emulated servos; None: the servos are real.
+        robot: Executes commands.
+        params: Parameters; None if they cannot be read or changed.
+        pulse: State of the loop.
+        about: Constant fields of the status, as {"rig": name, "pid": process}.
+        refusals: Exceptions besides ValueError that ``params`` raises if a value breaks a rule.
+        saved: Called with each file that was written.
+        fixed: Reason why parameters cannot be changed, if they cannot.
+        fault: Executes a fault command of emulated servos; None if the servos are real.
     """
 
     def __init__(
@@ -175,11 +177,11 @@ class RequestHandler:
         self._unsaved = -1, 0
 
     def answer(self, request: object, peer: str = "") -> dict[str, object]:
-        """Carry out one request: {"ok": what came of it} or {"refused": every rule broken}.
+        """Execute one request; return {"ok": result} or {"refused": every broken rule}.
 
         Args:
-            request: {"do": verb, ...}.
-            peer: who is at the other end, as "process 123", "" if unknown.
+            request: Request {"do": verb, ...}.
+            peer: Client at the other end, as "process 123", "" if unknown.
         """
         try:
             return {"ok": self._told(self._handler.do(request, partial(_signed, peer)))}
@@ -189,9 +191,9 @@ class RequestHandler:
             return {"refused": str(error)}
 
     def _told(self, outcome: RequestResult) -> object:
-        """Return an outcome as JSON, once the loop has it."""
+        """Return an outcome as JSON after the loop has executed it."""
         match outcome:
-            case Answered(value):
+            case QuestionAnswer(value):
                 return value
             case ParamsChanged(notes):
                 return self._in_force(notes)
@@ -199,19 +201,19 @@ class RequestHandler:
                 backup = None if saved.backup is None else str(saved.backup)
                 changes = as_changes(saved.changes)
                 return {"path": str(saved.path), "backup": backup, "changes": changes}
-            case CommandGiven(command, ticket):
+            case PendingCommand(command, ticket):
                 return self._replied(command, ticket)
 
     def _status(self) -> dict[str, object]:
         version = self._params.version if self._params is not None else 0
-        if version != self._unsaved[0]:  # else a program that polls would have it counted
+        if version != self._unsaved[0]:  # count once for a program that polls
             unsaved = self._params.unsaved() if self._params is not None else ()
             self._unsaved = version, len(tuple(unsaved))
         about = {**self._about, "version": version, "unsaved": self._unsaved[1]}
         return {**about, **self._pulse.as_json()}
 
     def _replied(self, command: Command, ticket: Ticket | None) -> object:
-        """Wait for the tick that takes a command up; return its reply."""
+        """Wait for the tick that executes a command; return its reply."""
         if ticket is None:
             return self._in_force(())
         reply = ticket.wait(_TAKEN_UP_S)
@@ -220,24 +222,24 @@ class RequestHandler:
         if reply.refused:
             raise _NotDone(reply)
         if not isinstance(command, REPEATED):
-            self._pulse.taken_up(ticks=1)  # so that the status tells of it
+            self._pulse.taken_up(ticks=1)  # so that the status includes it
         return {"notes": [], "reply": reply.as_json()}
 
     def _in_force(self, notes: tuple[str, ...]) -> dict[str, object]:
-        """Wait for the tick that obeys; pass on what a person should know."""
+        """Wait for the tick that applies the values; return the notes for the user."""
         if not self._pulse.taken_up():
             raise ValueError(_HANGS)
         return {"notes": list(notes)}
 
 
 def _signed(peer: str, command: Command) -> Command:
-    """Return a command with the process that asks: none can pose as another, or as the page."""
+    """Return a command with the client's process: it cannot pose as another, or as the page."""
     who = str(getattr(command, "who", ""))
     return signed(command, f"{who} ({peer})" if who else peer) if peer else command
 
 
 def is_stop(request: object) -> bool:
-    """True if a request is to stop: nothing may hold that up."""
+    """Return whether a request is a stop, which nothing may delay."""
     match request:
         case {"do": "stop"}:
             return True

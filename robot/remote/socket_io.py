@@ -1,9 +1,8 @@
-"""The socket of a running rig: where it is, and JSON lines through it, one each way.
+"""Socket of a running rig: its path, and JSON lines in both directions.
 
-A Unix socket in a folder of the user's own: who may open files of the user may steer the
-head, no other user; nothing of it is seen from another machine. Where a system has no such
-sockets, a port of the loopback takes its place: the file then holds the port and a token, which
-a caller has to show first.
+A Unix socket in a folder of the user: programs that may open files of the user may control the
+head, other users and other machines may not. On a system without such sockets, a port of the
+loopback replaces it: the file then contains the port and a token, which a caller must send first.
 """
 
 import contextlib
@@ -23,28 +22,29 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.model.clock import RealClock
 
 REQUEST_BYTES = 1 << 16
-"""Longest request. Reading one holds the interpreter: 64 KiB take less than a millisecond."""
+"""Longest request, bytes. Parsing 64 KiB occupies the interpreter for less than 1 ms."""
 ANSWER_BYTES = 1 << 23
-"""Longest answer a client takes."""
+"""Longest answer that a client accepts, bytes."""
 _PATH_BYTES = 107
 """Longest path of a Unix socket on Linux (unix(7), sun_path), without its ending zero."""
 _CHUNK_BYTES = 1 << 16
 HAS_SOCKET_FILES = hasattr(socket, "AF_UNIX") and hasattr(socket, "SO_PEERCRED")
-"""Whether this system has sockets that are files, and tells who is at their other end: Linux."""
+"""Whether this system has sockets with paths and identifies their peers: Linux."""
 _LOOPBACK = "127.0.0.1"
 _TOKEN_BYTES = 32
 _TOKEN_S = 1.0
 
 
 def user_id() -> int:
-    """Return the number of the user who runs this program; 0 where users have none."""
+    """Return the id of the user who runs this program, 0 on systems without user ids."""
     return os.getuid() if hasattr(os, "getuid") else 0
 
 
 class MalformedMessage(ValueError):
-    """What came is no JSON line; the message says why.
+    """A message is not a line of JSON; the text names the reason.
 
-    over: the end of the line is not known, so that nothing after it can be read
+    Attributes:
+        over: Whether the end of the line is unknown, so that nothing after it can be read.
     """
 
     def __init__(self, message: str, over: bool) -> None:
@@ -53,21 +53,21 @@ class MalformedMessage(ValueError):
 
 
 def folder(environ: Mapping[str, str], uid: int) -> Path:
-    """Return the folder of a user's sockets; it need not be there."""
+    """Return the folder of a user's sockets; it may not exist."""
     for runtime in (environ.get("XDG_RUNTIME_DIR"), f"/run/user/{uid}"):
         # unset, or left over from another user by sudo or su
         if runtime and os.path.isdir(runtime) and os.stat(runtime).st_uid == uid:
             return Path(runtime) / "gazerig"
-    if not hasattr(os, "getuid"):  # Windows: what lies here is shut to other users
+    if not hasattr(os, "getuid"):  # Windows: other users cannot read this folder
         return Path(environ.get("LOCALAPPDATA") or tempfile.gettempdir()) / "gazerig"
     return Path(f"/tmp/gazerig-{uid}")
 
 
 def make_private(path: Path, uid: int) -> None:
-    """Create a folder that only its owner can enter, or check that it is one.
+    """Create a folder that only its owner can enter, or check an existing one.
 
     Raises:
-        SetupError: another user could put a socket there, or it cannot be made.
+        SetupError: another user could put a socket there, or it cannot be created.
     """
     try:
         with contextlib.suppress(FileExistsError):
@@ -82,7 +82,7 @@ def make_private(path: Path, uid: int) -> None:
 
 
 def is_private(path: Path, uid: int) -> bool:
-    """Return whether a path is a folder, no link, of this user and shut to all others."""
+    """Return whether a path is a folder of this user, not a link, and closed to all others."""
     try:
         found = path.lstat()
     except FileNotFoundError:
@@ -93,14 +93,14 @@ def is_private(path: Path, uid: int) -> bool:
 
 
 def sockets(path: Path) -> dict[Path, int]:
-    """Return the sockets in a folder, dead ones among them, and the process of each."""
+    """Return path -> process id of the sockets in a folder, including dead ones."""
     found = path.glob("*.sock") if path.is_dir() else ()
     pids = {place: place.stem.partition("-")[0] for place in sorted(found)}
     return {place: int(pid) for place, pid in pids.items() if pid.isdecimal()}
 
 
 def free_name(path: Path, pid: int) -> Path:
-    """Return a name for one more socket of a process: 7.sock, for its second head 7-2.sock."""
+    """Return an unused socket path of a process: 7.sock, for its second head 7-2.sock."""
     count, name = 1, path / f"{pid}.sock"
     while name.exists():
         count += 1
@@ -112,7 +112,7 @@ def dial(path: Path, within_s: float) -> socket.socket:
     """Connect to a rig's socket.
 
     Raises:
-        OSError: there is no answer; ConnectionRefusedError where the process is dead.
+        OSError: there is no answer; ConnectionRefusedError if the process is dead.
     """
     if not HAS_SOCKET_FILES:
         return _dial_port(path, within_s)
@@ -127,7 +127,7 @@ def dial(path: Path, within_s: float) -> socket.socket:
 
 
 def _dial_port(path: Path, within_s: float) -> socket.socket:
-    """Connect to the port that a file names, and show the token.
+    """Connect to the port in a file, and send the token.
 
     Raises:
         OSError: see ``dial``.
@@ -145,16 +145,18 @@ def _dial_port(path: Path, within_s: float) -> socket.socket:
 
 
 class Peer(NamedTuple):
-    """Who is at the other end of a socket, as the kernel knows it; pid 0: it does not say."""
+    """Process and user at the other end of a socket; pid 0 if unknown."""
 
     pid: int
     uid: int
 
 
 class Listener:
-    """Takes callers of this user.
+    """Accepts callers of this user.
 
-    token: what they must show, empty where the kernel tells who they are
+    Args:
+        end: Listening socket.
+        token: Token that callers must send, "" if the kernel identifies them.
     """
 
     def __init__(self, end: socket.socket, token: str = "") -> None:
@@ -163,26 +165,26 @@ class Listener:
 
     @property
     def waits_for_token(self) -> bool:
-        """Return whether ``admitted`` waits for the caller to show a token."""
+        """Return whether ``admitted`` waits for a token from the caller."""
         return bool(self._token)
 
     def accept(self) -> socket.socket:
-        """Wait for a caller, who is not yet known.
+        """Wait for a caller, who is not identified yet.
 
         Raises:
-            OSError: it was closed.
+            OSError: the listener was closed.
         """
         return self._end.accept()[0]
 
     def admitted(self, caller: socket.socket) -> Peer | None:
-        """Return who called, None for whoever may not.
+        """Return the caller, None if it may not connect.
 
         Raises:
             OSError: the caller is gone.
         """
         if not self._token:
             found = peer(caller)
-            # The folder is shut to others; twice is safer.
+            # The folder is closed to others; this is a second check.
             return found if found.uid == user_id() else None
         caller.settimeout(_TOKEN_S)
         shown = b""
@@ -191,27 +193,27 @@ class Listener:
         return Peer(0, user_id()) if hmac.compare_digest(shown, self._token.encode()) else None
 
     def __enter__(self) -> Self:
-        """Listen within a block."""
+        """Return the listener itself."""
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """Close at its end."""
+        """Close it."""
         self.close()
 
     def close(self) -> None:
-        """Stop accepting callers; wakes who waits for one."""
+        """Stop accepting callers; a pending ``accept`` raises OSError."""
         with contextlib.suppress(OSError):
             self._end.shutdown(socket.SHUT_RDWR)
         self._end.close()
 
 
 def listen(path: Path) -> Listener:
-    """Listen on a socket file, for its owner alone; an existing one is replaced.
+    """Listen on a socket file that only its owner may open; an existing one is replaced.
 
     Raises:
         SetupError: the path is too long, or the disk refuses.
     """
-    # Its name only once it listens: a socket that refuses is taken for a dead rig's.
+    # Renamed after it listens: a socket that refuses is taken for that of a dead rig.
     early = path.with_name(f"{path.name}.new")
     if not HAS_SOCKET_FILES:
         return _listen_on_port(path, early)
@@ -231,7 +233,7 @@ def listen(path: Path) -> Listener:
 
 
 def _listen_on_port(path: Path, early: Path) -> Listener:
-    """Listen on a port of the loopback, and write it with a token into a file of this user."""
+    """Listen on a port of the loopback; write port and token to a file of this user."""
     listener = socket.socket()
     token = secrets.token_hex(_TOKEN_BYTES // 2)
     try:
@@ -248,7 +250,7 @@ def _listen_on_port(path: Path, early: Path) -> Listener:
 
 
 def peer(end: socket.socket) -> Peer:
-    """Return who connected to a Unix socket.
+    """Return the peer of a Unix socket.
 
     Raises:
         OSError: the connection is gone.
@@ -259,7 +261,7 @@ def peer(end: socket.socket) -> Peer:
 
 
 def clear_dead(path: Path) -> tuple[int, ...]:
-    """Remove the sockets that killed rigs left behind; give their processes' numbers."""
+    """Remove the sockets of killed rigs; return their process ids."""
     dead: list[int] = []
     for place, pid in sockets(path).items():
         try:
@@ -267,7 +269,7 @@ def clear_dead(path: Path) -> tuple[int, ...]:
         except ConnectionRefusedError:
             place.unlink(missing_ok=True)
             dead.append(pid)
-        except OSError:  # busy or gone: not this program's concern
+        except OSError:  # busy, or removed meanwhile
             continue
     return tuple(dead)
 
@@ -285,20 +287,20 @@ class Wire:
         """Send one value.
 
         Raises:
-            ValueError: it has no JSON, as infinity has none.
-            OSError: the other end is gone, or takes nothing for ``within_s``.
+            ValueError: it cannot be written as JSON, e.g. infinity.
+            OSError: the other end is gone, or accepts nothing for ``within_s``.
         """
         line = json.dumps(value, allow_nan=False, separators=(",", ":")).encode() + b"\n"
         self._end.settimeout(within_s)
         self._end.sendall(line)
 
     def read(self, first_s: float | None, rest_s: float) -> object:
-        """Wait for one value: ``first_s`` for its beginning (None: for ever), then ``rest_s``.
+        """Wait for one value: ``first_s`` for its start (None: without limit), then ``rest_s``.
 
         Raises:
             EOFError: the other end has closed.
             TimeoutError: nothing came in ``first_s``.
-            Garbled: what came is no line of JSON.
+            MalformedMessage: the message is not a line of JSON.
             OSError: the connection broke.
         """
         line = self._line(first_s, rest_s)
@@ -310,7 +312,7 @@ class Wire:
             raise MalformedMessage(f"not a line of JSON: {error}", over=False) from None
 
     def close(self) -> None:
-        """Close this end; a reader at either end sees the end."""
+        """Close the connection; readers at both ends get its end."""
         with contextlib.suppress(OSError):
             self._end.shutdown(socket.SHUT_RDWR)
         self._end.close()
@@ -324,7 +326,7 @@ class Wire:
                 raise MalformedMessage(f"longer than {self._longest} bytes", over=True)
             left_s = due_s - self._clock.now_s()
             try:
-                if left_s <= 0.0:  # an end that never comes, byte by byte
+                if left_s <= 0.0:  # a sender of single bytes without a line end
                     raise TimeoutError
                 held += self._received(left_s)
             except TimeoutError:
@@ -345,5 +347,5 @@ class Wire:
 
 
 def _no_number(word: str) -> NoReturn:
-    """Refuse NaN and Infinity, which are no JSON."""
+    """Refuse NaN and Infinity, which are not JSON."""
     raise ValueError(f"{word} is no number of JSON")

@@ -1,8 +1,8 @@
-"""The running rig's side of its remote control: a thread for each program that steers it.
+"""Server of a running rig's remote control: a thread for each connected program.
 
-None of them touches the control loop: they ask the tuning and leave commands, which the loop
-takes up at its next tick. A program that sends rubbish, stops in the middle or reads no
-answers costs a thread and nothing else.
+The threads never touch the control loop: they use the tuning and queue commands, which the loop
+executes at its next tick. A program that sends malformed data, stops within a request or reads no
+answers occupies a thread and nothing else.
 """
 
 import os
@@ -19,21 +19,21 @@ from gazerig.robot.remote.request_handler import RequestHandler, is_stop
 from gazerig.robot.remote.socket_io import REQUEST_BYTES, Listener, MalformedMessage, Wire
 
 _REST_S = 2.0
-"""A request that has begun must end within this."""
+"""Timeout of the rest of a request, s."""
 _TAKES_S = 2.0
-"""An answer must be taken within this."""
+"""Timeout of sending an answer, s."""
 _LONGEST_WAIT_S = 0.25
-"""Who has used up their processor time waits so long for an answer at most."""
+"""Longest delay of a program that has used up its processor time, s."""
 _MOST = 16
-"""Programs at a time; for one more the one that was quiet longest is hung up on."""
+"""Largest number of programs; for one more the least recently active is disconnected."""
 
 
 _NAMING = threading.Lock()
-"""Two heads of one program that start at a time get two names."""
+"""Two heads of one program that start at the same time get two names."""
 
 
 class RemoteServer:
-    """Listens while a rig runs."""
+    """Server that listens while a rig runs."""
 
     def __init__(self, requests: RequestHandler, say: Callable[[str], None]) -> None:
         self._requests = requests
@@ -43,14 +43,14 @@ class RemoteServer:
         self._path: Path | None = None
         self._listener: Listener | None = None
         self._lock = threading.Lock()
-        self._wires: dict[Wire, None] = {}  # the quietest first
+        self._wires: dict[Wire, None] = {}  # the least recently active first
         self._threads: list[threading.Thread] = []
 
     def open(self) -> Path:
-        """Begin to listen; sockets of rigs that were killed are removed. Gives the socket's path.
+        """Start listening, remove the sockets of killed rigs, and return the socket's path.
 
         Raises:
-            SetupError: no socket can be had; the message says why.
+            SetupError: no socket can be opened; the message names the reason.
         """
         uid = remote_socket.user_id()
         folder = remote_socket.folder(os.environ, uid)
@@ -77,7 +77,7 @@ class RemoteServer:
             thread.join(timeout=2.0)
 
     def _start(self, work: Callable[..., None], *words: object) -> bool:
-        """Start a thread, unless this was closed meanwhile."""
+        """Start a thread unless the server was closed; return whether it was started."""
         thread = threading.Thread(target=work, args=words, name="remote control", daemon=True)
         with self._lock:
             if self._listener is None:
@@ -93,13 +93,13 @@ class RemoteServer:
                 end = listener.accept()
             except OSError:  # closed
                 return
-            if not listener.waits_for_token:  # in the order in which they come
+            if not listener.waits_for_token:  # in the order of arrival
                 self._admit(end, listener)
             elif not self._start(self._admit, end, listener):
                 end.close()
 
     def _admit(self, end: socket.socket, listener: Listener) -> None:
-        """Let a program in if it is one of this user."""
+        """Accept a program if it belongs to this user."""
         try:
             caller = listener.admitted(end)
         except OSError:  # gone already
@@ -109,7 +109,7 @@ class RemoteServer:
             return
         wire = Wire(end, REQUEST_BYTES)
         with self._lock:
-            if self._listener is None:  # closed since: nothing would close this one
+            if self._listener is None:  # closed meanwhile: nothing would close this connection
                 wire.close()
                 return
             if len(self._wires) >= _MOST:
@@ -122,7 +122,7 @@ class RemoteServer:
         self._start(self._serve, wire, peer)
 
     def _serve(self, wire: Wire, peer: str) -> None:
-        """Answer one program until it hangs up or cannot be understood any more."""
+        """Answer one program until it disconnects or its data cannot be parsed."""
         own = Budget(EACH, self._clock.now_s())
         try:
             while self._served(wire, peer, own):
@@ -133,7 +133,7 @@ class RemoteServer:
             wire.close()
 
     def _served(self, wire: Wire, peer: str, own: Budget) -> bool:
-        """Answer one request; tell whether another can follow."""
+        """Answer one request; return whether another can follow."""
         try:
             request = wire.read(None, _REST_S)
         except MalformedMessage as error:
@@ -149,8 +149,7 @@ class RemoteServer:
         try:
             answer = self._requests.answer(request, peer)
         except Exception as error:
-            # One request that meets an error of ours must not end the remote control: the
-            # stop goes the same way.
+            # An internal error in one request must not end the remote control: stops need it.
             answer = {"failed": f"{type(error).__name__}: {error}"}
             self._say(f"remote control: {request!r:.200} met an error: {answer['failed']}")
         taken = self._answer(wire, answer)
@@ -160,7 +159,7 @@ class RemoteServer:
         return taken
 
     def _delayed(self, own: Budget) -> str:
-        """Delay a program that uses too much time; return the reason if it is refused even so."""
+        """Delay a program that uses too much time; return the reason if it is refused."""
         now_s = self._clock.now_s()
         wait_s = max(own.wait_s(now_s), self._budget.wait_s(now_s))
         if wait_s > 0.0:
@@ -169,7 +168,7 @@ class RemoteServer:
         return f"too many requests: ask again in {left_s:.1f} s" if left_s > 0.0 else ""
 
     def _answer(self, wire: Wire, answer: dict[str, object]) -> bool:
-        """Send an answer; tell whether it was taken."""
+        """Send an answer; return whether it was sent."""
         try:
             try:
                 wire.write(answer, _TAKES_S)

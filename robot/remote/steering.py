@@ -1,7 +1,7 @@
-"""What keys, sticks and buttons mean to a head that is steered by hand. Pure.
+"""Manual control of the head by keys, sticks and buttons; pure functions of time.
 
-A stick that is held leads; at rest it lets go. Keys of a terminal are only ever pressed, so they
-let go when none has come for a while.
+A stick out of its middle controls the gaze. A terminal reports only that keys are pressed, so
+keys stop to control it after a time without one.
 """
 
 from dataclasses import dataclass
@@ -10,33 +10,33 @@ from math import hypot, radians
 from gazerig.gaze.angles import Angles2
 
 GESTURES = ("nod", "shake", "wink", "surprised", "sleepy")
-"""What the buttons play, in the order of the page's."""
+"""Gestures of the buttons, in the order of the page's buttons."""
 
 STOP = "stop"
-"""What a button does that is no gesture: torque off."""
+"""Action of the button that switches the torque off."""
 
 KEYS_LET_GO_S = 1.0
-"""Without a key for so long the gaze is free again."""
+"""Time after the last key at which the gaze models take over, s."""
 _KEY_DEG = 4.0
 _DEAD = 0.15
-"""A stick that is let go rests within this of its middle."""
+"""Largest deflection of a stick at rest."""
 _WIDEST_DEG = (50.0, 30.0)
 
 
 @dataclass(frozen=True)
 class Stick:
-    """Where a stick is: x -1..1 to the right, y -1..1 up."""
+    """Position of a stick: x -1..1 to the right, y -1..1 up."""
 
     x: float = 0.0
     y: float = 0.0
 
 
 class Steering:
-    """Where a person wants the head to look; None while nothing is held.
+    """Direction that a person steers the gaze to.
 
     Args:
-        behind: the person stands behind the head, whose right is then theirs; in front of it, as
-            on the page, what they push to their right the head sees on its left.
+        behind: Whether the person is behind the head, so that both have the same right. In front of
+            it, as on the page, the person's right is the head's left.
     """
 
     def __init__(self, behind: bool = False) -> None:
@@ -50,7 +50,7 @@ class Steering:
         self._stick = at
 
     def key(self, right: int, up: int, now_s: float) -> None:
-        """Press an arrow key: -1, 0 or 1 each way."""
+        """Press an arrow key: -1, 0 or 1 on each axis."""
         yaw, pitch = self._keys_deg if self._held(now_s) else (0.0, 0.0)
         wide, high = _WIDEST_DEG
         self._keys_deg = (
@@ -60,7 +60,7 @@ class Steering:
         self._key_s = now_s
 
     def direction_rad(self, now_s: float) -> Angles2 | None:
-        """Return (yaw, pitch) to look in, yaw + left, pitch + up; None: the gaze is free."""
+        """Return (yaw, pitch), rad, yaw + left, pitch + up; None if the gaze models decide."""
         held = hypot(self._stick.x, self._stick.y)
         if held > _DEAD:
             share = min(1.0, (held - _DEAD) / (1.0 - _DEAD)) / held

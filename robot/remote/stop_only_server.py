@@ -1,7 +1,7 @@
-"""Where other programs stop a head that a user leads by hand; nothing else is to be had.
+"""Remote control of a head that a user moves by hand: other programs can only stop it.
 
-While a person calibrates, parameters stay as they are and no other client leads the head. But
-``gazerig stop`` must reach whatever moves.
+While a person calibrates, parameters are fixed and no other client controls the head. But
+``gazerig stop`` must reach every head that moves.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,12 +19,13 @@ _FIXED = "it is being calibrated: its parameters stay as they are until that is 
 
 
 class StopOnlyServer:
-    """The remote control of a head that can be stopped and resumed, and told nothing else.
+    """Server that executes stop and resume, and refuses all other commands.
 
     Args:
-        command: takes commands for the next tick.
-        clock: that of the loop; about: what does not change, as {"rig": name, "pid": process}
-        say: writes a line on the terminal.
+        command: Queues a command for the next tick.
+        clock: Clock of the loop.
+        about: Constant fields of the status, as {"rig": name, "pid": process}.
+        say: Prints a line on the terminal.
     """
 
     def __init__(
@@ -41,41 +42,41 @@ class StopOnlyServer:
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:
-        """Listen to other programs; says where that cannot be."""
+        """Listen to other programs; print a line if that fails."""
         try:
             self._server.open()
         except SetupError as error:  # the head goes on without
             self._say(f"gazerig stop will not find this rig: {error}")
 
     def update(self, tick: Tick) -> None:
-        """Leave the newest tick; called by the loop."""
+        """Store the newest tick; called by the loop."""
         self._pulse.update(tick)
 
     def close(self) -> None:
-        """Hang up on all programs."""
+        """Close all connections."""
         self._server.close()
 
 
 class _OnlyStops:
-    """A robot that takes stop and resume alone."""
+    """Robot that executes only stop and resume."""
 
     def __init__(self, command: CommandTaker) -> None:
         self._command = command
 
     def command(self, command: Command) -> Ticket | None:
-        """Hand on a stop or the end of one.
+        """Queue a stop or resume.
 
         Raises:
-            ValueError: it is anything else.
+            ValueError: it is another command.
         """
         if not isinstance(command, Stop | Resume):
             raise ValueError("it is being calibrated: besides stop and resume nothing goes")
         return self._command(command)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Offer nothing."""
+        """Return no menus."""
         return {}
 
     def gestures(self) -> tuple[GestureInfo, ...]:
-        """Offer none."""
+        """Return no gestures."""
         return ()
