@@ -38,15 +38,15 @@ class RateLimitedLog:
 
     def __init__(self, log: EventLog) -> None:
         self._log = log
-        self._said_s: dict[str, float] = {}
+        self._reported_s: dict[str, float] = {}
         self._since: dict[str, int] = {}
 
     def add(self, text: str, now_s: float, kind: str = "") -> None:
         """Add a line unless one of its kind is recent; the next line counts the omitted ones."""
-        if now_s - self._said_s.get(kind, -inf) < SELDOM_S:
+        if now_s - self._reported_s.get(kind, -inf) < SELDOM_S:
             self._since[kind] = self._since.get(kind, 0) + 1
             return
-        self._said_s[kind] = now_s
+        self._reported_s[kind] = now_s
         often = self._since.pop(kind, 0)
         times = "once more" if often == 1 else f"{often} more times"
         self._log.add(f"{text} ({times} since it was last reported)" if often else text)

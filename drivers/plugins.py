@@ -269,7 +269,7 @@ def describe_error(error: BaseException) -> str:
 
 def registrations(group: str) -> tuple[Registration, ...]:
     """Return all parts of a group: ours, then those of packages by package and name."""
-    return (*_ours(group), *_outside(group, tuple(sys.path)))
+    return (*_own_parts(group), *_package_parts(group, tuple(sys.path)))
 
 
 def name_conflicts(group: str) -> tuple[str, ...]:
@@ -296,7 +296,7 @@ def find(group: str, name: str) -> Registration:
     """
     if is_ours(group, name):
         return Registration(group, name, SHIPPED[group][name], OUR_PACKAGE)
-    there = _outside(group, tuple(sys.path))
+    there = _package_parts(group, tuple(sys.path))
     found = [one for one in there if one.name == name]
     if len(found) == 1:
         return found[0]
@@ -320,7 +320,7 @@ def load(group: str, name: str, kind: type[P]) -> P:
         PluginError: it does not exist, cannot be imported, or is of another type.
     """
     found = find(group, name)
-    part = _loaded(found)
+    part = _load_cached(found)
     if isinstance(part, kind):
         return part
     if callable(part) and kind is not BusPlugin:
@@ -330,7 +330,7 @@ def load(group: str, name: str, kind: type[P]) -> P:
 
 
 @cache
-def _loaded(found: Registration) -> object:
+def _load_cached(found: Registration) -> object:
     return found.load()
 
 
@@ -343,7 +343,7 @@ def yaml_files(group: str) -> dict[str, tuple[Path, Registration]]:
         PluginError: a package cannot be imported or does not name a folder.
     """
     files: dict[str, tuple[Path, Registration]] = {}
-    for one in _outside(group, tuple(sys.path)):
+    for one in _package_parts(group, tuple(sys.path)):
         for file in sorted(folder_of(one).glob("*.yaml")):
             files.setdefault(file.stem, (file, one))
     return files
@@ -379,7 +379,7 @@ def create(group: str, name: str, part: Plugin, params: Any) -> Any:
         ) from error
 
 
-def _ours(group: str) -> tuple[Registration, ...]:
+def _own_parts(group: str) -> tuple[Registration, ...]:
     return tuple(
         Registration(group, name, value, OUR_PACKAGE, _version())
         for name, value in SHIPPED[group].items()
@@ -397,7 +397,7 @@ def _version() -> str:
 
 
 @cache
-def _outside(group: str, path: tuple[str, ...]) -> tuple[Registration, ...]:
+def _package_parts(group: str, path: tuple[str, ...]) -> tuple[Registration, ...]:
     """Return the parts of installed packages; path: search path of modules."""
     from importlib.metadata import entry_points
 

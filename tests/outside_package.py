@@ -56,7 +56,12 @@ def on_path(folder: Path) -> Iterator[Path]:
 
 def _forget() -> None:
     """Forget what was loaded: another test has other packages of the same names."""
-    for cache in (plugins._loaded, plugins._outside, sections.rig_type, sections._with_sections):
+    for cache in (
+        plugins._load_cached,
+        plugins._package_parts,
+        sections.rig_type,
+        sections._with_sections,
+    ):
         cache.cache_clear()
     for name in set(servo_models.SERVOS) - OURS:
         del servo_models.SERVOS[name]

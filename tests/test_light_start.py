@@ -114,6 +114,6 @@ def test_a_rig_of_ours_looks_at_no_package(python: LightPython, tmp_path: Path) 
     code = (
         "import sys; from gazerig.config.schema import load_rig; load_rig('desk');"
         "from gazerig.robot.app.bus_wiring import rig_bus;"
-        "from gazerig.drivers import plugins; print(plugins._outside.cache_info().misses)"
+        "from gazerig.drivers import plugins; print(plugins._package_parts.cache_info().misses)"
     )
     assert python.run(code, tmp_path)[0] == "0\n"

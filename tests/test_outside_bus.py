@@ -107,7 +107,7 @@ def test_without_an_emulated_device_mock_says_so(example, monkeypatch):
 
     bare = gazerig_lx16a.LX16A.__class__(**{**vars(gazerig_lx16a.LX16A), "device": None})
     monkeypatch.setattr(gazerig_lx16a, "LX16A", bare)
-    plugins._loaded.cache_clear()
+    plugins._load_cached.cache_clear()
     with pytest.raises(
         PluginError,
         match="^bus 'lx16a' of gazerig-lx16a 0.1.0 has no emulated device: run it without --mock$",

@@ -57,7 +57,7 @@ class CheckedBus:
             SetupError: raised by the bus itself.
             PluginError: the bus raises any other error.
         """
-        outcome = self._made(self._bus.open, "open")
+        outcome = self._call_in_order(self._bus.open, "open")
         if outcome is None:
             raise PluginError(f"{self._label} has not opened within {_LONGEST_S['open']:g} s")
         if isinstance(outcome.error, DriverError):
@@ -72,21 +72,21 @@ class CheckedBus:
             BusLost: the port is gone, or the package fails.
         """
         began_s = self._now_s() if self._now_s is not None else 0.0
-        feedback = self._tried(lambda: self._bus.read(now_s), "read")
+        feedback = self._checked_call(lambda: self._bus.read(now_s), "read")
         if self._now_s is not None:
-            self._time(self._now_s() - began_s, now_s)
+            self._report_slow_read(self._now_s() - began_s, now_s)
         if not isinstance(feedback, Feedback):
             raise BusLost(
                 f"{self._label}: read returned a {type(feedback).__name__}, wanted Feedback"
             )
         try:
-            return self._sound(feedback, now_s)
+            return self._checked_feedback(feedback, now_s)
         except (TypeError, ValueError) as error:
             raise BusLost(
                 f"{self._label}: read returned no feedback: {describe_error(error)}"
             ) from error
 
-    def _time(self, took_s: float, now_s: float) -> None:
+    def _report_slow_read(self, took_s: float, now_s: float) -> None:
         """Report a read that leaves no time for the rest of the tick."""
         period_s = now_s - self._last_s if self._last_s is not None else None
         self._last_s = now_s
@@ -94,7 +94,7 @@ class CheckedBus:
             text = f"{self._label}: a read took {took_s * 1e3:.0f} ms, as long as a tick"
             self._seldom.add(f"{text}: lower loop.rate_hz", now_s, "slow")
 
-    def _sound(self, feedback: Feedback, now_s: float) -> Feedback:
+    def _checked_feedback(self, feedback: Feedback, now_s: float) -> Feedback:
         for name, column in zip(Feedback._fields[:_COLUMNS], feedback[:_COLUMNS], strict=True):
             if len(column) != self._count:
                 raise ValueError(f"{len(column)} values of {name} for {self._count} servos")
@@ -129,7 +129,7 @@ class CheckedBus:
         Raises:
             BusLost: the package fails or does not return a goal for every servo.
         """
-        goals: Any = self._tried(self._bus.enable_torque, "enable_torque")
+        goals: Any = self._checked_call(self._bus.enable_torque, "enable_torque")
         if isinstance(goals, Sequence) and len(goals) == self._count:
             pairs = list(zip(goals, self._setups, strict=True))
             if all(isinstance(g, int) and s.min_steps <= g <= s.max_steps for g, s in pairs):
@@ -154,15 +154,15 @@ class CheckedBus:
             round(min(max(goal, setup.min_steps), setup.max_steps))
             for goal, setup in zip(goals_steps, self._setups, strict=True)
         ]
-        self._tried(lambda: self._bus.write(clipped), "write")
+        self._checked_call(lambda: self._bus.write(clipped), "write")
 
     def faults(self) -> tuple[str, ...]:
         """Return the latched servo faults, one line each."""
-        return self._tried(lambda: tuple(map(str, self._bus.faults())), "faults")
+        return self._checked_call(lambda: tuple(map(str, self._bus.faults())), "faults")
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call."""
-        events = self._tried(lambda: tuple(map(str, self._bus.events())), "events")
+        events = self._checked_call(lambda: tuple(map(str, self._bus.events())), "events")
         return (*self._log.drain(), *events)
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
@@ -174,7 +174,7 @@ class CheckedBus:
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
             raise ValueError("other servos need another bus: ids and models must stay")
-        outcome = self._made(lambda: self._bus.retune(setups), "retune")
+        outcome = self._call_in_order(lambda: self._bus.retune(setups), "retune")
         if outcome is not None and outcome.error is not None:
             raise outcome.error
 
@@ -184,16 +184,16 @@ class CheckedBus:
         Raises:
             BusLost: the port is gone, or the package fails.
         """
-        self._tried(self._bus.disable_torque, "disable_torque", "cut the servo power")
+        self._checked_call(self._bus.disable_torque, "disable_torque", "cut the servo power")
 
     def health(self) -> BusHealth:
         """Return byte and error counts."""
-        health: Any = self._tried(self._bus.health, "health")
+        health: Any = self._checked_call(self._bus.health, "health")
         return health if isinstance(health, BusHealth) else BusHealth(0, 0, {})
 
     def close(self) -> None:
         """Close the port; safe to call twice."""
-        outcome = self._made(self._bus.close, "close")
+        outcome = self._call_in_order(self._bus.close, "close")
         if outcome is None:
             self._log.add(f"{self._label} does not close: it is abandoned")
         elif outcome.error is not None:
@@ -201,8 +201,8 @@ class CheckedBus:
         self._call.close()
         self._call, self._blocked = BoundedCall(self._label, _USUAL_S), False
 
-    def _tried(self, call: Callable[[], T], name: str, remedy: str = "") -> T:
-        outcome = self._made(call, name)
+    def _checked_call(self, call: Callable[[], T], name: str, remedy: str = "") -> T:
+        outcome = self._call_in_order(call, name)
         hint = f": {remedy}" if remedy else ""
         if outcome is None:
             raise BusLost(f"{self._label}: {name} does not return{hint}")
@@ -213,10 +213,10 @@ class CheckedBus:
         value: T = outcome.value
         return value
 
-    def _made(self, call: Callable[[], object], name: str) -> CallResult | None:
+    def _call_in_order(self, call: Callable[[], object], name: str) -> CallResult | None:
         """Make a call after all earlier ones; return None if any of them does not return."""
         longest_s = _BLOCKED_S if self._blocked else _LONGEST_S.get(name, _USUAL_S)
-        outcome = self._call.in_turn(call, longest_s)
+        outcome = self._call.call_in_order(call, longest_s)
         self._blocked = outcome is None
         return outcome
 

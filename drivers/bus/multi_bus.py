@@ -116,9 +116,9 @@ class MultiBus:
             timer.update(feedbacks[i], now_s)
         if lost:
             raise lost[0]
-        return self._together(feedbacks)
+        return self._combine(feedbacks)
 
-    def _together(self, feedbacks: Sequence[Feedback]) -> Feedback:
+    def _combine(self, feedbacks: Sequence[Feedback]) -> Feedback:
         """Return the feedback of all buses as one."""
         columns = [tuple(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]
         missing = list[int]()

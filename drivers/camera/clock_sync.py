@@ -52,9 +52,9 @@ class ClockSync:
         Later stamps never result in earlier times, and no time is after the arrival.
         """
         difference_s = arrived_s - device_s
-        if self._jumped(device_s, difference_s):
+        if self._has_jumped(device_s, difference_s):
             self._forget()
-        self._keep(device_s, difference_s)
+        self._store(device_s, difference_s)
         host_s = device_s + self._line_s(device_s) - self._least_delay_s
         if self._last is not None and device_s >= self._last[0]:
             host_s = max(host_s, self._last[1])
@@ -66,7 +66,7 @@ class ClockSync:
         """Return host minus device time at a device time."""
         return self._offset_s + self._drift * device_s
 
-    def _jumped(self, device_s: float, difference_s: float) -> bool:
+    def _has_jumped(self, device_s: float, difference_s: float) -> bool:
         """Return whether the clocks no longer match the line."""
         if self._last is None:
             return False
@@ -89,7 +89,7 @@ class ClockSync:
         self._drift, self._offset_s = 0.0, 0.0
         self.jumps += 1
 
-    def _keep(self, device_s: float, difference_s: float) -> None:
+    def _store(self, device_s: float, difference_s: float) -> None:
         """Store a frame if it is the least delayed of its bucket, and fit the line again."""
         bucket = int(device_s // _BUCKET_S)
         new = _BestFrame(device_s, difference_s)

@@ -70,7 +70,7 @@ class GuardedCamera:
         self._call.close()
         self._call = BoundedCall(self._label, self._longest_s)
         given_up = threading.Event()
-        outcome = self._call.in_turn(lambda: self._open(given_up), self._open_s)
+        outcome = self._call.call_in_order(lambda: self._open(given_up), self._open_s)
         if outcome is None:
             given_up.set()
             self._call.close()
@@ -92,7 +92,7 @@ class GuardedCamera:
         """Return the newest detections, None before the first and after a failure."""
         if self._failed:
             return None
-        outcome = self._call(lambda: self._look(now_s))
+        outcome = self._call(lambda: self._read_camera(now_s))
         if outcome is None:
             self._wait(now_s)
             return self._newest
@@ -116,7 +116,7 @@ class GuardedCamera:
                     self._log.add(f"{self._label}: {line}")
         return self._newest
 
-    def _look(self, now_s: float) -> tuple[Detections | None, str, tuple[str, ...]]:
+    def _read_camera(self, now_s: float) -> tuple[Detections | None, str, tuple[str, ...]]:
         """Return the camera's detections, its fault, and its events; may block."""
         found = self.camera.latest(now_s)
         wrong = "" if found is self._checked else fault_of(found)

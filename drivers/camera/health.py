@@ -197,9 +197,9 @@ class HealthModel:
             return None
         if any(abs(_within_half(one - seen.turned_deg)) > _AGREE_DEG for one in self._turned):
             return None
-        return self._turned_text(seen.turned_deg)
+        return self._turn_message(seen.turned_deg)
 
-    def _turned_text(self, deg: float) -> str:
+    def _turn_message(self, deg: float) -> str:
         """Return a message with the clockwise angle of frames and the remedy."""
         quarter = round(deg / 90.0) * 90 % 360
         off = abs(_within_half(deg - quarter))
@@ -319,17 +319,17 @@ class TurnedFaces:
         detector = self._made()
         if detector is None or not _is_picture(image):
             return None
-        small = _no_wider(image[..., :3], _PROBE_PX)
+        small = _limit_width(image[..., :3], _PROBE_PX)
         if tilted:
             if _any_upright(detector.find(small)):
                 return 0.0
-        elif not _any_sure(detector.find(_turned_back(small, self._ways[0]))):
+        elif not _any_sure(detector.find(_turn_back(small, self._ways[0]))):
             self._ways.rotate(-1)
             return 0.0
         found = [
             (face.confidence - _PER_DEG * abs(roll_deg(face)), way, face)
             for way in range(0, 360, 45)
-            for face in detector.find(_turned_back(small, way))
+            for face in detector.find(_turn_back(small, way))
         ]
         if not found:
             return 0.0
@@ -351,7 +351,7 @@ class TurnedFaces:
         return self._detector
 
 
-def _turned_back(image: NDArray[Any], deg: float) -> ImageArray:
+def _turn_back(image: NDArray[Any], deg: float) -> ImageArray:
     """Return a whole image turned counter-clockwise."""
     if deg % 90 == 0:
         return np.asarray(np.ascontiguousarray(np.rot90(image, int(deg) // 90)), np.uint8)
@@ -390,7 +390,7 @@ def picture_stats(image: NDArray[Any]) -> PictureStats | None:
     """Return statistics of a frame; None if it is no 8-bit picture."""
     if not _is_picture(image):
         return None
-    green = _no_wider(image[..., 1], _WIDTH_PX)
+    green = _limit_width(image[..., 1], _WIDTH_PX)
     bright = float(np.percentile(green[::4, ::4], 95))
     return PictureStats(bright, _edge_px(green) if min(green.shape) >= _LEAST_SIDE_PX else None)
 
@@ -411,7 +411,7 @@ def _edge_px(grey: NDArray[Any]) -> float | None:
     return float(np.percentile(contrast[shown] / steep[shown], 25))
 
 
-def _no_wider(image: NDArray[Any], width_px: int) -> ImageArray:
+def _limit_width(image: NDArray[Any], width_px: int) -> ImageArray:
     """Return an image, scaled down if it is wider than a width."""
     height, width = image.shape[:2]
     image = np.ascontiguousarray(image)

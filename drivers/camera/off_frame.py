@@ -37,17 +37,17 @@ class OffFrameReport:
     """Report, made once, that a detector returns such faces."""
 
     def __init__(self) -> None:
-        self._told = False
+        self._reported = False
 
     def report(
         self, faces: tuple[DetectedFace, ...], width_px: int, height_px: int
     ) -> tuple[str, ...]:
         """Return the line about the faces of a frame, or an empty tuple."""
-        if self._told:
+        if self._reported:
             return ()
         for face in faces:
             if _is_misplaced(face.landmarks_px.tolist(), width_px, height_px):
-                self._told = True
+                self._reported = True
                 x, y = face.landmarks_px.mean(axis=0).tolist()
                 return (
                     f"a face with landmarks about ({x:.0f}, {y:.0f}), outside the frame of "

@@ -94,7 +94,7 @@ class CameraRecorder:
         """
         shot = self._source.take(now_s, stop)
         if shot is not None and not self.failure:
-            self._hand_on(shot)
+            self._encode(shot)
         return shot
 
     def events(self) -> tuple[str, ...]:
@@ -116,7 +116,7 @@ class CameraRecorder:
             self._encoders.shutdown()
             self._encoders = None
 
-    def _hand_on(self, shot: Shot) -> None:
+    def _encode(self, shot: Shot) -> None:
         """Begin to encode a frame, unless too many are queued already."""
         if self._waiting.full():
             if self.left_out == 0:

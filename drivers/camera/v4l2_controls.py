@@ -36,35 +36,37 @@ def apply(device: Path, params: WebcamParams) -> Iterator[str]:
         return  # the camera itself is rejected with another message
     try:
         if params.exposure_ms is None:
-            if _refused(file, AUTO_EXPOSURE, _EXPOSURE_BY_APERTURE):
-                _refused(file, AUTO_EXPOSURE, _EXPOSURE_AUTO)
+            if _set_control(file, AUTO_EXPOSURE, _EXPOSURE_BY_APERTURE):
+                _set_control(file, AUTO_EXPOSURE, _EXPOSURE_AUTO)
         else:
-            _refused(file, AUTO_EXPOSURE, _EXPOSURE_MANUAL)
+            _set_control(file, AUTO_EXPOSURE, _EXPOSURE_MANUAL)
             units = max(1, round(params.exposure_ms / _EXPOSURE_UNIT_MS))
-            yield from _said("exposure_ms", params.exposure_ms, _refused(file, EXPOSURE, units))
+            yield from _report(
+                "exposure_ms", params.exposure_ms, _set_control(file, EXPOSURE, units)
+            )
         if params.gain is None:
-            _refused(file, AUTO_GAIN, 1)
+            _set_control(file, AUTO_GAIN, 1)
         else:
-            _refused(file, AUTO_GAIN, 0)
-            yield from _said("gain", params.gain, _refused(file, GAIN, params.gain))
+            _set_control(file, AUTO_GAIN, 0)
+            yield from _report("gain", params.gain, _set_control(file, GAIN, params.gain))
         if params.anti_flicker != "default":
-            why = _refused(file, MAINS, _MAINS[params.anti_flicker])
-            yield from _said("anti_flicker", params.anti_flicker, why)
+            why = _set_control(file, MAINS, _MAINS[params.anti_flicker])
+            yield from _report("anti_flicker", params.anti_flicker, why)
         if params.focus is None:
-            _refused(file, AUTO_FOCUS, 1)
+            _set_control(file, AUTO_FOCUS, 1)
         else:
-            _refused(file, AUTO_FOCUS, 0)
-            yield from _said("focus", params.focus, _refused(file, FOCUS, params.focus))
+            _set_control(file, AUTO_FOCUS, 0)
+            yield from _report("focus", params.focus, _set_control(file, FOCUS, params.focus))
     finally:
         os.close(file)
 
 
-def _said(name: str, value: object, why: str) -> Iterator[str]:
+def _report(name: str, value: object, why: str) -> Iterator[str]:
     if why:
         yield f"does not accept webcam.{name}: {value} ({why}): omit it or give another value"
 
 
-def _refused(file: int, control: int, value: int) -> str:
+def _set_control(file: int, control: int, value: int) -> str:
     """Set a control; return why it failed, "" on success."""
     try:
         import fcntl  # absent on Windows

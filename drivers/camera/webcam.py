@@ -92,9 +92,9 @@ class Webcam:
         self._rate_hz = capture.get(cv2.CAP_PROP_FPS)
         self._rate = FrameRateMonitor(f"camera {self._file}", self._rate_hz)
         self._left_s = None
-        self._tell_once(self._refused_format(capture))
+        self._report_once(self._refused_format(capture))
         for line in v4l2_controls.apply(self._file, self._params):
-            self._tell_once(f"camera {self._file} {line}")
+            self._report_once(f"camera {self._file} {line}")
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the kernel's stamp or its time of arrival.
@@ -116,7 +116,7 @@ class Webcam:
             if pixels is not None:
                 captured_s = self._stamp_s(self._capture, arrived_s)
                 away_s = 0.0 if self._left_s is None else came_s - self._left_s
-                self._tell(self._rate.update(captured_s, away_s))
+                self._report(self._rate.update(captured_s, away_s))
                 self._left_s = now_s()
                 # Frames that arrived while the reader was away count as skipped.
                 rate_hz = self._rate.measured_hz or self._rate_hz
@@ -153,14 +153,14 @@ class Webcam:
                 "(sudo usermod -aG video $USER) and log in again"
             )
 
-    def _tell(self, line: str) -> None:
+    def _report(self, line: str) -> None:
         """Store a line for ``events``."""
         if line and line not in self._told:
             self._events.append(line)
 
-    def _tell_once(self, line: str) -> None:
+    def _report_once(self, line: str) -> None:
         """Store a line once, even if the camera is reopened."""
-        self._tell(line)
+        self._report(line)
         self._told.add(line)
 
     def _refused_format(self, capture: cv2.VideoCapture) -> str:

@@ -40,7 +40,7 @@ def refuse_existing(*paths: Path, force: bool = False) -> None:
                 kind = kind_of(path.stat())
                 raise SetupError(f"{path} is {kind}: name a file, or /dev/stdout")
             if not force and (path.exists() or path.is_symlink()):
-                raise SetupError(_there(path))
+                raise SetupError(_exists_message(path))
             folder = path.parent
             if folder.exists() and not folder.is_dir():
                 raise SetupError(f"{folder} is no folder: name another file than {path}")
@@ -124,14 +124,14 @@ def _put_in_place(fresh: Path, target: Path, path: Path, force: bool) -> None:
     try:
         os.link(fresh, target)  # unlike a rename, it never replaces a file created meanwhile
     except FileExistsError:
-        raise SetupError(_there(path)) from None
+        raise SetupError(_exists_message(path)) from None
     except OSError:  # a file system without links
         if target.exists():
-            raise SetupError(_there(path)) from None
+            raise SetupError(_exists_message(path)) from None
         os.replace(fresh, target)
 
 
-def _there(path: Path) -> str:
+def _exists_message(path: Path) -> str:
     return f"{path} already exists: name another file, or use --force"
 
 

@@ -52,10 +52,10 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
         if not pulse:
             board.wait(start_s + board.timing.stagger_s)
             start_s = board.line.port.now_s()
-        _insist(board, channel, pulse)
+        _enable_channel(board, channel, pulse)
 
 
-def _insist(board: Board, channel: Channel, pulse: int) -> None:
+def _enable_channel(board: Board, channel: Channel, pulse: int) -> None:
     """Enable one channel.
 
     Raises:

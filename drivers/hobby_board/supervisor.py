@@ -168,7 +168,7 @@ class BoardSupervisor:
         astray = not self._led and (home or away or len(odd) == len(held))
         lost = odd if astray else home
         if lost:
-            self._lost_hold(lost, errors, now_s)
+            self._record_lost_hold(lost, errors, now_s)
         for channel in odd:
             if channel not in lost:
                 self._off_goal(channel, found[channel])
@@ -208,7 +208,9 @@ class BoardSupervisor:
             self._line.errors["other pulse"] += 1
             self._log.add(refusal(self._board, channel))
 
-    def _lost_hold(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
+    def _record_lost_hold(
+        self, lost: Sequence[Channel], errors: Sequence[str], now_s: float
+    ) -> None:
         """Record that channels have lost their goals and must be enabled again."""
         named = " and ".join(errors)
         who = (

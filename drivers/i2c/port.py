@@ -113,7 +113,7 @@ class I2cPort:
             for part in parts
         ]
         try:
-            self._see_free(parts[0].address)
+            self._check_free(parts[0].address)
             self._bus.i2c_rdwr(*messages)
         except OSError as error:
             if error.errno in _GONE or (self._bus.fd is not None and not self._is_there()):
@@ -125,7 +125,7 @@ class I2cPort:
             if part.length is not None:
                 self._waiting += bytes(message)
 
-    def _see_free(self, address: int) -> None:
+    def _check_free(self, address: int) -> None:
         """Check that no kernel driver has claimed an address.
 
         Raises:

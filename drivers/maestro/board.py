@@ -55,7 +55,7 @@ class MaestroBoard:
         where = self.line.port.port_name
         register = self.line.greet()
         if register is None:
-            raise ServoMissing(f"{where}: no Maestro answers: {self._mute_causes()}")
+            raise ServoMissing(f"{where}: no Maestro answers: {self._silence_causes()}")
         if not self.line.expects_crc():
             raise ServoMissing(
                 f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
@@ -73,7 +73,7 @@ class MaestroBoard:
                 )
         return pulses
 
-    def _mute_causes(self) -> str:
+    def _silence_causes(self) -> str:
         """Return the possible causes of a board that does not answer."""
         params = self.params
         number = f", its device number {params.device}" if params.protocol == "pololu" else ""

@@ -63,11 +63,11 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> Detected
             port.drain()
             register = line.greet()
             if register is not None and not register >> len(ERRORS) and line.expects_crc():
-                return _look(line, params, register, count)
+                return _read_state(line, params, register, count)
     return None
 
 
-def _look(
+def _read_state(
     line: MaestroLink, params: MaestroParams, register: int, count: bool
 ) -> DetectedMaestro | None:
     """Read the remaining state of a board that answers."""
@@ -76,7 +76,7 @@ def _look(
     # If several boards share a line, all of them answer the compact form.
     for form in FORMS if line.speech.form == "compact" else ("pololu",):
         spoken = MaestroLink(line.port, replace(params, protocol=form, crc=crc))
-        found = _patiently(partial(spoken.ask_words, spoken.speech.errors(), 1))
+        found = _retry(partial(spoken.ask_words, spoken.speech.errors(), 1))
         if found is not None:
             forms, line = (*forms, form), spoken
             register |= found[0]
@@ -85,7 +85,7 @@ def _look(
     if not forms:
         return None
     status = line.ask(line.speech.script_status(), 1)
-    pulses = _patiently(partial(line.pulses, range(min(MICRO, params.channels))))
+    pulses = _retry(partial(line.pulses, range(min(MICRO, params.channels))))
     if pulses is None:
         return None
     channels = _count(line) if count and not any(pulses) else None
@@ -95,7 +95,7 @@ def _look(
     return DetectedMaestro(forms, crc, name_errors(register), script, pulses, channels)
 
 
-def _patiently(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | None:
+def _retry(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | None:
     """Repeat a read without an answer: a busy host may have been late, not the board."""
     return next((answer for answer in (ask() for _ in range(TRIES)) if answer is not None), None)
 

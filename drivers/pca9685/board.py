@@ -122,7 +122,7 @@ class Pca9685Board:
     def prepare(self, log: EventLog) -> None:
         """Do nothing: boards are set up, if needed, before their first pulse."""
 
-    def _ready(self, address: int) -> bool:
+    def _ensure_set_up(self, address: int) -> bool:
         """Set a board up if it is not, which stops all its pulses; return whether it is set up."""
         now = self._modes(address)
         if now is None:
@@ -204,9 +204,9 @@ class Pca9685Board:
         prescale = found[2][0] if with_prescale else usual
         if found[0][0] == AWAKE and prescale == usual:
             return ChannelStatus(self._pulse_steps(channel.id, counts_of(found[1]), prescale))
-        return self._look_closer(channel)
+        return self._recheck(channel)
 
-    def _look_closer(self, channel: Channel) -> ChannelStatus | None:
+    def _recheck(self, channel: Channel) -> ChannelStatus | None:
         """Check a board again that has lost its setup or was read badly."""
         address, _ = self._places[channel.id]
         now, pulses = self._modes(address), self.pulses((channel.id,))
@@ -284,7 +284,9 @@ class Pca9685Board:
             channel.ramp.accel_steps_s2 = channel.setup.max_accel_steps_s2 or 0.0
         if not confirmed:
             return True
-        return all(self._ready(address) for address in self._boards([c.id for c in channels]))
+        return all(
+            self._ensure_set_up(address) for address in self._boards([c.id for c in channels])
+        )
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send the intermediate pulses of channels towards their goals, one transfer per board."""

@@ -52,7 +52,7 @@ def check_board(line: I2cLine, address: int) -> None:
     tries = (_registers(line, address) for _ in range(TRIES))
     found = next((one for one in tries if one is not None), None)
     if found is None:
-        raise ServoMissing(f"{where}{_mute(line, address)}")
+        raise ServoMissing(f"{where}{_silence_reason(line, address)}")
     first_six, outputs, prescale = found
     if not plausible(first_six, outputs, prescale):
         raise ServoMissing(
@@ -66,7 +66,7 @@ def check_board(line: I2cLine, address: int) -> None:
         )
 
 
-def _mute(line: I2cLine, address: int) -> str:
+def _silence_reason(line: I2cLine, address: int) -> str:
     """Return the reason of a failed read, with the remedy."""
     if line.failure == "bus stuck":
         return (

@@ -124,30 +124,33 @@ class BoundedCall:
         if self._longest_s is None:
             return _outcome(work, (Exception, SystemExit))
         if self._late is not None:
-            return self._waited_for(self._late, 0.0)
-        return self._waited_for(self._begun(work), self._longest_s)
+            return self._await_result(self._late, 0.0)
+        return self._await_result(self._submit(work), self._longest_s)
 
     def begin(self, work: Callable[[], Any]) -> None:
         """Make a call after all earlier ones and ignore its result; never wait."""
         with contextlib.suppress(RuntimeError):  # no memory for a thread: the next call tries again
-            self._begun(work)
+            self._submit(work)
 
-    def in_turn(self, work: Callable[[], Any], longest_s: float) -> CallResult | None:
+    def call_in_order(self, work: Callable[[], Any], longest_s: float) -> CallResult | None:
         """Make a call after the late one before, whose result is discarded; None while one lasts.
 
         longest_s: longest wait for each, seconds
         """
         if self._longest_s is None:
             return self(work)
-        if self._late is not None and self._waited_for(self._late, longest_s) is None:
+        if self._late is not None and self._await_result(self._late, longest_s) is None:
             return None
-        return self._waited_for(self._begun(work), longest_s)
+        return self._await_result(self._submit(work), longest_s)
 
     def idle(self, longest_s: float) -> bool:
         """Wait until all calls are done, at most ``longest_s`` [s]; return whether they are."""
-        return self._late is None or self._waited_for(self._begun(_nothing), longest_s) is not None
+        return (
+            self._late is None
+            or self._await_result(self._submit(_do_nothing), longest_s) is not None
+        )
 
-    def _begun(self, work: Callable[[], Any]) -> _Call:
+    def _submit(self, work: Callable[[], Any]) -> _Call:
         call = _Call(work)
         self._calls.put(call)
         self._late = call
@@ -158,7 +161,7 @@ class BoundedCall:
                 self._thread = thread
         return call
 
-    def _waited_for(self, call: _Call, patience_s: float) -> CallResult | None:
+    def _await_result(self, call: _Call, patience_s: float) -> CallResult | None:
         if not call.done.acquire(timeout=patience_s):
             return None
         self._late = None
@@ -216,7 +219,7 @@ class BoundedCall:
                 self._left = True
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Do nothing; used to wait for all earlier calls."""
 
 

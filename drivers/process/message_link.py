@@ -94,7 +94,7 @@ def create_links(count: int) -> LinkOffer:
         fds = tuple(end.fileno() for end in theirs)
         return LinkOffer(ours, tuple(map(str, fds)), fds, {}, theirs)
     token = secrets.token_hex(_TOKEN_BYTES // 2)
-    links = tuple(LoopbackLink(listener=_listening(), token=token) for _ in range(count))
+    links = tuple(LoopbackLink(listener=_listen(), token=token) for _ in range(count))
     words = tuple(f"port:{link.port}" for link in links)
     return LinkOffer(links, words, (), {TOKEN_VARIABLE: token}, ())
 
@@ -149,7 +149,7 @@ class LoopbackLink:
         self._queue: deque[bytes] = deque()
         self._queued = 0
         self._news = threading.Condition()
-        threading.Thread(target=self._hand_over, name="link", daemon=True).start()
+        threading.Thread(target=self._send_queued, name="link", daemon=True).start()
 
     def fileno(self) -> int:
         """Return the file descriptor to wait on."""
@@ -180,7 +180,7 @@ class LoopbackLink:
                 self.wait()
             elif not self._ready(0.0):
                 raise BlockingIOError
-            if self._closed or (self._end is None and not self._accepted()):
+            if self._closed or (self._end is None and not self._accept()):
                 return b""
             if self._end is None or not self._ready(0.0):
                 continue
@@ -227,7 +227,7 @@ class LoopbackLink:
             self._closed = True
             return True
 
-    def _accepted(self) -> bool:
+    def _accept(self) -> bool:
         """Accept a connection; return False if none will come any more."""
         assert self._listener is not None
         try:
@@ -256,7 +256,7 @@ class LoopbackLink:
         length = int.from_bytes(self._got[:_LENGTH_BYTES], "little")
         return _LENGTH_BYTES + length - len(self._got)
 
-    def _hand_over(self) -> None:
+    def _send_queued(self) -> None:
         """Send queued messages as fast as the other end receives them."""
         while True:
             with self._news:
@@ -272,7 +272,7 @@ class LoopbackLink:
                 return  # the receiver finds the end
 
 
-def _listening() -> socket.socket:
+def _listen() -> socket.socket:
     listener = socket.socket()
     listener.bind((_LOOPBACK, 0))
     listener.listen(8)

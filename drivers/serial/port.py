@@ -174,9 +174,9 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """
         if self._on_traffic is not None:
             self._on_traffic()
-        return self._gather(b"", length, deadline_s)
+        return self._read_rest(b"", length, deadline_s)
 
-    def _gather(self, got: bytes, length: int, deadline_s: float) -> bytes:
+    def _read_rest(self, got: bytes, length: int, deadline_s: float) -> bytes:
         """Read until there are ``length`` bytes, or the deadline.
 
         Raises:
@@ -227,7 +227,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
         if len(got) < length:
-            got = self._gather(got, length, deadline_s)
+            got = self._read_rest(got, length, deadline_s)
         return got, sent_s
 
     def drain(self) -> int:

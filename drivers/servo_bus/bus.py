@@ -114,7 +114,7 @@ class SmartServoBus(PortBus):
 
     # --- one reading
 
-    def _in_doubt(self, now_s: float) -> bool:
+    def _is_doubtful(self, now_s: float) -> bool:
         """Return whether even an intact answer must be checked servo by servo."""
         if self._family.weak_check:
             corrupt = self._line.errors.get("corrupt", 0)
@@ -272,7 +272,7 @@ class SmartServoBus(PortBus):
                 self._take(reader.read_troubled(now_s), now_s)
             else:
                 raw, at_s = line.exchange(group.request, group.reply_length)
-                doubtful = self._wary and self._in_doubt(now_s)
+                doubtful = self._wary and self._is_doubtful(now_s)
                 if doubtful or not feedback.apply_whole(group, raw, at_s):
                     self._take(reader.salvage(group, raw, at_s, now_s), now_s)
                 elif self._health.all_silent_since_s is not None:

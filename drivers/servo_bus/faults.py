@@ -130,7 +130,7 @@ class ServoHealth:
             self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return
         if self.all_silent_since_s is None:
-            self._tell(out, now_s, garbling)
+            self._report_silent(out, now_s, garbling)
         elif not self._all_silent and now_s - self.all_silent_since_s >= BLAME_S:
             self._all_silent = True
             self._log.add("no servo answers: check servo power and cable")
@@ -169,7 +169,7 @@ class ServoHealth:
                 "from their position", now_s, "lost",
             )  # fmt: skip
 
-    def _tell(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
+    def _report_silent(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
         for servo_id in out:
             silent_s = now_s - self._silent_since[servo_id]
             if servo_id not in self._reported and silent_s >= SAY_SILENT_S:

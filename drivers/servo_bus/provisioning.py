@@ -69,9 +69,9 @@ class Provisioning:
             self._correct(differences)
             for _ in range(self._family.passes - 1):
                 self._correct(self.differences(ids))
-            self._refuse(self.differences(ids))
+            self._raise_differences(self.differences(ids))
         if self._block is not None:
-            self._map(ids, self._block)
+            self._write_addresses(ids, self._block)
 
     def disable(self, ids: Sequence[int]) -> None:
         """Make servos answer every instruction, and switch torque and bus watchdog off.
@@ -155,7 +155,7 @@ class Provisioning:
             self._raise_missing((servo_id,), {}, name)
         return written
 
-    def _map(self, ids: Sequence[int], block: AddressMap) -> None:
+    def _write_addresses(self, ids: Sequence[int], block: AddressMap) -> None:
         """Write the indirect addresses that differ."""
         for servo_id, data in self._addresses(ids, block).items():
             if data != block.data:
@@ -174,7 +174,7 @@ class Provisioning:
         self._raise_missing(ids, found, "indirect addresses")
         return found
 
-    def _refuse(self, differences: Sequence[Difference]) -> None:
+    def _raise_differences(self, differences: Sequence[Difference]) -> None:
         """Raise an error for registers that still have wrong values."""
         if not differences:
             return

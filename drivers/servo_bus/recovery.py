@@ -52,7 +52,7 @@ class Recovery:
         self._watchdog = watchdog
         self._health = health
         self._log = log
-        self._said = ""
+        self._last_reported = ""
 
     def recover(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
         """Set servos up as at the start, holding their positions if ``engaged``.
@@ -95,16 +95,16 @@ class Recovery:
                 i for i in whole if torque[i] or not engaged or not health.exhausted(i, now_s)
             )
             if engaged:
-                well = self._on_this_side(well)
+                well = self._release_lost(well)
                 self.enable(well)
             found = dict(zip(well, read_positions(line, well), strict=True))
         except ServoMissing:
             return None
         except ServoFault as fault:
             switch_off(line, whole)
-            if self._said != str(fault):
-                self._said = str(fault)
-                self._log.add(self._said)
+            if self._last_reported != str(fault):
+                self._last_reported = str(fault)
+                self._log.add(self._last_reported)
             return None
         for servo_id in well:
             if self._family.faults_latch:
@@ -143,7 +143,7 @@ class Recovery:
         denied = {i for i, bits in found.items() if bits & family.torque_faults}
         return tuple(i for i in ids if i not in denied or torque.get(i, 1))
 
-    def _on_this_side(self, ids: tuple[int, ...]) -> tuple[int, ...]:
+    def _release_lost(self, ids: tuple[int, ...]) -> tuple[int, ...]:
         """Switch servos off that would move in the wrong direction; return the others.
 
         Raises:
@@ -188,7 +188,7 @@ class Recovery:
             write_verified(line, ids, "bus_watchdog", [0] * len(ids))
         present = read_positions(line, ids)
         if family.single_turn:
-            self._refuse_lost(ids, present)
+            self._check_none_lost(ids, present)
         goals = [self.clip(i, p) for i, p in zip(ids, present, strict=True)]
         outside = {i for i, p, g in zip(ids, present, goals, strict=True) if p != g}
         speeds = self.speeds(ids, outside)
@@ -199,7 +199,7 @@ class Recovery:
             write_verified(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
         return tuple(goals), outside
 
-    def _refuse_lost(self, ids: Sequence[int], present: Sequence[int]) -> None:
+    def _check_none_lost(self, ids: Sequence[int], present: Sequence[int]) -> None:
         """Check that no servo would move into its range in the wrong direction.
 
         Raises:

@@ -193,7 +193,7 @@ class SyncReader:
             silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
             if not samples and not damaged and self._header in raw:
                 self._line.lateness.late_answer(now_s)  # to an earlier request
-            self._blame(damaged, silent, now_s, turns)
+            self._record_failures(damaged, silent, now_s, turns)
             done = replies.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
             if not left or self._line.port.now_s() >= self._until_s:
@@ -201,7 +201,7 @@ class SyncReader:
             group = self._group(left, turns.next())
             raw, at_s = self._line.exchange(group.request, group.reply_length)
 
-    def _blame(
+    def _record_failures(
         self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: WindowSchedule
     ) -> None:
         """Record the failed servos; later bytes must not be taken for the next answer."""

@@ -73,14 +73,14 @@ class Transactions:
         port.write(packet)
         # Measured after the write: the host may have slept just before the bytes left.
         if port.now_s() - self._sent_s >= self.starving_s:
-            self._starve(port.now_s() - self._sent_s)
+            self._record_starvation(port.now_s() - self._sent_s)
         self._sent_s = now_s
         # Bytes leave after those still in the output buffer, at the speed of the bus.
         free_s = self._free_s if now_s <= self._free_s <= now_s + _BACKLOG_S else now_s
         self._free_s = free_s + len(packet) * self._byte_s
         self.tx_bytes += len(packet)
 
-    def _starve(self, silent_s: float) -> None:
+    def _record_starvation(self, silent_s: float) -> None:
         """Record a silence of this computer that tripped the servos' watchdogs."""
         self.starved = True
         self.lateness.own_silence(silent_s, self.port.now_s())
@@ -102,7 +102,7 @@ class Transactions:
         # Bytes received before the request belong to an earlier one.
         waited = self._reply_owed and bool(port.getBytesAvailable())
         if waited:
-            self._note_late(port.read_until(_ROOM, port.now_s()))
+            self._record_late(port.read_until(_ROOM, port.now_s()))
         now_s, prompt_s = port.now_s(), timeout.seconds
         # Times and counts as in ``send``, without the cost of another call every tick.
         free_s = self._free_s if now_s <= self._free_s <= now_s + _BACKLOG_S else now_s
@@ -112,11 +112,11 @@ class Transactions:
         self._reserved = reserve
         raw, sent_s = port.exchange(request, length, whole_s + 0.5 * prompt_s)
         if sent_s - self._sent_s >= self.starving_s:
-            self._starve(sent_s - self._sent_s)
+            self._record_starvation(sent_s - self._sent_s)
         self._sent_s = now_s
         self.quiet = False
         if len(raw) < length:
-            raw += self._wait_on(length - len(raw), 0.5 * prompt_s)
+            raw += self._wait_longer(length - len(raw), 0.5 * prompt_s)
         at_s = port.now_s()
         self.rx_bytes += len(raw)
         # The first bytes after a silence may be a late answer too: more may follow.
@@ -135,7 +135,7 @@ class Transactions:
         wait_s = timeout.with_reserve(self._sent_s) if self._reserved else timeout.seconds
         return self.whole_s + wait_s
 
-    def _wait_on(self, length: int, rest_s: float) -> bytes:
+    def _wait_longer(self, length: int, rest_s: float) -> bytes:
         """Return bytes that arrive after half of the prompt time-out.
 
         The last ``rest_s`` of the whole time-out show whether the line has fallen silent.
@@ -172,11 +172,11 @@ class Transactions:
             self.rx_bytes += len(more)
             if not more or self.port.now_s() >= end_s or len(dropped) >= 16 * _ROOM:
                 if dropped and self._reply_owed:
-                    self._note_late(dropped)
+                    self._record_late(dropped)
                     self._silent = False
                 return len(dropped)
 
-    def _note_late(self, raw: bytes) -> None:
+    def _record_late(self, raw: bytes) -> None:
         """Record answers that arrived after their time-outs; noise does not count."""
         if any(status.intact for status in self.family.codec.statuses(raw)):
             self.lateness.late_answer(self.port.now_s())
@@ -235,7 +235,7 @@ class Transactions:
         codec = self.family.codec
         self.port.clearPort()
         self.send(self.family.request(ids, address, length))
-        deadline_s = self._ends_s(len(ids) * (length + codec.STATUS_OVERHEAD))
+        deadline_s = self._reply_deadline_s(len(ids) * (length + codec.STATUS_OVERHEAD))
         found: dict[int, bytes] = {}
         refused: set[int] = set()
 
@@ -256,7 +256,7 @@ class Transactions:
             self.drain()
         return found
 
-    def _ends_s(self, answer_bytes: int) -> float:
+    def _reply_deadline_s(self, answer_bytes: int) -> float:
         """Return the deadline of an answer to the last request, seconds.
 
         In the loop other servos wait, and the delay of answers has been measured.

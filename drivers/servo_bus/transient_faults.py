@@ -140,7 +140,7 @@ class TransientFaultSupervisor(Supervisor):
         if sample.torque == 1 and self._is_armed(servo_id, sample):
             self._torque_off.discard(servo_id)
             self._doubted.discard(servo_id)
-        elif servo_id not in self._torque_off or not self._known_reason(servo_id):
+        elif servo_id not in self._torque_off or not self._has_known_reason(servo_id):
             self._doubted.add(servo_id)
 
     def _is_armed(self, servo_id: int, sample: Sample) -> bool:
@@ -148,7 +148,7 @@ class TransientFaultSupervisor(Supervisor):
         wanted = self._family.armed(self._setups[servo_id]).items()
         return all(limit is None or getattr(sample, name) == limit for name, limit in wanted)
 
-    def _look_again(self, group: Collection[int]) -> None:
+    def _reread_doubtful(self, group: Collection[int]) -> None:
         """Read marked servos once more, and schedule recovery of those that are not armed.
 
         Raises:
@@ -163,7 +163,7 @@ class TransientFaultSupervisor(Supervisor):
             sample = window.sample(0, data)
             if sample.torque != 1:
                 self._torque_off.add(servo_id)
-                if not self._known_reason(servo_id):
+                if not self._has_known_reason(servo_id):
                     self._suspects.add(servo_id)
             elif not self._is_armed(servo_id, sample):
                 # A restart too short to be noticed, after which a goal switched torque on.
@@ -187,7 +187,7 @@ class TransientFaultSupervisor(Supervisor):
             self._line.errors["setting changed"] += 1
             self._suspects.add(servo_id)
 
-    def _known_reason(self, servo_id: int) -> bool:
+    def _has_known_reason(self, servo_id: int) -> bool:
         """Return whether the reason for a servo's lack of torque is known."""
         if servo_id not in self._health.faults:
             return False
@@ -207,7 +207,7 @@ class TransientFaultSupervisor(Supervisor):
         if disturbed and self.engaged and now_s >= self._check_at_s:
             self._check_settings(group, now_s)
         if self._doubted and group:
-            self._look_again(group)
+            self._reread_doubtful(group)
         if self._suspects and now_s >= self._recover_at_s:
             self._recover(group, now_s)
         if self.entering.places:

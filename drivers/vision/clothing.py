@@ -136,7 +136,7 @@ def clothing_colours(
             if beside or other.y - _HEAD_UP_M * other.px_m > bottom:
                 continue
             if other.px_m > head.px_m / _NEARER and not _is_same(other, head):
-                seen &= ~_covered(other, xs, ys)
+                seen &= ~_covered_mask(other, xs, ys)
         share = float(np.count_nonzero(seen)) / seen.size
         if share < _LEAST_SHARE:
             continue
@@ -159,7 +159,7 @@ def _is_same(one: _Head, other: _Head) -> bool:
     return as_large and hypot(one.x - other.x, one.y - other.y) < _HEAD_HALF_M * other.px_m
 
 
-def _covered(
+def _covered_mask(
     by: _Head, xs: NDArray[np.floating[Any]], ys: NDArray[np.floating[Any]]
 ) -> NDArray[np.bool_]:
     """Return a mask of the grid of pixels that a nearer person covers."""

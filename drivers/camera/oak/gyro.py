@@ -74,14 +74,14 @@ class Gyro:
         if self.fault or (self._times and device_s <= self._times[-1]):
             return
         if not all(map(isfinite, rates_rad_s)) or hypot(*rates_rad_s) > _MOST_RAD_S:
-            self._absurd(device_s, rates_rad_s)
+            self._reject(device_s, rates_rad_s)
             return
         self._absurd_since_s = None
         if self._is_stuck(device_s, rates_rad_s):
             return
         x, y, z = (self._R_camera_imu @ rates_rad_s).tolist()
         self._bias.add(device_s, (x, y, z))
-        self._sum_up(device_s, (x, y, z))
+        self._integrate(device_s, (x, y, z))
         if self._first_s is None:
             self._first_s = device_s
         if self._bias.rad_s is None and not self._restless_told:
@@ -110,7 +110,7 @@ class Gyro:
         # Extrapolated from the previous reading, or from the newest one with its rate.
         base = max(0, after - 1)
         rates, since_s = _mean(self._rates[base], self._rates[at]), device_s - self._times[base]
-        w, x, y, z = _multiplied(self._turned[base], _small_turn(rates, bias, since_s))
+        w, x, y, z = _multiply(self._turned[base], _small_turn(rates, bias, since_s))
         return CameraTurn(
             self._epoch,
             (
@@ -120,7 +120,7 @@ class Gyro:
             ),
         )
 
-    def _sum_up(self, device_s: float, rates: Rates) -> None:
+    def _integrate(self, device_s: float, rates: Rates) -> None:
         """Integrate the mean of this reading and the last."""
         if not self._times or device_s - self._times[-1] > _GAP_S:
             self._epoch += 1
@@ -130,7 +130,7 @@ class Gyro:
         else:
             bias, since_s = self._bias.rad_s or (0.0, 0.0, 0.0), device_s - self._times[-1]
             step = _small_turn(_mean(self._rates[-1], rates), bias, since_s)
-            turned = _multiplied(self._turned[-1], step)
+            turned = _multiply(self._turned[-1], step)
         self._times.append(device_s)
         self._turned.append(turned)
         self._rates.append(rates)
@@ -144,7 +144,7 @@ class Gyro:
             self._fail(f"is stuck: always the same reading ({x:.2f}, {y:.2f}, {z:.2f} deg/s)")
         return bool(self.fault)
 
-    def _absurd(self, device_s: float, rates: Rates) -> None:
+    def _reject(self, device_s: float, rates: Rates) -> None:
         """Reject an impossible reading; a single one may be a disturbance."""
         if self._absurd_since_s is None:
             self._absurd_since_s = device_s
@@ -169,7 +169,7 @@ def _small_turn(rates: Rates, bias: Rates, dt_s: float) -> _Quaternion:
     return cos(0.5 * angle), share * x, share * y, share * z
 
 
-def _multiplied(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+def _multiply(a: _Quaternion, b: _Quaternion) -> _Quaternion:
     """Return the rotation a followed by b, about the rotated axes."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b

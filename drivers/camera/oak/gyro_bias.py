@@ -44,10 +44,10 @@ class GyroBias:
             self._means.append(np.mean(self._block, axis=0))
         self._block, self._began_s = [], t_s
         if len(self._means) == _BLOCKS:
-            self._judge(np.array(self._means))
+            self._assess(np.array(self._means))
             self._means.clear()
 
-    def _judge(self, means: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
+    def _assess(self, means: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
         """Replace the bias by these averages if the gyro was at rest."""
         mean = means.mean(axis=0)
         if np.abs(means - mean).max() > _SPREAD_RAD_S or np.abs(mean).max() > _MOST_RAD_S:

@@ -92,16 +92,16 @@ class AutoDetector:
         self._size = frame.shape
         if first:
             self._known = []
-        known = self._placed_again(frame)
+        known = self._track_faces(frame)
         soon = len(known) < len(self._known) or self._is_cut(frame)
         if first or self._search_due(soon, not known):
             self._since_search = 0
-            known += self._near(frame, known, first)
+            known += self._search_frame(frame, known, first)
         else:
-            known += self._far(frame, known, self._tile(frame))
+            known += self._search_tile(frame, known, self._tile(frame))
         if first:
             for tile in self._tiles(frame):
-                known += self._far(frame, known, tile)
+                known += self._search_tile(frame, known, tile)
         self._known = known
         return largest_first([one.face for one in known])
 
@@ -136,21 +136,21 @@ class AutoDetector:
         before, self._samples = self._samples, samples
         return before.shape == samples.shape and float(np.abs(samples - before).mean()) > _CUT_GREY
 
-    def _placed_again(self, frame: ImageArray) -> list[_KnownFace]:
+    def _track_faces(self, frame: ImageArray) -> list[_KnownFace]:
         """Return the known faces that are still present, placed in this frame."""
         if not self._known:
             return []
         boxes = np.array([one.box for one in self._known])
-        judged = self._judged(frame, boxes, self._params.keep_confidence)
+        judged = self._score(frame, boxes, self._params.keep_confidence)
         for row, (one, now) in enumerate(zip(self._known, judged, strict=True)):
             if now is None:
                 around = None if one.by_yunet else self._around(frame, one)
                 judged[row] = around or self._by_yunet(frame, one)
             else:
-                judged[row] = _moving(now, one)
+                judged[row] = _predict(now, one)
         return _distinct([one for one in judged if one is not None], [])
 
-    def _judged(self, frame: ImageArray, boxes: Floats, least: float) -> list[_KnownFace | None]:
+    def _score(self, frame: ImageArray, boxes: Floats, least: float) -> list[_KnownFace | None]:
         """Return the face in each square box, None if the last network finds none."""
         placed = self._networks.place(frame, boxes)
         again = to_squares(placed.tight)
@@ -161,18 +161,18 @@ class AutoDetector:
 
     def _around(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
         """Search for a lost face around its previous position."""
-        part, where = crop_square(frame, _widened(one.box, _AROUND), _AROUND_PX)
+        part, where = crop_square(frame, _widen(one.box, _AROUND), _AROUND_PX)
         boxes, _ = self._networks.propose(part, _PROPOSE_AT)
         boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
         boxes = self._networks.refine(frame, to_squares(boxes))
-        found = [face for face in self._judged(frame, boxes, self._params.min_confidence) if face]
+        found = [face for face in self._score(frame, boxes, self._params.min_confidence) if face]
         return max(found, key=lambda face: face.face.confidence, default=None)
 
     def _by_yunet(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
         """Place a face that only YuNet finds."""
         if self._yunet is None:
             return None
-        part, where = crop_square(frame, _widened(one.box, _YUNET_AROUND), _YUNET_PX)
+        part, where = crop_square(frame, _widen(one.box, _YUNET_AROUND), _YUNET_PX)
         rows = self._yunet.search(part, self._params.keep_confidence)
         if not len(rows):
             return None
@@ -182,22 +182,24 @@ class AutoDetector:
         row[4:14] += np.tile(where[:2], 5)
         return _KnownFace(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
 
-    def _near(self, frame: ImageArray, known: list[_KnownFace], first: bool) -> list[_KnownFace]:
+    def _search_frame(
+        self, frame: ImageArray, known: list[_KnownFace], first: bool
+    ) -> list[_KnownFace]:
         """Search the whole frame; return the new faces."""
         prepared = prepare(frame, self._params.work_width_px)
         assert prepared is not None
         self._searches += 1
         found: list[_KnownFace] = []
         if self._yunet is not None:
-            found += self._near_by_yunet(self._yunet, prepared, known)
+            found += self._search_frame_by_yunet(self._yunet, prepared, known)
         if self._yunet is None or first or self._searches % _BOTH_EVERY == 0:
             boxes = propose_faces(self._networks, prepared, self._params.min_face_px)
             boxes = self._networks.refine(frame, boxes[_is_new(boxes, [*known, *found])])
             least = self._params.min_confidence
-            found += self._accepted(frame, [*known, *found], boxes, least)
+            found += self._accept(frame, [*known, *found], boxes, least)
         return found
 
-    def _near_by_yunet(
+    def _search_frame_by_yunet(
         self, yunet: YunetNetwork, prepared: PreparedImage, known: list[_KnownFace]
     ) -> list[_KnownFace]:
         """Search the whole frame with YuNet; MTCNN's last network places faces it also finds."""
@@ -207,7 +209,7 @@ class AutoDetector:
         points = rows[:, 4:14].reshape(-1, 5, 2)
         boxes = np.array([_square_of(five) for five in points]).reshape(-1, 4)
         fresh = np.flatnonzero(_is_new(boxes, known))
-        judged = self._judged(prepared.full, boxes[fresh], least)
+        judged = self._score(prepared.full, boxes[fresh], least)
         found = [
             now if now is not None else _KnownFace(boxes[row], face_of_row(rows[row]), True)
             for row, now in zip(fresh, judged, strict=True)
@@ -227,7 +229,7 @@ class AutoDetector:
         self._next_tile = (self._next_tile + 1) % len(tiles)
         return tiles[self._next_tile]
 
-    def _far(
+    def _search_tile(
         self, frame: ImageArray, known: list[_KnownFace], tile: Tile | None
     ) -> list[_KnownFace]:
         """Search a tile for small faces; return the new ones."""
@@ -243,17 +245,17 @@ class AutoDetector:
         boxes = to_squares(boxes)
         boxes = self._networks.refine(frame, boxes[_is_new(boxes, known)])
         least = max(_FAR_CONFIDENCE, self._params.min_confidence)
-        return self._accepted(frame, known, boxes, least)
+        return self._accept(frame, known, boxes, least)
 
-    def _accepted(
+    def _accept(
         self, frame: ImageArray, known: list[_KnownFace], boxes: Floats, least: float
     ) -> list[_KnownFace]:
         """Return the new faces in square boxes that the last network confirms."""
-        found = [one for one in self._judged(frame, boxes, least) if one is not None]
+        found = [one for one in self._score(frame, boxes, least) if one is not None]
         return _distinct(found, known)
 
 
-def _moving(now: _KnownFace, before: _KnownFace) -> _KnownFace:
+def _predict(now: _KnownFace, before: _KnownFace) -> _KnownFace:
     """Return a face with its search box predicted by its motion between frames.
 
     The network places a face that is off the centre of its box too near to that centre.
@@ -262,7 +264,7 @@ def _moving(now: _KnownFace, before: _KnownFace) -> _KnownFace:
     return now._replace(box=now.box + np.tile(moved, 2))
 
 
-def _widened(box: Floats, times: float) -> Floats:
+def _widen(box: Floats, times: float) -> Floats:
     """Return a square with the same centre, wider by a factor."""
     middle, half = (box[:2] + box[2:]) / 2.0, times * (box[2] - box[0]) / 2.0
     return np.concatenate([middle - half, middle + half])

@@ -22,7 +22,7 @@ def crop_square(
     """
     if box[2] - box[0] > _AVERAGED_FROM * side_px:
         box = np.rint(box)
-        return _averaged(image, box, side_px), box
+        return _average_crop(image, box, side_px), box
     left, top, right, bottom = box.tolist()
     x, y = side_px / max(right - left, 1e-3), side_px / max(bottom - top, 1e-3)
     # Pixel edges are whole numbers here; in OpenCV pixel centres are.
@@ -31,7 +31,7 @@ def crop_square(
     return np.asarray(part, np.uint8), box
 
 
-def _averaged(image: ImageArray, box: NDArray[np.float64], side_px: int) -> ImageArray:
+def _average_crop(image: ImageArray, box: NDArray[np.float64], side_px: int) -> ImageArray:
     """Crop a box of whole pixels and shrink it."""
     left, top, right, bottom = (int(edge) for edge in box)
     inside = image[max(0, top) : max(0, bottom), max(0, left) : max(0, right)]

@@ -113,14 +113,14 @@ class MeshNetworks:
         side = _SIDE * max(_EYES_AS_HEIGHT * apart, float(np.hypot(*(mouth - between))))
         if not _LEAST_EYES_PX <= side / (_SIDE * _EYES_AS_HEIGHT) <= max(image.shape[:2]):
             return None
-        to_image = _square(between + _MIDDLE * (mouth - between), side, across, _MESH_PX)
+        to_image = _square_map(between + _MIDDLE * (mouth - between), side, across, _MESH_PX)
         points, certainty = _run(self._face, _MESH_OUTPUTS, _crop(image, to_image, _MESH_PX))
         sure = 1.0 / (1.0 + exp(-min(max(float(certainty[0]), -50.0), 50.0)))
         if sure < _LEAST_CERTAINTY or not np.isfinite(points).all():
             return None
         grid = points.reshape(_POINTS, 3)
         depth = grid[:, 2:] * (side / _MESH_PX)
-        found = np.hstack([_placed(grid[:, :2], to_image), depth]).astype(np.float32)
+        found = np.hstack([_to_image(grid[:, :2], to_image), depth]).astype(np.float32)
         seen = self._eyes(image, found, eyes) if apart > _LEAST_IRIS_EYES_PX else None
         irises, lids = seen if seen is not None else (None, None)
         return FaceMesh(found, irises, lids, sure)
@@ -135,7 +135,7 @@ class MeshNetworks:
             points: Points of the mesh.
             eyes: Eyes of earlier frames.
         """
-        maps = [_eye_square(points, corners) for corners in _EYE_CORNERS]
+        maps = [_eye_square_map(points, corners) for corners in _EYE_CORNERS]
         placed = [to_image for to_image in maps if to_image is not None]
         if len(placed) < len(maps):
             return None
@@ -147,7 +147,7 @@ class MeshNetworks:
             return None
         irises, lids = (
             np.array(
-                [_placed(eye[k], to_image) for eye, to_image in zip(seen, placed, strict=True)]
+                [_to_image(eye[k], to_image) for eye, to_image in zip(seen, placed, strict=True)]
             )
             for k in (0, 1)
         )
@@ -186,14 +186,14 @@ def _network(file: ModelFile) -> cv2.dnn.Net:
         return cv2.dnn.readNetFromTFLite(content)
 
 
-def _square(middle: Floats, side: float, across: Floats, size_px: int) -> Floats:
+def _square_map(middle: Floats, side: float, across: Floats, size_px: int) -> Floats:
     """Return the map (2, 3) from pixels of an upright square crop to pixels of the image."""
     angle, scale = atan2(float(across[1]), float(across[0])), side / size_px
     turn = scale * np.array([(cos(angle), -sin(angle)), (sin(angle), cos(angle))])
     return np.column_stack([turn, middle - turn @ np.full(2, 0.5 * (size_px - 1))])
 
 
-def _eye_square(points: NDArray[np.float32], which: tuple[int, int]) -> Floats | None:
+def _eye_square_map(points: NDArray[np.float32], which: tuple[int, int]) -> Floats | None:
     """Return the map (2, 3) from the crop of an eye to pixels of the image, None if invalid.
 
     Args:
@@ -203,7 +203,7 @@ def _eye_square(points: NDArray[np.float32], which: tuple[int, int]) -> Floats |
     corners = points[list(which), :2].astype(np.float64)
     across = corners[1] - corners[0]
     side = _EYE_SIDE * float(np.hypot(*across))
-    return _square(corners.mean(axis=0), side, across, _IRIS_PX) if side > 1.0 else None
+    return _square_map(corners.mean(axis=0), side, across, _IRIS_PX) if side > 1.0 else None
 
 
 def _crop(image: ImageArray, to_image: Floats, size_px: int) -> ImageArray:
@@ -212,7 +212,7 @@ def _crop(image: ImageArray, to_image: Floats, size_px: int) -> ImageArray:
     return np.asarray(cv2.warpAffine(image, to_image, (size_px, size_px), flags=flags), np.uint8)
 
 
-def _placed(grid: NDArray[np.floating], to_image: Floats) -> Floats:
+def _to_image(grid: NDArray[np.floating], to_image: Floats) -> Floats:
     """Return points of a crop in pixels of the image."""
     return np.asarray(grid @ to_image[:, :2].T + to_image[:, 2], dtype=np.float64)
 

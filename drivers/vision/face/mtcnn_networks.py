@@ -88,7 +88,7 @@ class MtcnnNetworks:
         shifts, scores = _run(self._pnets[size], "pnet", turned)
         ix, iy = np.nonzero(scores[0, :, :, 1] > at)
         corner = np.stack([ix, iy], axis=1) * float(_STEP_PX)
-        boxes = _shifted(np.hstack([corner, corner + WINDOW_PX]), shifts[0, ix, iy])
+        boxes = _shift_edges(np.hstack([corner, corner + WINDOW_PX]), shifts[0, ix, iy])
         sure = scores[0, ix, iy, 1].astype(np.float64)
         keep = suppress_overlaps(boxes, sure)
         return boxes[keep], sure[keep]
@@ -100,7 +100,7 @@ class MtcnnNetworks:
         crops, boxes = _crops(image, boxes, _REFINE_PX)
         shifts, scores = _run(self._rnet, "rnet", crops)
         keep = scores[:, 1] > _REFINE_AT
-        boxes = _shifted(boxes[keep], shifts[keep])
+        boxes = _shift_edges(boxes[keep], shifts[keep])
         return to_squares(boxes[suppress_overlaps(boxes, scores[keep, 1])])
 
     def place(self, image: ImageArray, boxes: Floats) -> PlacedFaces:
@@ -112,7 +112,7 @@ class MtcnnNetworks:
         # Five x, then five y, as shares of the box.
         sides = (boxes[:, 2:] - boxes[:, :2])[:, np.newaxis]
         places = points.reshape(-1, 2, 5).transpose(0, 2, 1) * sides + boxes[:, np.newaxis, :2]
-        return PlacedFaces(_shifted(boxes, shifts), places, scores[:, 1].astype(np.float64))
+        return PlacedFaces(_shift_edges(boxes, shifts), places, scores[:, 1].astype(np.float64))
 
 
 def package_folder() -> Path:
@@ -188,6 +188,6 @@ def _crops(image: ImageArray, boxes: Floats, side_px: int) -> tuple[NDArray[np.u
     return crops, np.array([box for _, box in cuts])
 
 
-def _shifted(boxes: Floats, shifts: Floats32) -> Floats:
+def _shift_edges(boxes: Floats, shifts: Floats32) -> Floats:
     """Return boxes with edges moved by shares of the box's size."""
     return boxes + shifts * np.tile(boxes[:, 2:] - boxes[:, :2], 2)

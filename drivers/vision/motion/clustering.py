@@ -67,30 +67,30 @@ def cluster_motion(things: MotionMask, params: MotionParams) -> list[Group]:
     least = max(4, round(params.min_area_share * things.mask.size))
     pieces = [
         piece
-        for group in _connected(
+        for group in _components(
             things.mask, things.flow, params.close_px, least, _LOOKED_AT * params.max_blobs
         )
-        for piece in _parted(group, things, least, _MOST_SPLITS)
+        for piece in _split(group, things, least, _MOST_SPLITS)
     ]
     if things.change is not None:
         small = _SMALL_SHARE * things.mask.size
         pieces = [
             piece
             for piece in pieces
-            if _sharpest(things.change[piece.y, piece.x])
+            if _percentile_97(things.change[piece.y, piece.x])
             > (_LEAST_CHANGE * min(1.0, small / len(piece.x))) ** 2
         ]
     pieces.sort(key=lambda group: (-len(group.x), group.x[0], group.y[0]))
     return pieces[: params.max_blobs]
 
 
-def _sharpest(values: NDArray[np.float32]) -> float:
+def _percentile_97(values: NDArray[np.float32]) -> float:
     """Return the 97th percentile of values."""
     at = int(0.97 * len(values))
     return float(np.partition(values, at)[at])
 
 
-def _connected(mask: Mask, flow: Flow, close_px: int, least: int, most: int = 100) -> list[Group]:
+def _components(mask: Mask, flow: Flow, close_px: int, least: int, most: int = 100) -> list[Group]:
     """Return the connected components of the mask; gaps up to ``close_px`` are bridged.
 
     Of very many, the ``most`` largest are returned.
@@ -115,11 +115,11 @@ def _group(x: Indices, y: Indices, flow: Flow) -> Group:
     return Group(x, y, flow[y, x].astype(np.float64))
 
 
-def _parted(group: Group, things: MotionMask, least: int, splits: int) -> list[Group]:
+def _split(group: Group, things: MotionMask, least: int, splits: int) -> list[Group]:
     """Split a group of several motions recursively."""
     if splits == 0 or len(group.x) < 2 * least:
         return [group]
-    sides = _sides(group, things.threshold_px)
+    sides = _first_thing_mask(group, things.threshold_px)
     if sides is None:
         return [group]
     left, top, width, height = group.box
@@ -129,14 +129,14 @@ def _parted(group: Group, things: MotionMask, least: int, splits: int) -> list[G
         mask[group.y[side] - top, group.x[side] - left] = 255
         own = cv2.medianBlur(mask, _SMOOTH_PX) > 0
         flow = things.flow[top : top + height, left : left + width]
-        for piece in _connected(own, flow, _SMOOTH_PX, least):
+        for piece in _components(own, flow, _SMOOTH_PX, least):
             parts.append(Group(piece.x + left, piece.y + top, piece.flow))
     if len(parts) < 2:
         return [group]
-    return [piece for part in parts for piece in _parted(part, things, least, splits - 1)]
+    return [piece for part in parts for piece in _split(part, things, least, splits - 1)]
 
 
-def _sides(group: Group, threshold_px: float) -> Mask | None:
+def _first_thing_mask(group: Group, threshold_px: float) -> Mask | None:
     """Return a mask of the first of two things; None if there is only one."""
     step = max(1, len(group.x) // _SAMPLE)
     places = np.column_stack((group.x, group.y)).astype(np.float64)
@@ -172,20 +172,20 @@ def inscribed_px(group: Group, shape: tuple[int, ...]) -> float:
     inner[group.y - y, group.x - x] = 1
     inner[:] = cv2.morphologyEx(inner, cv2.MORPH_CLOSE, _HOLES)
     if x <= _CUT_PX:
-        _go_on(mask[:, 0], mask[:, 1])
+        _extend(mask[:, 0], mask[:, 1])
     if x + width >= shape[1] - _CUT_PX:
-        _go_on(mask[:, -1], mask[:, -2])
+        _extend(mask[:, -1], mask[:, -2])
     if y <= _CUT_PX:
-        _go_on(mask[0], mask[1])
+        _extend(mask[0], mask[1])
     if y + height >= shape[0] - _CUT_PX:
-        _go_on(mask[-1], mask[-2])
+        _extend(mask[-1], mask[-2])
     # Plain skin shows no flow: an area surrounded by motion moves too.
     outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(mask, outlines, -1, 1, cv2.FILLED)
     return float(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_3).max())
 
 
-def _go_on(beyond: NDArray[np.uint8], edge: NDArray[np.uint8]) -> None:
+def _extend(beyond: NDArray[np.uint8], edge: NDArray[np.uint8]) -> None:
     """Extend a patch that the image's edge cuts beyond it in one piece."""
     at = np.flatnonzero(edge)
     beyond[at[0] : at[-1] + 1] = 1

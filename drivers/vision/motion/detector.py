@@ -247,9 +247,11 @@ class MotionDetector:
     ) -> tuple[MovingBlob, ...]:
         """Measure each patch, and assign ids to those that move by more than ``least_px``."""
         frames = blur_images(pair) if groups else ()
-        measured = [(group, _measured(group, frames, _room(group, pair, ego))) for group in groups]
         measured = [
-            one for one in measured if _goes_px(one[0], one[1][1], now.grey.shape) > least_px
+            (group, _measure(group, frames, _background_warp(group, pair, ego))) for group in groups
+        ]
+        measured = [
+            one for one in measured if _motion_px(one[0], one[1][1], now.grey.shape) > least_px
         ]
         groups, motions = [group for group, _ in measured], [motion for _, motion in measured]
         follows = self._tracks.step(
@@ -284,7 +286,7 @@ class MotionDetector:
         edges = _edges(group, *now.grey.shape[:2])
         # A thing that the edge of the image cuts does not grow when more of it becomes visible.
         growth_sd = np.inf if any(edges) else motion.growth_sd
-        loom = _believed(motion.growth, growth_sd) / dt_s
+        loom = _shrink(motion.growth, growth_sd) / dt_s
         fastest_px, fastest_flow = fastest_quarter(group)
         at = back_project(fastest_px, far.z_m, now.K)
         fx, fy = (fastest_flow / dt_s).tolist()
@@ -296,7 +298,7 @@ class MotionDetector:
             _KIND,
             p,
             radius_m(len(group.x), far.z_m, now.K),
-            spin_rad_s=_believed(motion.spin_rad, motion.spin_sd) / dt_s,
+            spin_rad_s=_shrink(motion.spin_rad, motion.spin_sd) / dt_s,
             loom_1_s=loom,
             v_camera_m_s=velocity(p, flow_px_s, loom, now.K),
             depth_known=far.known,
@@ -324,13 +326,13 @@ def at_level(params: MotionParams, now: SmallImage) -> MotionParams:
     )
 
 
-def _goes_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> float:
+def _motion_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> float:
     """Return the approximate root mean square motion of a patch's pixels."""
     slide = float(np.hypot(*motion.slide_px))
     if any(_edges(group, *shape[:2])):
         return slide  # its growth is unknown
-    growth = _believed(motion.growth, motion.growth_sd)
-    spin = _believed(motion.spin_rad, motion.spin_sd)
+    growth = _shrink(motion.growth, motion.growth_sd)
+    spin = _shrink(motion.spin_rad, motion.spin_sd)
     return float(
         np.hypot(slide, 0.3 * np.sqrt(group.box[2] * group.box[3]) * np.hypot(growth, spin))
     )
@@ -359,14 +361,14 @@ def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -
     return out
 
 
-def _room(group: Group, pair: ImagePair, ego: EgoMotion) -> BackgroundWarp:
+def _background_warp(group: Group, pair: ImagePair, ego: EgoMotion) -> BackgroundWarp:
     """Return the map of a still patch to the older image."""
     if pair.shift is None:
         return BackgroundWarp(ego.B, np.zeros(2))
     return BackgroundWarp(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
 
 
-def _measured(
+def _measure(
     group: Group, frames: tuple[Level, ...], room: BackgroundWarp
 ) -> tuple[Floats, PatchMotion]:
     """Return a patch's centre, and the motion there."""
@@ -378,7 +380,7 @@ def _measured(
     return middle, patch_motion(refine_warp(start, places, middle, frames, room), rest)
 
 
-def _believed(value: float, sd: float) -> float:
+def _shrink(value: float, sd: float) -> float:
     """Shrink a measurement towards 0 by its noise; one within the noise is 0.
 
     This is the positive part of the James-Stein estimator for one number. Attention uses the

@@ -127,22 +127,22 @@ def estimate_ego_motion(
         unknown, and the motion of most points is taken for it
     moved_before: whether the image alone showed a motion of the camera shortly before
     """
-    points = _textured(pair)
+    points = _textured_points(pair)
     B, share, noise, fitted, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False, False
     if len(points) >= _LEAST_POINTS:
         at = points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)
         there = points + pair.flow[at]
         if pair.shift is not None:
             there -= pair.shift[at]
-        reach = _STANDING_REACH_PX + (_way(_inverse(pair.H), points) if predicted else 0.0)
+        reach = _STANDING_REACH_PX + (_median_shift(_inverse(pair.H), points) if predicted else 0.0)
         need = _AGAINST_JOINTS if predicted else _MOVES if moved_before else _STOOD
-        found = _room(points, there, K, pair, reach, need)
+        found = _fit_room(points, there, K, pair, reach, need)
         if found is not None:
             B, share, noise, free = found
             share, fitted = (share if noise <= _MOST_NOISE_PX else 0.0), True
     back = _inverse(pair.H) @ B
-    way = _way(back, points) if len(points) else 0.0
-    unforeseen = _way(B, points) if free else 0.0
+    way = _median_shift(back, points) if len(points) else 0.0
+    unforeseen = _median_shift(B, points) if free else 0.0
     total = _inverse(back)
     return EgoMotion(B, total / total[2, 2], share, noise, way, unforeseen, fitted)
 
@@ -169,13 +169,13 @@ def predicted_ego_motion(pair: ImagePair, changed: Mask) -> EgoMotion | None:
     slid = np.linalg.solve(g.T @ g + np.eye(3), -(g.T @ off[same]))
     if np.hypot(*slid[:2]) > _REST_PX:
         return None
-    way = _way(_inverse(pair.H), corners(pair.now.shape))
+    way = _median_shift(_inverse(pair.H), corners(pair.now.shape))
     return EgoMotion(
         np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0, True
     )
 
 
-def _textured(pair: ImagePair) -> Floats:
+def _textured_points(pair: ImagePair) -> Floats:
     """Return the points of a grid, (n, 2), with reliable flow."""
     strength = cv2.cornerMinEigenVal(pair.now, _CORNER_BLOCK)
     height, width = pair.now.shape
@@ -185,7 +185,7 @@ def _textured(pair: ImagePair) -> Floats:
     return np.column_stack((x[good], y[good])).astype(np.float64)
 
 
-def _room(
+def _fit_room(
     points: Floats,
     there: Floats,
     K: Floats,
@@ -199,12 +199,12 @@ def _room(
     near = off < reach_px
     stands = bool(near.mean() >= _LEAST_SHARE) and _cells(points[near], shape) >= _LEAST_CELLS
     asked = stands or need is _AGAINST_JOINTS
-    found = _fitted(points, there, K, shape, reach_px) if asked else None
+    found = _fit_homography(points, there, K, shape, reach_px) if asked else None
     if found is not None and found.share >= _LEAST_SHARE:
         return found
-    free = _fitted(points, there, K, shape, np.inf, need.cells)
+    free = _fit_homography(points, there, K, shape, np.inf, need.cells)
     if free is not None and free.noise_px > _MIXED_PX:
-        free = _of_two(points, there, K, shape, need.cells) or free
+        free = _fit_two_motions(points, there, K, shape, need.cells) or free
     if free is None or free.share < need.share:
         return found
     # Points that kept their position although the whole image seems to have moved.
@@ -239,7 +239,7 @@ def _outlines_kept(pair: ImagePair, B: Floats) -> float:
     return float((changed[should] < _UNCHANGED * change[should]).mean())
 
 
-def _of_two(
+def _fit_two_motions(
     points: Floats, there: Floats, K: Floats, shape: tuple[int, ...], least_cells: int
 ) -> HomographyFit | None:
     """Fit the room in an image with two motions: more of the edge moves with it.
@@ -256,11 +256,11 @@ def _of_two(
     for mine in (side, ~side):
         if np.count_nonzero(mine) < _LEAST_POINTS:
             continue
-        start = _fitted(points[mine], there[mine], K, shape, np.inf)
+        start = _fit_homography(points[mine], there[mine], K, shape, np.inf)
         if start is None:
             continue
         left = warp_points(_inverse(start.B), there)
-        rest = _fitted(points, left, K, shape, _STANDING_REACH_PX, least_cells)
+        rest = _fit_homography(points, left, K, shape, _STANDING_REACH_PX, least_cells)
         if rest is None or rest.noise_px > _MIXED_PX:
             continue
         B = start.B @ rest.B
@@ -271,7 +271,7 @@ def _of_two(
     return best
 
 
-def _fitted(
+def _fit_homography(
     points: Floats,
     there: Floats,
     K: Floats,
@@ -295,7 +295,7 @@ def _fitted(
         weights = np.maximum(1.0 - (errors / (_TUKEY * scale)) ** 2, 0.0) ** 2
         if np.count_nonzero(weights) < _LEAST_POINTS:
             return None
-        last, h = h, _solved(rows, b, weights)
+        last, h = h, _solve(rows, b, weights)
         errors = focal * np.hypot(*(_image(h, a) - b).T)
         done = np.abs(h - last).max() * focal < _SMALL_PX and scale < 2 * noise
         noise = _noise(errors, weights > 0.0)
@@ -321,7 +321,7 @@ def _rows(a: Floats, b: Floats) -> Floats:
     return rows.reshape(2 * n, 8)
 
 
-def _solved(rows: Floats, b: Floats, weights: Floats) -> Floats:
+def _solve(rows: Floats, b: Floats, weights: Floats) -> Floats:
     """Solve for the eight numbers, with a weak prior of no motion."""
     both = np.concatenate((weights, weights)) / _POINT_NOISE**2
     weighted = rows * both[:, None]
@@ -361,7 +361,7 @@ def _inverse(H: Floats) -> Floats:
     return np.asarray(np.linalg.inv(H), dtype=np.float64)
 
 
-def _way(H: Floats, points: Floats) -> float:
+def _median_shift(H: Floats, points: Floats) -> float:
     """Return the median motion of points by a homography."""
     return float(np.median(np.hypot(*(warp_points(H, points) - points).T)))
 

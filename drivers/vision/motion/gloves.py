@@ -109,9 +109,11 @@ class GloveDetector:
         circles = _circles(mask.copy(), least)
         gloves = []
         for row, circle in enumerate(circles):
-            cut = _cut(circle, small.shape[1], small.shape[0])
-            covered = _touched(circle, circles[:row]) or not (cut or _whole(mask, row, circles))
-            glove = self._numbered(circle, cut, covered, captured_s)
+            cut = _is_cut(circle, small.shape[1], small.shape[0])
+            covered = _is_covered(circle, circles[:row]) or not (
+                cut or _is_whole(mask, row, circles)
+            )
+            glove = self._assign_id(circle, cut, covered, captured_s)
             if glove is not None:
                 gloves.append(glove)
         found = {glove.id for glove in gloves}
@@ -121,7 +123,7 @@ class GloveDetector:
         self._known = [*gloves, *rest]
         return tuple(_blob(glove, share, lens) for glove in gloves)
 
-    def _numbered(
+    def _assign_id(
         self, circle: Circle, cut: bool, covered: bool, captured_s: float
     ) -> _Glove | None:
         """Return a circle with the number of the nearest earlier glove.
@@ -172,11 +174,11 @@ def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
         window = np.s_[y : y + height, x : x + width]
         inside = np.zeros((height, width), np.uint8)
         cv2.fillConvexPoly(inside, cv2.convexHull(outline) - (x, y), 255)
-        red[window] |= inside & _pale(hsv[window])
+        red[window] |= inside & _pale_mask(hsv[window])
     return red
 
 
-def _pale(hsv: NDArray[Any]) -> NDArray[np.uint8]:
+def _pale_mask(hsv: NDArray[Any]) -> NDArray[np.uint8]:
     """Return a mask of white and pale red."""
     hue, saturation, value = cv2.split(hsv)
     reddish = np.minimum(hue, 179 - hue) <= _PALE_HUE
@@ -203,13 +205,13 @@ def _circles(mask: NDArray[np.uint8], least_px: float) -> list[Circle]:
     return found
 
 
-def _cut(circle: Circle, width: int, height: int) -> bool:
+def _is_cut(circle: Circle, width: int, height: int) -> bool:
     """Return whether the edge of the image may hide a part of a glove."""
     edge = _BEYOND * circle.radius
     return not (edge < circle.x < width - edge and edge < circle.y < height - edge)
 
 
-def _touched(circle: Circle, nearer: list[Circle]) -> bool:
+def _is_covered(circle: Circle, nearer: list[Circle]) -> bool:
     """Return whether a larger circle may hide a part of a glove."""
     return any(
         np.hypot(circle.x - one.x, circle.y - one.y) < _TAKEN * one.radius + _BEYOND * circle.radius
@@ -217,7 +219,7 @@ def _touched(circle: Circle, nearer: list[Circle]) -> bool:
     )
 
 
-def _whole(mask: NDArray[np.uint8], row: int, circles: list[Circle]) -> bool:
+def _is_whole(mask: NDArray[np.uint8], row: int, circles: list[Circle]) -> bool:
     """Return whether a glove is nearly round, so that nothing in front hides a part of it.
 
     Args:

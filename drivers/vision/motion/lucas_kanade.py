@@ -97,14 +97,14 @@ def refine_warp(
     slope, there = room.near(centre)
     best = start
     for level in frames:
-        fit = _aligned(best, arms, centre, size, level, slope, there)
+        fit = _refine_level(best, arms, centre, size, level, slope, there)
         if fit is None:
             return best
         best = fit
     return best
 
 
-def _aligned(
+def _refine_level(
     start: AffineWarp,
     arms: Floats,
     centre: Floats,
@@ -115,7 +115,7 @@ def _aligned(
 ) -> AffineWarp | None:
     """Refine at one level; return None if it diverges or does not improve."""
     scale = level.scale
-    at = _at(arms + centre, scale).astype(np.intp)
+    at = _level_positions(arms + centre, scale).astype(np.intp)
     # Exact positions of the whole pixels.
     arms = (at + 0.5) / scale - 0.5 - centre
     wanted, slopes = _template(level.now, at, arms / size)
@@ -123,13 +123,13 @@ def _aligned(
 
     def errors() -> Floats:
         seen = arms @ (slope @ matrix).T + (there + slope @ shift)
-        at = _at(seen, scale).astype(np.float32)[:, None]
+        at = _level_positions(seen, scale).astype(np.float32)[:, None]
         found = cv2.remap(level.before, at, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
         out: Floats = wanted - found.ravel()
         return out
 
     off = errors()
-    first, weights = _weighed(off)
+    first, weights = _tukey_weights(off)
     noise, normal = first, np.eye(7)
     for _ in range(level.steps):
         weighted = slopes * weights[:, None]
@@ -139,7 +139,7 @@ def _aligned(
         matrix = matrix @ change
         shift = shift + matrix @ step[4:6] / scale
         off = errors()
-        noise, weights = _weighed(off)
+        noise, weights = _tukey_weights(off)
         if np.abs(step[:6]).max() < _SMALL_PX:
             break
     led_away = np.abs(matrix - start.matrix).max() * size * scale > 3 * _SLOPE_SD_PX
@@ -150,7 +150,7 @@ def _aligned(
     return AffineWarp(matrix, shift, float(spread))
 
 
-def _at(places: Floats, scale: float) -> Floats:
+def _level_positions(places: Floats, scale: float) -> Floats:
     """Return positions of the searched image in a level's pixels."""
     return places if scale == 1.0 else (places + 0.5) * scale - 0.5
 
@@ -168,7 +168,7 @@ def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, F
     return now[y, x].astype(np.float64), slopes
 
 
-def _weighed(errors: Floats) -> tuple[float, Floats]:
+def _tukey_weights(errors: Floats) -> tuple[float, Floats]:
     """Return the noise of errors without their mean, and Tukey's weights."""
     apart = np.abs(errors - upper_median(errors))
     noise = max(_LEAST_NOISE, 1.4826 * upper_median(apart))

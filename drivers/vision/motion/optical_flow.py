@@ -86,16 +86,18 @@ class FlowSearch:
             found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # initial guess, then result
             self._dis.calc(now, before, found)
             flow[window] = found
-            known[window] &= _inside(flow[window])
+            known[window] &= _flow_inside(flow[window])
         return pair._replace(flow=flow, known=known, windows=windows)
 
 
 def align(now: SmallImage, before: SmallImage, H: Floats) -> ImagePair:
     """Align two images by turning the older one by ``H``; their flow is still 0."""
-    grey, known = _turned(before.grey, H)
+    grey, known = _turn_image(before.grey, H)
     fine = grey
     if before.fine is not before.grey:
-        fine, _ = _turned(before.fine, _finer(H, before.fine.shape[0] / grey.shape[0]))
+        fine, _ = _turn_image(
+            before.fine, _scale_homography(H, before.fine.shape[0] / grey.shape[0])
+        )
     flow: Flow = np.zeros((*grey.shape, 2), dtype=np.float32)
     return ImagePair(now.grey, grey, known, flow, H, (now.fine, fine))
 
@@ -115,13 +117,13 @@ def windows_of(changed: Mask) -> tuple[Window, ...] | None:
     count, _, stats, _ = cv2.connectedComponentsWithStats(near)
     out, area = [], 0
     for x, y, w, h, _ in stats[1:].tolist():
-        columns, rows = _widened(4 * x, 4 * w, width), _widened(4 * y, 4 * h, height)
+        columns, rows = _widen(4 * x, 4 * w, width), _widen(4 * y, 4 * h, height)
         out.append((rows, columns))
         area += (rows.stop - rows.start) * (columns.stop - columns.start)
     return tuple(out) if area < _MOST_SHARE * changed.size else None
 
 
-def _widened(start: int, length: int, most: int) -> slice:
+def _widen(start: int, length: int, most: int) -> slice:
     """Return a range of an image, at least as long as the flow search needs."""
     more = max(0, LEAST_SIDE_PX - length)
     start = max(0, min(start - more // 2, most - length - more))
@@ -169,7 +171,7 @@ def gradients(grey: Grey) -> tuple[Plane, Plane]:
     )
 
 
-def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
+def _turn_image(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
     """Turn an image; return it with a mask of its known pixels."""
     at = corners(grey.shape)
     height, width = grey.shape
@@ -182,7 +184,7 @@ def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
     return np.asarray(turned, dtype=np.uint8), known
 
 
-def _finer(H: Floats, scale: float) -> Floats:
+def _scale_homography(H: Floats, scale: float) -> Floats:
     """Return a homography in pixels of an image that is larger by a factor."""
     S = np.array(
         [[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5], [0.0, 0.0, 1.0]]
@@ -191,7 +193,7 @@ def _finer(H: Floats, scale: float) -> Floats:
     return out
 
 
-def _inside(flow: Flow) -> Mask:
+def _flow_inside(flow: Flow) -> Mask:
     """Return a mask of the pixels whose flow ends inside the other image."""
     height, width = flow.shape[:2]
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]

@@ -97,7 +97,7 @@ def segment_motion(
             nearer thing cannot have (against the room or across its motion) counts.
         still: Their difference, if the room keeps its position in the older image.
     """
-    there = None if still is not None and pair.shift is None else _there(pair, ego)
+    there = None if still is not None and pair.shift is None else _still_positions(pair, ego)
     if still is None or pair.shift is not None:
         still = image_difference(pair, there)
     threshold = max(params.min_flow_px, params.noise_factor * ego.noise_px)
@@ -111,24 +111,24 @@ def segment_motion(
         part = pair.part(window)
         corner = np.array((window[1].start, window[0].start), np.float32)
         at = None if there is None else there[window] - corner
-        rest = -part.flow if at is None else at - _added(part.flow, 1.0)
+        rest = -part.flow if at is None else at - _add_flow(part.flow, 1.0)
         moves = rest
         if by_image and ego.shift_px > _STANDS_PX:
-            moves = rest - _nearer(rest, ego, params.parallax_share)
-        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _jumps(part.shift)
+            moves = rest - _parallax_part(rest, ego, params.parallax_share)
+        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _parallax_jumps(part.shift)
         mask &= part.known
         squares = still.squares[window]
         mask &= squares > _NOISE_RATIO * still.noise
         if mask.any():
             mask &= _across(part.now, moves, threshold)
-            mask &= _borne_out(part, squares, still.noise, rest)
+            mask &= _confirmed_mask(part, squares, still.noise, rest)
         things.flow[window], things.mask[window] = rest, mask
         if mask.any():
-            change[window] = _solid(part, at)
+            change[window] = _solid_change(part, at)
     return things
 
 
-def _there(pair: ImagePair, ego: EgoMotion) -> Flow:
+def _still_positions(pair: ImagePair, ego: EgoMotion) -> Flow:
     """Return the positions of still things in the older image, (h, w, 2)."""
     there = _background(ego.B, pair.now.shape)
     if pair.shift is not None:
@@ -136,12 +136,12 @@ def _there(pair: ImagePair, ego: EgoMotion) -> Flow:
     return there
 
 
-def _solid(pair: ImagePair, there: Flow | None) -> Plane:
+def _solid_change(pair: ImagePair, there: Flow | None) -> Plane:
     """Return the square of the relative change of brightness, without light, (h, w).
 
     A shadow darkens neighbouring pixels alike; a thing has its own edges.
     """
-    seen = _through(pair.before, there)
+    seen = _warp(pair.before, there)
     change: Plane = np.log((pair.now + _DARK) / (seen + _DARK)).astype(np.float32)
     change -= cv2.blur(change, (_NEAR_PX, _NEAR_PX))
     return np.asarray(change * change, np.float32)
@@ -163,7 +163,7 @@ def _across(now: Grey, moves: Flow, threshold_px: float) -> Mask:
     return out
 
 
-def _jumps(shift: Flow | None) -> Plane | float:
+def _parallax_jumps(shift: Flow | None) -> Plane | float:
     """Return the relative motion of still neighbours, (h, w): flow there may be the neighbour's."""
     if shift is None:
         return 0.0
@@ -171,7 +171,7 @@ def _jumps(shift: Flow | None) -> Plane | float:
     return np.asarray(ends[..., 0] + ends[..., 1], dtype=np.float32)
 
 
-def _nearer(rest: Flow, ego: EgoMotion, most: float) -> Flow:
+def _parallax_part(rest: Flow, ego: EgoMotion, most: float) -> Flow:
     """Return the part of a motion that a still thing nearer than the room could have, (h, w, 2).
 
     A lens that turns also moves sideways, so near things move like the room but farther, and things
@@ -183,7 +183,7 @@ def _nearer(rest: Flow, ego: EgoMotion, most: float) -> Flow:
         most: Largest additional motion of a thing, as a share of the room's motion.
     """
     room = -_background(np.asarray(np.linalg.inv(ego.total)), rest.shape[:2])
-    room = _added(room, 1.0)
+    room = _add_flow(room, 1.0)
     squares = np.maximum(_dot(room, room), np.float32(1e-6))
     along = np.asarray(_dot(rest, room) / squares, dtype=np.float32)
     out: Flow = np.clip(along, -_BEHIND, most)[..., None] * room
@@ -213,21 +213,21 @@ def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
     return np.dstack(((a * x + b * y + c) / depth, (d * x + e * y + f) / depth))
 
 
-def _borne_out(pair: ImagePair, still: Plane, noise: float, rest: Flow) -> Mask:
+def _confirmed_mask(pair: ImagePair, still: Plane, noise: float, rest: Flow) -> Mask:
     """Return a mask of pixels that the flow explains and the camera's motion does not.
 
     Background that a thing has uncovered changed too, and any flow explains plain background. But
     its flow begins at unchanged pixels, while the flow of a thing begins at pixels that it has
     left.
     """
-    moving = _squares(pair.now, pair.before, _added(pair.flow, 1.0))
-    left = cv2.remap(still, _added(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
+    moving = _squares(pair.now, pair.before, _add_flow(pair.flow, 1.0))
+    left = cv2.remap(still, _add_flow(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
     out: Mask = left > _NOISE_RATIO * noise
     out &= moving < _LEFT_SHARE * (still - noise) + noise
     return out
 
 
-def _added(flow: Flow, sign: float) -> Flow:
+def _add_flow(flow: Flow, sign: float) -> Flow:
     """Return each pixel's position plus or minus its flow."""
     out: Flow = np.float32(sign) * flow
     out[..., 0] += np.arange(out.shape[1], dtype=np.float32)
@@ -237,11 +237,11 @@ def _added(flow: Flow, sign: float) -> Flow:
 
 def _squares(now: Grey, before: Grey, there: Flow | None) -> Plane:
     """Return the local mean square difference from the older image, seen through a map."""
-    off = without_illumination(now.astype(np.float32) - _through(before, there))
+    off = without_illumination(now.astype(np.float32) - _warp(before, there))
     return np.asarray(cv2.blur(off * off, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 
-def _through(before: Grey, there: Flow | None) -> Plane:
+def _warp(before: Grey, there: Flow | None) -> Plane:
     """Return the older image seen through a map; unchanged for None."""
     grey = before.astype(np.float32)
     if there is None:

@@ -75,7 +75,7 @@ class MotionTracks:
             found[j] = follow
         for j, centre in enumerate(centres):
             if j not in found:
-                found[j] = self._begun(centre, t_s)
+                found[j] = self._begin_track(centre, t_s)
             follow = found[j]
             follow.centre, follow.velocity_px_s = centre, velocities_px_s[j]
             follow.size_px, follow.seen_s = sizes_px[j], t_s
@@ -103,7 +103,7 @@ class MotionTracks:
         """Return whether a patch has been detected often enough."""
         return follow.seen >= self._params.confirm_frames
 
-    def _begun(self, centre: Floats, t_s: float) -> PatchTrack:
+    def _begin_track(self, centre: Floats, t_s: float) -> PatchTrack:
         """Begin a new track."""
         follow = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
         self._next_id += 1
