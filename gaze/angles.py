@@ -1,8 +1,8 @@
 """Points, directions, great circles and rotations as plain tuples, without numpy.
 
-Frames and signs as in gaze.types: x forward, y left, z up; yaw + left, pitch + up,
-roll + right ear down. Radians throughout. Scalar arithmetic, because one numpy call on
-three numbers costs as much as the whole of most functions here.
+Frames and signs as in gaze.types: x forward, y left, z up; yaw + left, pitch + up, roll + right ear
+down. Radians throughout. Scalar arithmetic, because one numpy call on three numbers costs as much
+as most functions here.
 """
 
 from math import asin, atan2, cos, hypot, pi, sin, sqrt
@@ -70,7 +70,7 @@ def unit(a: Vec3) -> Vec3:
 
 
 def no_nearer(point: Vec3, eye: Vec3, least_m: float) -> Vec3:
-    """Return a point, moved straight away from the eye where it is nearer than a distance."""
+    """Return a point, moved straight away from the eye if it is nearer than a distance."""
     x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     if sqrt(x * x + y * y + z * z) >= least_m:
         return point
@@ -97,7 +97,7 @@ def angle_between(a: Vec3, b: Vec3) -> float:
 
 
 def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
-    """Return the unit vector a fraction of the way from one unit vector to another.
+    """Return the unit vector at a fraction of the arc from one unit vector to another.
 
     0 gives ``start``, 1 gives ``end``; the path is the shorter arc. Opposite vectors
     have no shortest arc: the turn then goes over the left.
@@ -110,9 +110,9 @@ def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:
 
 
 def beside(way: Vec3, start: Vec3, further_rad: float, aside_rad: float) -> Vec3:
-    """Return a direction moved on along the great circle that leads to it, and across.
+    """Return a direction moved on along its great circle, and across it.
 
-    way: unit vector that is moved; start: where the great circle comes from
+    way: unit vector that is moved; start: unit vector at the start of the great circle
     further_rad: beyond ``way``; aside_rad: to the left of the path as seen from outside
     """
     pole = cross(start, way)
@@ -142,7 +142,7 @@ def shortened(v: Vec3, offset_rad: float, start: Vec3 = (1.0, 0.0, 0.0)) -> Vec3
 
     Args:
         v: direction of any length.
-        offset_rad: how far it is moved.
+        offset_rad: angle of the move.
         start: unit vector towards which it is moved; straight ahead.
     """
     arc = angle_between(start, v)

@@ -1,10 +1,10 @@
-"""Which bodies an eye can see (Mitake et al. 3.3.2): those whose centre lies in its field.
+"""Visibility of bodies (Mitake et al. 3.3.2): an eye sees a body whose centre is in its field.
 
-The paper's figure 4 holds the field's angles but not in print; the defaults are the
-limits of human perimetry. Radians and metres inside, degrees in the parameters.
+The paper's figure 4 shows the field's angles without numbers; the defaults are the limits of human
+perimetry. Radians and metres inside, degrees in the parameters.
 
-The paper's rule also sees what stands behind something else, and the robot's own moving
-fist: one's own body is therefore left out, and what is hidden may be.
+By the paper's rule an eye also sees a body behind another, and the robot's own moving fist. Own
+bodies are therefore excluded, and hidden ones optionally.
 """
 
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ from gazerig.gaze.types import Angles2, Angles3, Bodies, BodyRows, Floats, GazeS
 from gazerig.params import Bounds
 
 BLOCK = 8192
-"""Bodies computed at once: their intermediate results stay in the processor's cache."""
+"""Bodies computed together: their intermediate results stay in the processor's cache."""
 
 _PAIRS_AT_ONCE = 1_000_000
 
 
 @dataclass(frozen=True)
 class FieldOfViewParams:
-    """Limits of one eye's field, from its line of sight, and what is not seen inside it."""
+    """Limits of one eye's field, from its line of sight, and exclusions inside it."""
 
     # fmt: off
     temporal_deg: Annotated[float, Bounds(5, 120), "extent of the visual field towards the temple"] = 100.0
@@ -57,8 +57,8 @@ class FieldOfView:
     def visible(self, bodies: Bodies, state: GazeState) -> NDArray[np.bool_]:
         """Return (n,) whether each body's centre is in the field of at least one eye.
 
-        One's own bodies are never among them; with occlusion neither are those that stand
-        behind another body, one's own included, as seen from the head.
+        Own bodies are never visible; with occlusion neither are bodies behind another one, own
+        bodies included, as seen from the head.
         """
         seen = self._in_field(bodies.p_world_m, state)
         if not self._own.isdisjoint(bodies.kinds):
@@ -71,7 +71,7 @@ class FieldOfView:
         return seen
 
     def visible_rows(self, bodies: Bodies, rows: BodyRows, state: GazeState) -> list[bool]:
-        """Return what ``visible`` does, for few bodies, whose rows are given as well."""
+        """Return the result of ``visible`` for few bodies, whose rows are given as well."""
         if self._occlusion:
             found: list[bool] = self.visible(bodies, state).tolist()
             return found
@@ -86,7 +86,7 @@ class FieldOfView:
         return seen
 
     def _inside(self, p: list[float], p_eye: Vec3, axes: Mat3, left: bool) -> bool:
-        """Return whether a point is in the field of one eye, as ``_in_one_field`` does."""
+        """Return whether a point is in the field of one eye; scalar form of ``_in_one_field``."""
         x, y, z = p[0] - p_eye[0], p[1] - p_eye[1], p[2] - p_eye[2]
         (a, b, c), (d, e, f), (g, h, i) = axes
         ahead, side, up = a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
@@ -135,13 +135,13 @@ def columns(rows: Floats) -> Floats:
 
 
 def occluded(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return for each of ``rows`` whether any body's sphere lies wholly before its centre.
+    """Return for each of ``rows`` whether any body's sphere is wholly in front of its centre.
 
     rel_m:    (n, 3) centres seen from the eye
     radius_m: (n,) radii
 
-    A centre inside another sphere is not hidden by it: a place on a body, or a body held
-    in a hand. Neither hides a sphere with the eye inside.
+    A centre inside another sphere is not hidden by it (a place on a body, a body in a hand). A
+    sphere around the eye hides nothing.
     """
     distance2 = (rel_m * rel_m).sum(axis=1)
     radius2 = radius_m * radius_m
@@ -155,7 +155,8 @@ def occluded(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray
         ways = rel_m[some] / np.maximum(distance, 1e-9)
         along = ways @ screens
         chord2 = screens_r2 - (screens_d2 - along * along)
-        # The line of view leaves the sphere at along + sqrt(chord2): before the centre?
+        # The line of view leaves the sphere at along + sqrt(chord2), which must be before the
+        # centre.
         before = (along > 0.0) & (along < distance) & (chord2 > 0.0)
         before &= chord2 < (distance - along) ** 2
         out[start : start + step] = before.any(axis=1)
@@ -169,12 +170,12 @@ def eye_axes(state: GazeState, left: bool) -> Mat3:
 
 
 def head_in_space(state: GazeState) -> Angles3:
-    """Return the head's (yaw, pitch, roll) in the world: the neck's where no lower neck bends."""
+    """Return the head's (yaw, pitch, roll) in the world: the neck's if no lower neck is bent."""
     return state.head_rad if state.base_rad == (0.0, 0.0) else angles_of(state.R_world_head)
 
 
 def line_of_sight(state: GazeState, left: bool) -> Vec3:
-    """Return the unit vector along which one eye looks, in the world."""
+    """Return the unit vector of one eye's line of sight, in the world."""
     return rotate(
         state.R_world_head, direction(state.eye_left_rad if left else state.eye_right_rad)
     )

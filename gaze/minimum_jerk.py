@@ -1,10 +1,10 @@
-"""Minimum-jerk movements: the curve between two rests, from any state to rest, and to moving goals.
+"""Minimum-jerk movements: between two rests, from any state to rest, and to moving goals.
 
 ``min_jerk`` is eq 2 (and eq 8) of Mitake et al. ``Quintic`` starts from any position, speed and
 acceleration; it is the smoothest curve (least jerk) between given ends. ``MinimumJerkBlend``
-follows goals that change at any time: each change starts a minimum-jerk move by the difference,
-and moves under way are added up (the superposition of Flash and Henis 1991 for targets that jump).
-Any unit; speed and acceleration are per second.
+follows goals that change at any time: each change starts a minimum-jerk move by the difference, and
+active moves are summed (the superposition of Flash and Henis 1991 for targets that jump). Any unit;
+speed and acceleration are per second.
 """
 
 from typing import NamedTuple
@@ -14,13 +14,13 @@ PEAK_SPEED = 1.875
 PEAK_ACCELERATION = 5.7735
 """Its highest acceleration, 10 / sqrt 3."""
 _MOVES_AT_ONCE = 32
-"""Goals that come faster than so many in one duration wait for their turn; the newest counts."""
+"""Largest number of active moves; more goals wait, and the newest counts."""
 
 Values = tuple[float, ...]
 
 
 def min_jerk(s: float) -> float:
-    """Return f(s) = 6 s^5 - 15 s^4 + 10 s^3, held at 0 before 0 and at 1 after 1 (eq 2, eq 8)."""
+    """Return f(s) = 6 s^5 - 15 s^4 + 10 s^3, clamped outside 0..1 (eq 2, eq 8)."""
     if s <= 0.0:
         return 0.0
     if s >= 1.0:
@@ -76,14 +76,14 @@ class _Move(NamedTuple):
 
 
 class MinimumJerkBlend:
-    """Several values on their way to the newest goal.
+    """Several values in motion to the newest goal.
 
     Position, speed and acceleration are continuous at every moment. With one duration the result is
     a weighted mean of the goals, so it never leaves their range, and its speed never exceeds that
     of a single move over this range: 1.875 x range / duration.
 
     Args:
-        start: the values to begin with.
+        start: initial values.
         duration_s: of one move, above 0.
     """
 
@@ -92,17 +92,17 @@ class MinimumJerkBlend:
         self.reset(start)
 
     def reset(self, values: Values) -> None:
-        """Rest at values at once."""
+        """Rest at values immediately."""
         self._values = self._base = self._planned = self._goal = values
         self._moves: list[_Move] = []
 
     def move_to(self, goal: Values) -> None:
         """Move to another goal, from the next step on; as many values as at the start."""
-        if goal != self._goal:  # an equal goal stays the tuple that is planned: cheap to compare
+        if goal != self._goal:  # an equal goal keeps its tuple, which is cheap to compare
             self._goal = goal
 
     def step(self, t_s: float) -> Values:
-        """Return the values at a time; times never go back. At rest it is the same tuple."""
+        """Return the values at a time; times must not decrease. At rest it is the same tuple."""
         goal = self._goal
         if goal is not self._planned and goal != self._planned and self._may_start(t_s):
             delta = tuple([b - a for a, b in zip(self._planned, self._goal, strict=True)])
@@ -122,7 +122,7 @@ class MinimumJerkBlend:
         return not self._moves or t_s - self._moves[-1].start_s >= pause_s
 
     def _sum(self, t_s: float) -> Values:
-        """Add up the moves under way; those that are over go into the base."""
+        """Sum the active moves; finished ones are added to the base."""
         ended = [move for move in self._moves if t_s >= move.start_s + move.duration_s]
         if len(ended) == len(self._moves):
             self._moves = []

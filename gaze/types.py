@@ -47,7 +47,7 @@ PART_NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """Everything that could be looked at, one row a body.
+    """Possible targets of the gaze, one row per body.
 
     ids:       stable identity of each body
     kinds:     "face", "hand", "thing", ... as perception named it
@@ -96,18 +96,17 @@ class Face:
     R_world_face:  face axes in the world: x out of the face, y to the owner's left, z up
     parts_world_m: the eight parts in the order of PARTS
     confidence:    0..1 of the detector
-    distance_from: what the distance rests on: "camera", its depth; "face size", that of an
-        adult or as learned of this person; "" where unknown
-    across_sd_m, along_sd_m: standard deviations of the place, across and along the view
-    off_head_rad:  angle between where the person looks and the direction to the robot's head; None
-        in recordings that do not hold it
+    distance_from: source of the distance: "camera", its depth; "face size", an adult's or the
+        learned one of this person; "" if unknown
+    across_sd_m, along_sd_m: standard deviations of the position, across and along the view
+    off_head_rad:  angle between the person's gaze and the direction to the robot's head; None in
+        recordings without it
     looks_at_head: whether the person looks at the robot's head (gaze at robot: one side of mutual
-        gaze); None where that is too uncertain
-    gaze_world:    direction of the gaze of the eyes; None where the detector does not find it
-    eye_opening:   of the lids over the usual opening, 0 is shut; None where it is not found
-    mouth_opening_m: gap between the lips, at an adult's size; None where it is not found
-    speaks:        whether the mouth opens and closes as of a speaking person; None where it is not
-        found
+        gaze); None if that is too uncertain
+    gaze_world:    direction of the gaze of the eyes; None if the detector does not find it
+    eye_opening:   of the lids over the usual opening, 0 is shut; None if not found
+    mouth_opening_m: gap between the lips, at an adult's size; None if not found
+    speaks:        whether the mouth moves like that of a speaking person; None if not found
     """
 
     id: int
@@ -129,9 +128,9 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """What one frame showed, placed in the world by the head pose at its time of capture.
+    """Contents of one frame, in the world by the head pose at its time of capture.
 
-    scene: counts the cuts so far; where it has changed, nothing of before is there any more
+    scene: number of cuts before this frame; after a cut nothing seen earlier exists
     """
 
     captured_s: float
@@ -145,16 +144,17 @@ class Percept:
 
 
 ORDERED = "puppet"
-"""Kind of a target that a person or a program ordered: the gaze rests on that very point."""
+"""Kind of a target ordered by a person or a program: the gaze rests exactly on that point."""
 
 
 class Salience(NamedTuple):
     """Salience of one body, term by term (Mitake et al., eq 1 and the rules).
 
-    translation, looming, rotation: the three terms of eq 1; onset: of having just come into view
+    translation, looming, rotation: the three terms of eq 1; onset: of a recent entry into view
     rule:     constant of the rule that points at it, 0 without one
-    habituation: factor 0..1 of habituation, inhibition of return, and a face that looks elsewhere
-    total:    the amount of attention that was compared
+    habituation: factor 0..1 of habituation, inhibition of return, and of a face that looks
+        elsewhere
+    total:    the compared amount of attention
     """
 
     id: int
@@ -169,19 +169,19 @@ class Salience(NamedTuple):
 
 
 class Target(NamedTuple):
-    """Where to look and why.
+    """Target of the gaze, with its reason.
 
     p_world_m, v_world_m_s: the point and its velocity, as at ``at_s``
     kind:     "face", "hand", "thing", "idle", ...
-    id:       body or face id, -1 where there is nothing
+    id:       body or face id, -1 without one
     salience: amount of attention A (Mitake et al., eq 1 or the rule's constant)
     top_down: whether a rule chose it
-    part:     face part code where a face is looked at
-    shift:    counts up whenever another object or part is chosen: the saccade's event flag
+    part:     face part code if the target is a face
+    shift:    increases whenever another object or part is chosen: the saccade's event flag
     why:      the reason in words
-    centre_world_m: where the head turns to, e.g. the face's centre; None: the point itself
-    plan:     what the action planner (gazerig.gaze.attention.action_planner) has chosen and why; ""
-              without
+    centre_world_m: goal of the head, e.g. the face's centre; None: the point itself
+    plan:     choice of the action planner (gazerig.gaze.attention.action_planner) and its reason; ""
+        without one
     saliences: of the winner and of the next three, highest first
     """
 
@@ -201,7 +201,7 @@ class Target(NamedTuple):
 
 
 class GazeState(NamedTuple):
-    """Where head and eyes are, as measured.
+    """Measured position of head and eyes.
 
     head_rad, head_rate_rad_s: (yaw, pitch, roll) of the neck and their rates
     eye_left_rad, eye_right_rad: (yaw, pitch) in the head
@@ -229,7 +229,7 @@ class GazeState(NamedTuple):
 
 
 class Limited(NamedTuple):
-    """An angle clipped by a range, in radians: asked for, and done.
+    """An angle clipped by a range, in radians: requested, and executed.
 
     axis: "left eye yaw", "right eye pitch", "head yaw", "head pitch"
     """
@@ -245,11 +245,11 @@ class GazeCommand(NamedTuple):
 
     head_rad: (yaw, pitch, roll); eye_left_rad, eye_right_rad: (yaw, pitch) in the head
     lid_left, lid_right: opening of the upper lids, 0 shut .. 1 open
-    phase:    what the eyes are doing; blink: whether a blink is under way
-    gaze_point_world_m: where both eyes are meant to point now
+    phase:    phase of the eye movement; blink: whether a blink is in progress
+    gaze_point_world_m: point at which both eyes are aimed now
     saccades, fixations, blinks: counts since the reset
     lower_left, lower_right: opening of the lower lids, 0 shut .. 1 open
-    limited:  what keeps the eyes from the gaze point, empty while nothing does
+    limited:  limits that keep the eyes from the gaze point, empty without any
     """
 
     head_rad: Angles3

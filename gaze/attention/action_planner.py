@@ -1,14 +1,15 @@
-"""Chooses guard, attack or wait in a boxing match, from what is seen (Mitake et al. 3.2, 3.3.3).
+"""Action planner of a boxing match: guard, attack or wait (Mitake et al. 3.2, 3.3.3).
 
 The paper takes the three behaviours from the action planner of an earlier boxing game, which it
-does not describe and which knows both bodies. This planner knows one percept after the other.
+does not describe and which knows both bodies. This planner receives one percept after the other.
 
-guard   A fist comes straight at the head and arrives soon. It is looked at until it comes no more.
-attack  The opponent is within reach, nothing comes, and a place is open: no hand is near the line
-        to it; for a moment after a punch less room will do. The place is looked at before the blow.
+guard   A fist approaches the head directly and arrives soon. The gaze follows it until it stops.
+attack  The opponent is within reach, no fist approaches, and a place is open: no hand is near the
+        line to it; for a moment after a punch less room suffices. The gaze is on the place before
+        the blow.
 wait    Anything else.
 
-Nothing is open to one who does not know where both hands are.
+No place is open while the position of a hand is unknown.
 """
 
 from dataclasses import dataclass
@@ -32,14 +33,14 @@ ACTIONS: tuple[Action, ...] = ("wait", "guard", "attack")
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _SURE_SD = 2.0
-"""A speed is certain that is so many standard deviations above what is asked of it."""
+"""A speed is certain if it exceeds its limit by this number of standard deviations."""
 _LONGEST_GAP_S = 0.5
-"""After a longer time without a frame nothing goes on."""
+"""A longer time without a frame ends every action."""
 
 
 @dataclass(frozen=True)
 class ActionPlannerParams:
-    """When a boxing match calls for guard or attack."""
+    """Conditions of guard and attack in a boxing match."""
 
     # fmt: off
     enabled: Annotated[bool, "the behaviours wait, guard and attack are chosen from what is seen"] = False
@@ -65,10 +66,10 @@ class ActionPlannerParams:
 
 
 class Plan(NamedTuple):
-    """What is to be done, and why.
+    """Action and reason.
 
-    body_id: what comes, on guard; -1 otherwise
-    p_world_m, v_world_m_s: the place to be hit, in an attack; None otherwise
+    body_id: the approaching fist, on guard; -1 otherwise
+    p_world_m, v_world_m_s: the place to hit, in an attack; None otherwise
     """
 
     action: Action
@@ -87,7 +88,7 @@ WAITING = Plan("wait", "nobody is in view")
 
 
 class ActionPlanner:
-    """The planner, stepped once for each new percept."""
+    """Action planner, stepped once for each new percept."""
 
     def __init__(self, params: ActionPlannerParams) -> None:
         self._params = params
@@ -95,11 +96,11 @@ class ActionPlanner:
         self.reset()
 
     def retune(self, params: ActionPlannerParams) -> None:
-        """Change the parameters; what is under way goes on by the new ones."""
+        """Change the parameters; the present action continues with the new ones."""
         self._params = params
 
     def reset(self) -> None:
-        """Forget the opponent; nothing is under way."""
+        """Forget the opponent and the present action."""
         self._hands.reset()
         self.plan = WAITING
         self._since_s = self._at_s = self._guard_end_s = self._attack_end_s = -inf
@@ -108,13 +109,13 @@ class ActionPlanner:
         self._place = ""
 
     def step(self, percept: Percept, p_eye: Vec3, t_s: float, asked: Action | None = None) -> Plan:
-        """Return what is to be done.
+        """Return the next action.
 
         Args:
             percept: a new one.
             p_eye: middle of the robot's eyes.
             t_s: now; the percept is older.
-            asked: what the user wants to be done; None: as the planner decides.
+            asked: the action that the user has chosen; None: the planner decides.
         """
         if t_s - self._at_s > _LONGEST_GAP_S:
             self.reset()
@@ -133,7 +134,7 @@ class ActionPlanner:
         elif threat is not None:
             self.plan = self._guard(threat, t_s)
         elif self.plan.action == "guard" and t_s - self._since_s < par.min_guard_ms / 1e3:
-            pass  # it goes on
+            pass  # the action continues
         else:
             if self.plan.action == "guard":
                 self._guard_end_s = t_s
@@ -148,7 +149,7 @@ class ActionPlanner:
         found: list[HitTarget],
         p_eye: Vec3,
     ) -> Plan:
-        """Return what the user wants, of the place with most room or the nearest fist."""
+        """Return the user's action, for the place with most room or the nearest fist."""
         why = "asked for"
         if asked == "attack" and face is not None:
             return Plan(asked, why, -1, found[0].p_world_m, face.v_world_m_s)
@@ -157,7 +158,7 @@ class ActionPlanner:
         return Plan(asked, why)
 
     def _threat(self, percept: Percept, p_eye: Vec3, t_s: float) -> Approach | None:
-        """Return the fist that arrives first of those that have come for the reaction time."""
+        """Return the first fist to arrive of those that have approached for the reaction time."""
         par, guarded = self._params, self.plan.body_id
         late_s = max(0.0, t_s - percept.captured_s)
         coming = [
@@ -176,7 +177,7 @@ class ActionPlanner:
         return first if sure or ready or self.plan.action == "guard" else None
 
     def _is_punch(self, one: Approach, ratio: float) -> bool:
-        """Return whether a fist comes as a punch does; ratio: how far it may fail to."""
+        """Return whether a fist moves like a punch; ratio: tolerance."""
         par = self._params
         return (
             one.contact_s < ratio * par.contact_ms / 1e3
@@ -192,7 +193,7 @@ class ActionPlanner:
         return Plan("guard", why, threat.id)
 
     def _attack(self, face: Face | None, found: list[HitTarget], t_s: float) -> Plan:
-        """Begin an attack, go on with it, or wait."""
+        """Begin an attack, continue it, or wait."""
         par, now = self._params, self.plan
         if now.action == "attack":
             if t_s - self._since_s < par.attack_ms / 1e3:

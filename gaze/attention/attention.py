@@ -1,11 +1,11 @@
-"""The winner of bottom-up and top-down attention (Mitake et al. 3.3.4), and the reason why.
+"""Competition of bottom-up and top-down attention (Mitake et al. 3.3.4).
 
-The larger amount of attention wins. Two nearly equal amounts would flicker, so the
-present winner is kept unless another is clearly stronger, and for a shortest time. And
-a winner for ever would be a stare, so amounts are multiplied by the factor that habituation
-leaves (gazerig.gaze.attention.habituation). Of the bodies that a rule points at the one with the
-highest factor keeps the rule's whole constant, which the paper's comparison needs: so one
-person alone is not left for habituation, and several people share the gaze.
+The larger amount of attention wins. Two nearly equal amounts would flicker, so the present winner
+is kept for a shortest time, and until another is clearly stronger. A permanent winner would be a
+stare, so amounts are multiplied by the factor of habituation (gazerig.gaze.attention.habituation).
+Of the bodies that a rule selects, the one with the highest factor keeps the rule's whole constant,
+which the paper's comparison needs: so the gaze does not leave a single person by habituation, and
+several people share it.
 """
 
 from math import inf
@@ -29,10 +29,10 @@ from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _NO_ONE: frozenset[int] = frozenset()
 _FEW = 24
-"""So many bodies are computed one by one, which costs less than arrays do."""
-_SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says nothing
+"""Up to this number of bodies are computed one by one, which is faster than arrays."""
+_SPEED_OVER_S = 0.2  # longest interval for a speed of the head from two positions
 _DECIDED_S = 0.2
-"""A camera may show the target of a new behaviour so long after the change."""
+"""Time within which a camera may show the target of a new behaviour after the change."""
 
 
 class Attention:
@@ -40,11 +40,11 @@ class Attention:
 
     Args:
         params: hysteresis, habituation and reaction time.
-        field_of_view: which bodies an eye can see.
+        field_of_view: visibility of bodies.
         bottom_up: salience by motion.
         top_down: the rules.
-        idle: where to look with nothing in sight.
-        rng: draws reaction times; None: every change of target is at once.
+        idle: gaze without a target in sight.
+        rng: draws reaction times; None: every change of target is immediate.
     """
 
     def __init__(
@@ -68,13 +68,13 @@ class Attention:
         self.reset(0.0)
 
     def retune(self, params: AttentionParams) -> None:
-        """Change the hysteresis; the target in force and all habituation stay."""
+        """Change the hysteresis; the present target and all habituation stay."""
         self._params = params
         self._habituation.retune(params.habituation)
         self._reaction.retune(params.reaction)
 
     def reset(self, t_s: float) -> None:
-        """Forget everything seen."""
+        """Forget all targets."""
         for model in (self._bottom_up, self.top_down, self._idle, self._habituation):
             model.reset(t_s)
         self._reaction.reset(t_s)
@@ -94,13 +94,13 @@ class Attention:
         self._eye: tuple[Vec3, float] | None = None
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Return the target in force at ``t_s``."""
+        """Return the target at ``t_s``."""
         stale_s = self._params.stale_ms / 1e3
         fresh = percept is not None and t_s - percept.captured_s <= stale_s
         new = percept is not None and percept.captured_s != self._seen_s
         target = self._target
         if fresh and not new and target is not None and not self._reaction.waits:
-            return target  # as decided on the frame
+            return target  # as decided for the frame
         if percept is not None and fresh and new:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)
@@ -117,7 +117,7 @@ class Attention:
         return self._target
 
     def _settle(self, target: Target, t_s: float) -> Target:
-        """Count a gaze shift whenever another object is looked at."""
+        """Count a gaze shift whenever the object changes."""
         place, self._place = self._place, target.p_world_m
         identity = (target.kind, target.id)
         if identity == self._identity and target.shift == self._shift:
@@ -132,12 +132,12 @@ class Attention:
         return target._replace(shift=self._shift)
 
     def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
-        """Return the present target as it is now, None where there is nothing to look at.
+        """Return the present target with its present position, None without one.
 
-        What wins over it waits for its reaction time; a present target that is gone stays where it
-        was until then.
+        A new winner waits for its reaction time; a present target that is gone keeps its position
+        until then.
         """
-        if percept.scene != self._scene:  # a cut: nobody is where they were
+        if percept.scene != self._scene:  # a cut: no one is at the former position
             self._scene = percept.scene
             self._memory.reset()
             self._persons.reset()
@@ -184,7 +184,7 @@ class Attention:
         return self._target and self._target._replace(plan=made.plan)
 
     def _unnoticed(self, made: TargetComparison) -> bool:
-        """Return whether there is nothing, or only things that are explored as anything else is."""
+        """Return whether there are no bodies, or only things of low salience, for idle gaze."""
         best, most = made.best, made.total[made.best]
         if most == -inf or most >= self._params.least_salience:
             return bool(most == -inf)
@@ -193,7 +193,7 @@ class Attention:
     def _compare_few(
         self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
     ) -> TargetComparison:
-        """Return what ``_compare`` does, for few bodies."""
+        """Return the result of ``_compare`` for few bodies."""
         n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
         seen = self._field_of_view.visible_rows(bodies, rows, state)
         v_eye = self._eye_velocity(eye, t_s)
@@ -229,9 +229,9 @@ class Attention:
     def _compare(
         self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
     ) -> TargetComparison:
-        """Return everything that the decision rests on.
+        """Return the amounts that the decision compares.
 
-        worth: share of its salience that each body keeps besides
+        worth: additional factor 0..1 of each body's salience
         """
         n, eye = len(bodies), state.p_world_head_m
         seen = self._field_of_view.visible(bodies, state)
@@ -262,7 +262,7 @@ class Attention:
         )
 
     def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
-        """Return of each body what its motion cannot exceed, and the share of it that counts."""
+        """Return the limit of each body's motion, and the share of it that counts."""
         parts, ratio = self._persons.parts, self._params.own_motion_ratio
         usual, of_hands = self._bottom_up.limit(), self._bottom_up.limit(hand=True)
         most, worth = [], []
@@ -272,7 +272,7 @@ class Attention:
         return most, worth
 
     def _note_gestures(self, made: TargetComparison) -> None:
-        """Note how much each person's own body moves; it counts in the next decision."""
+        """Record the motion of each person's own body, which counts in the next decision."""
         ratio, self._gestures = self._params.own_motion_ratio, {}
         if ratio == 0.0 or ratio == 1.0:
             return
@@ -291,7 +291,7 @@ class Attention:
         attended: int,
         t_s: float,
     ) -> list[float]:
-        """Return the factor 0..1 of each body that a rule points at, 1 for the strongest."""
+        """Return the factor 0..1 of each body that a rule selects, 1 for the strongest."""
         named = [ids[row] for row in rule_target.rows]
         moved = self._gestures
         mine = [worth[row] * (1.0 + moved.get(ids[row], 0.0)) for row in rule_target.rows]
@@ -306,27 +306,27 @@ class Attention:
         return [one / most for one in shares]
 
     def _gaze(self, state: GazeState) -> Vec3:
-        """Return where both eyes look, of any length, where the salience goes by it."""
+        """Return the gaze direction of both eyes, of any length, if the salience depends on it."""
         if not self._bottom_up.needs_gaze:
             return _STILL
         return add(line_of_sight(state, left=True), line_of_sight(state, left=False))
 
     def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
-        """Return how fast the head has carried the eyes since the decision before, m/s."""
+        """Return the velocity of the eyes by the head's motion since the last decision, m/s."""
         before, self._eye = self._eye, (p_eye_m, t_s)
         if before is None or not 0.0 < t_s - before[1] <= _SPEED_OVER_S:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
     def _winner(self, made: TargetComparison, present: int | None) -> int:
-        """Return the row of the strongest, the present one being favoured."""
+        """Return the row of the strongest body; the present one is favoured."""
         if present is None:
             return made.best
         stays = made.total[made.best] < made.total[present] * self._params.hysteresis_ratio
         return present if stays else made.best
 
     def _present_row(self, made: TargetComparison) -> int | None:
-        """Return the row of what is looked at now, None where it is no longer there."""
+        """Return the row of the present target, None if it is gone."""
         if self._identity is not None and self._identity[1] == NO_BODY:
             there = made.total[-1] > -inf and made.point_kind == self._identity[0]
             return len(made.bodies) if there else None

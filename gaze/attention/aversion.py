@@ -1,14 +1,14 @@
 """Gaze aversion: looking away from a face while talking, listening and thinking.
 
-A gaze that never leaves a face is a stare. So it goes to and fro between MUTUAL, on the
-face, and AWAY, beside it. How long each lasts, how far away the gaze goes and which way
-is what Lee, Badler & Badler 2002 (Eyes Alive) measured in talking and listening people;
-while thinking the gaze goes mostly up, for longer (Andrist et al. 2014). Without a conversation
-two people who face each other prefer bouts of mutual gaze of 3.3 s (Binetti et al. 2016, n = 498);
-no measurement of the looks away between them is known, they are as short as a listener's.
+A gaze that never leaves a face is a stare. So it alternates between MUTUAL, on the face, and AWAY,
+next to it. Durations, amplitudes and directions are those that Lee, Badler & Badler 2002 (Eyes
+Alive) measured in talking and listening people; while thinking the gaze goes mostly up, for longer
+(Andrist et al. 2014). Without a conversation two people who face each other prefer bouts of mutual
+gaze of 3.3 s (Binetti et al. 2016, n = 498); no measurement of the aversions between them is known,
+they are as short as a listener's.
 
-A look away leaves when the rest on a part of the face is over, instead of the next shift between
-parts, and goes beside the outline of the face: a near face is wider than the published angles.
+An aversion starts when the rest on a part of the face is over, instead of the next shift between
+parts, and goes beyond the outline of the face: a near face is wider than the published angles.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _UP = 2
 _MODE_TEXT = {"none": "no conversation"}
 
 _HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
-"""The oval of a face, a little larger than an adult's."""
+"""Half axes of the oval of a face, a little larger than an adult's."""
 
 # A = -6.9 ln(P / 15.7) deg, P uniform in 0..15 % (Eyes Alive).
 _SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
@@ -74,7 +74,7 @@ class AversionParams:
         """Check the order of the limits.
 
         Raises:
-            ValueError: the nearest look away lies beyond a farthest one.
+            ValueError: the nearest aversion is beyond a farthest one.
         """
         if self.least_deg > min(self.talk_most_deg, self.listen_most_deg):
             raise ValueError("least_deg must not be above talk_most_deg or listen_most_deg")
@@ -90,7 +90,7 @@ class Aversion:
         self.reset(0.0)
 
     def retune(self, params: AversionParams) -> None:
-        """Change durations and angles, from the next look on."""
+        """Change durations and angles, from the next aversion on."""
         par = self._params = params
         self._times: dict[AversionMode, tuple[float, float, float, float]] = {
             "none": (
@@ -130,14 +130,13 @@ class Aversion:
 
     @property
     def mode(self) -> AversionMode:
-        """The conversation mode in force."""
+        """The present conversation mode."""
         return self._mode
 
     def converse(self, mode: AversionMode, t_s: float) -> None:
         """Set the conversation mode: talk, listen, think or none.
 
-        A change brings the gaze back to the face for a new look; thinking looks away at
-        once, since that is when people do.
+        A change returns the gaze to the face; thinking averts it immediately, as people do.
 
         Raises:
             ValueError: there is no such mode.
@@ -159,23 +158,23 @@ class Aversion:
         ordered: bool = False,
         rests_until_s: float = -inf,
     ) -> Target:
-        """Return the target itself, or a place beside the face while looking away.
+        """Return the target itself, or a place next to the face during an aversion.
 
-        A place beside a face has kind "away", the id of the face, the face's centre as
+        A place next to a face has kind "away", the id of the face, the face's centre as
         centre (the head stays with the person) and a shift number of its own; the
-        number rises on leaving and on returning. A target that passes has the shifts that
-        earlier looks away have added to the count.
+        number rises on leaving and on returning. An unchanged target includes the shifts of
+        earlier aversions in its count.
 
-        ordered: a user has chosen the target, which is left in a conversation only
-        rests_until_s: until when the gaze rests on a part of the face, which it does not leave
-            sooner; inf while it is on its way there
+        ordered: a user has chosen the target, from which only a conversation averts the gaze
+        rests_until_s: end of the rest on a part of the face, which the gaze does not leave
+            sooner; inf while it is moving there
         """
         kept = ordered and self._mode == "none"
         face = target.id if target.kind == "face" and not kept else None
         if face != self._face:
             self._attend(face, t_s)
         if self._until_s == inf and self._times[self._mode][0] > 0.0 and self._face is not None:
-            self._until_s = t_s + self._mutual_s()  # told only now to look away
+            self._until_s = t_s + self._mutual_s()  # only now allowed to look away
         leaves = self._away is not None or t_s >= rests_until_s
         if self._face is not None and t_s >= self._until_s and leaves:
             self._turn(target, p_world_head_m, t_s)
@@ -186,7 +185,7 @@ class Aversion:
         return self._passed(target)
 
     def _passed(self, target: Target) -> Target:
-        """Return a target with the shifts that looks away have added, made once for many ticks."""
+        """Return a target with the shifts of aversions added, made once for many ticks."""
         last, shift = self._last, target.shift + self._shifts
         if last is None or last[0] is not target or last[1].shift != shift:
             last = self._last = target, target._replace(shift=shift)
@@ -230,7 +229,7 @@ class Aversion:
         )
 
     def _place(self, face: Vec3, p_world_head_m: Vec3) -> Vec3:
-        """Draw a point beside the face, at the distance of the face."""
+        """Draw a point next to the face, at the distance of the face."""
         rel = sub(face, p_world_head_m)
         ahead = unit(rel)
         right = unit(cross(ahead, (0.0, 0.0, 1.0)))
@@ -247,7 +246,7 @@ class Aversion:
         near = self._mode in ("listen", "none")
         least = max(par.least_deg, edge_deg + par.beside_deg)
         most = max(least, par.listen_most_deg if near else par.talk_most_deg)
-        # The law's P, of those only that go at least as far as asked for; never 0.
+        # The law's P, restricted to amplitudes of at least the required one; never 0.
         p_most = min(_P_MOST, _P_TOP * exp(-least / _SCALE_DEG))
         p = (1.0 - float(self._rng.random())) * p_most
         return min(most, -_SCALE_DEG * log(p / _P_TOP))
@@ -269,7 +268,7 @@ class Aversion:
         return len(DIRECTIONS_PERCENT) - 1  # rounding
 
     def _mutual_s(self) -> float:
-        """Draw a duration of mutual gaze, without end where the mode never looks away."""
+        """Draw a duration of mutual gaze, infinite if the mode has no aversions."""
         mean, sd, _, _ = self._times[self._mode]
         if mean == 0.0:
             return inf
@@ -288,7 +287,7 @@ class Aversion:
 
 
 def _edge_deg(way_rad: float, distance_m: float) -> float:
-    """Return how far a face extends from its centre in a direction, 0 right and 90 deg up."""
+    """Return the extent of a face from its centre, degrees, in a direction (0 right, pi/2 up)."""
     across, up = cos(way_rad) / _HALF_WIDE_M, sin(way_rad) / _HALF_HIGH_M
     return degrees(atan2(1.0 / hypot(across, up), distance_m))
 

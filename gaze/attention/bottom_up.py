@@ -1,30 +1,28 @@
 """Bottom-up attention: the salience of each visible body by its motion.
 
 Mitake et al. eq 1 sums three stimuli to which cells of the areas MT and MST respond:
-translation across the line of view (slide), motion along it (loom) and rotation about
-it (spin). Two forms of it are here, and one can do without:
+translation across the line of view (slide), motion along it (loom) and rotation about it (spin). It
+has two forms, and can be switched off:
 
 literal   As printed: one gaze direction e for all bodies, no distance, metres and radians
           added as they are. Printed with e/|e| on a projection that is only right for
           |e| = 1, so e is normalised.
-retinal   What the paper's reason, the image on the retina, demands: e from the eye to each
+retinal   As the paper's reason, the image on the retina, demands: e from the eye to each
           body, speeds relative to the moving eye and divided by the distance, each term
-          measured by the motion that counts as 1.
-none      No motion attracts: all that is looked at is what a rule names.
+          in units of the motion that counts as 1.
+none      No motion attracts: rules alone select targets.
 
-What has just come into view has a further, decaying term: the paper's behaviour
-(e), a hand that reaches in from outside the field, is not in eq 1. So has what begins to move,
-which captures attention as what appears does (Abrams & Christ 2003), where motion saturates.
-Onsets that follow each other weigh less, as people stop looking at what appears again and again
-(Neo & Chua 2006).
+A body that has just entered the view has a further, decaying term: the paper's behaviour (e), a
+hand that reaches in from outside the field, is not in eq 1. If motion saturates, a body that begins
+to move has it too: it captures attention like a new one (Abrams & Christ 2003). Onsets that follow
+each other weigh less, as people stop looking at repeated appearances (Neo & Chua 2006).
 
-In the retinal form the sum saturates where bodies are compared: no motion alone outweighs a face
-for long. What comes nearer so fast that it would arrive within two seconds is exempt, as a hand
-that reaches for the head.
+In the retinal form the sum saturates for the comparison: no motion alone outweighs a face for long.
+An approach that would arrive within two seconds is exempt, such as a hand that reaches for the
+head.
 
-All bodies are computed at once; what is remembered of each is a row of an array. Of the few that
-there usually are each is computed by itself, in plain arithmetic: a handful of numbers costs
-less so than one call of NumPy.
+All bodies are computed together, and the state of each is a row of an array. The usual few are
+computed one by one in plain arithmetic, as a handful of numbers costs less than one call of NumPy.
 """
 
 from collections.abc import Sequence
@@ -42,12 +40,12 @@ from gazerig.params import Bounds
 Ids = NDArray[np.int64]
 
 _BLINK_S = 0.3
-"""A body unseen for no longer than this was missed by the detector and did not leave."""
+"""A body unseen for at most this time was missed by the detector and did not leave."""
 
 _MOVES, _STILL_BELOW = 0.5, 0.15
-"""Sums of eq 1 from which a body moves, and below which it has come to rest."""
+"""Sums of eq 1 above which a body moves, and below which it rests."""
 _SETTLED_S = 0.5
-"""What has just come into view, as all has at the start, does not begin to move as well."""
+"""Time after entry during which a body gets no onset of motion as well."""
 _NEAREST_M = 0.05
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Vec3 = (1.0, 0.0, 0.0)
@@ -77,7 +75,7 @@ class BottomUpParams:
 
 
 class MotionTerms(NamedTuple):
-    """The terms of eq 1 for each body: (n,) arrays; looming is negative of what goes away."""
+    """Terms of eq 1 for each body: (n,) arrays; looming is negative for a receding body."""
 
     translation: Floats
     looming: Floats
@@ -85,7 +83,7 @@ class MotionTerms(NamedTuple):
 
 
 class SalienceRow(NamedTuple):
-    """Amount of attention of one body, term by term; total: what is compared."""
+    """Amount of attention of one body, term by term; total: the compared amount."""
 
     translation: float
     looming: float
@@ -95,7 +93,7 @@ class SalienceRow(NamedTuple):
 
 
 class SalienceTerms(NamedTuple):
-    """Amount of attention of each body, term by term: (n,) arrays; total: what is compared."""
+    """Amount of attention of each body, term by term: (n,) arrays; total: the compared amount."""
 
     translation: Floats
     looming: Floats
@@ -127,15 +125,15 @@ def _eq_1(v: Floats, w: Floats, e: Floats) -> MotionTerms:
 
 
 _FAST, _FASTEST = 1.0, 3.0
-"""Looming beyond the first is exempt from saturation, up to the second."""
+"""Range of looming that is exempt from saturation."""
 
 
 def limited(terms: Floats, most: Floats, worth: Floats) -> Floats:
     """Return the sum of the terms of eq 1, saturated: worth most (1 - exp(-sum / most)).
 
     Args:
-        terms: (3, n) slide, loom and spin; loom is positive of what comes nearer.
-        most: (n,) what motion cannot exceed; inf: no limit.
+        terms: (3, n) slide, loom and spin; loom is positive for an approach.
+        most: (n,) limit of motion; inf: no limit.
         worth: (n,) the share that counts.
     """
     slide, loom, spin = terms
@@ -148,7 +146,7 @@ def limited(terms: Floats, most: Floats, worth: Floats) -> Floats:
 
 
 def limited_row(slide: float, loom: float, spin: float, most: float, worth: float) -> float:
-    """Return what ``limited`` does, of one body."""
+    """Return the result of ``limited`` for one body."""
     if most == inf:
         return worth * (slide + abs(loom) + spin)
     exempt = min(max(loom, _FAST), _FASTEST) - _FAST
@@ -168,8 +166,9 @@ _UNSEEN = SalienceRow(0.0, 0.0, 0.0, 0.0, 0.0)
 class _Memory(NamedTuple):
     """State of m bodies, in any order: (m,) arrays, terms (3, m).
 
-    terms: smoothed slide, loom (with its sign) and spin; entered_s, seen_s: came into view, was
-    last seen; onset: share of the onset's salience at entry; moving: whether it moves, 0 or 1
+    terms: smoothed slide, loom (with its sign) and spin; entered_s, seen_s: time of entry into view
+        and of the last sight; onset: share of the onset's salience at entry; moving: whether it
+        moves, 0 or 1
     """
 
     ids: Ids
@@ -206,14 +205,14 @@ class _Rows(NamedTuple):
 
 
 def _never_seen(ids: Ids) -> _Memory:
-    """Return what is known of bodies that nothing is known of."""
+    """Return the state of bodies that were never seen."""
     n = len(ids)
     never, none = np.full(n, -np.inf), np.zeros(n)
     return _Memory(ids, np.zeros((3, n)), never, never.copy(), none, none.copy())
 
 
 class BottomUp:
-    """Eq 1 with a low-pass filter per body, and the salience of what has just come into view."""
+    """Eq 1 with a low-pass filter per body, and the salience of new bodies."""
 
     def __init__(self, params: BottomUpParams) -> None:
         self._params = params
@@ -225,7 +224,7 @@ class BottomUp:
 
     @property
     def needs_gaze(self) -> bool:
-        """Return whether the form in force goes by where the eyes look."""
+        """Return whether the present form depends on the gaze direction."""
         return self._params.form == "literal"
 
     def reset(self, t_s: float) -> None:
@@ -250,12 +249,12 @@ class BottomUp:
     ) -> SalienceTerms:
         """Return the smoothed salience of all bodies, in their order; 0 for those not in view.
 
-        Must be called with no bodies, too, or what comes next is not known to be new.
+        It must be called without bodies, too, or the next body does not count as new.
 
-        v_world_eye_m_s: velocity of the eye itself; the literal form does not know it
-        gaze_world: where the eyes look, any length; only the literal form needs it
+        v_world_eye_m_s: velocity of the eye itself; the literal form ignores it
+        gaze_world: gaze direction, any length; only the literal form needs it
         seen: (n,) which bodies are in view; None: all
-        most: of each body, what its motion cannot exceed; None: ``saturation``
+        most: limit of each body's motion; None: ``saturation``
         worth: of each body, the share of its motion that counts; None: all
         """
         if self._params.form == "none":
@@ -271,7 +270,7 @@ class BottomUp:
         return self._blend(now, seen, t_s, limits, shares)
 
     def limit(self, hand: bool = False) -> float:
-        """Return what motion cannot exceed; inf: no limit, as in the paper's own form."""
+        """Return the limit of motion; inf: no limit, as in the paper's own form."""
         par = self._params
         most = par.hand_saturation if hand else par.saturation
         return most if most > 0.0 and par.form == "retinal" else inf
@@ -287,7 +286,7 @@ class BottomUp:
         most: Sequence[float],
         worth: Sequence[float],
     ) -> list[SalienceRow]:
-        """Return what ``step`` does for few bodies, one row a body."""
+        """Return the result of ``step`` for few bodies, one row per body."""
         if self._params.form == "none":
             return [_UNSEEN] * len(rows.ids)
         self._pause(t_s)
@@ -335,7 +334,7 @@ class BottomUp:
     def _row(
         self, rows: BodyRows, i: int, p_eye: Vec3, v_eye: Vec3, gaze: Vec3
     ) -> tuple[float, float, float]:
-        """Return slide, loom and spin of one body as they are now, as ``_terms`` does of all."""
+        """Return the present slide, loom and spin of one body; scalar form of ``_terms``."""
         par = self._params
         (vx, vy, vz), (wx, wy, wz) = rows.v_world_m_s[i], rows.w_world_rad_s[i]
         if par.form == "literal":
@@ -360,7 +359,7 @@ class BottomUp:
         )
 
     def _terms(self, bodies: Bodies, p_eye: Vec3, v_eye: Vec3, gaze: Vec3) -> Floats:
-        """Return (3, n) slide, loom and spin as they are now."""
+        """Return the present slide, loom and spin, (3, n)."""
         now = np.empty((3, len(bodies)))
         for start in range(0, len(bodies), BLOCK):
             some = slice(start, start + BLOCK)
@@ -386,7 +385,7 @@ class BottomUp:
         out[2] = raw.rotation / par.rotation_reference_rad_s
 
     def _onset_share(self, t_s: float) -> float:
-        """Return the share of its salience that an onset has now."""
+        """Return the share of the full salience of an onset at this time."""
         recovery_s = self._params.onset_recovery_s
         return -expm1((self._onset_s - t_s) / recovery_s) if recovery_s > 0.0 else 1.0
 
@@ -436,7 +435,7 @@ class BottomUp:
         return self._memory if isinstance(self._memory, _Memory) else self._memory.arrays()
 
     def _pause(self, t_s: float) -> None:
-        """Shift all times where no step was made for long, so that no body counts as gone."""
+        """Shift all times after a long pause without steps, so that no body counts as gone."""
         paused_s = t_s - self._at_s
         if self._started_s < inf and paused_s <= _BLINK_S:
             return
@@ -447,14 +446,14 @@ class BottomUp:
             self._gone = self._gone._replace(seen_s=self._gone.seen_s + paused_s)
 
     def _entry_s(self, t_s: float) -> float:
-        """Return the time of entry of what is seen for the first time at ``t_s``.
+        """Return the time of entry of a body first seen at ``t_s``.
 
-        What the first moments show was there before: it entered long ago.
+        A body seen in the first moments was there before: it entered long ago.
         """
         return t_s if t_s - self._started_s > _BLINK_S else -np.inf
 
     def _remember(self, ids: tuple[int, ...], t_s: float) -> None:
-        """Rearrange the memory for other bodies, keeping those missed for a moment."""
+        """Rearrange the memory for other bodies; those missed for a moment stay."""
         now = _never_seen(np.fromiter(ids, dtype=np.int64, count=len(ids)))
         old = _joined(self._arrays(), self._gone)
         old = old.only(t_s - old.seen_s <= _BLINK_S)

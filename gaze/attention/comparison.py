@@ -1,4 +1,4 @@
-"""What one decision of attention compared, and the target that comes of it with its reason."""
+"""Comparison of one decision of attention, and the resulting target with its reason."""
 
 from collections.abc import Callable
 from math import inf
@@ -11,7 +11,7 @@ from gazerig.gaze.attention.top_down import RuleTarget
 from gazerig.gaze.types import Bodies, Floats, Salience, Target, vec
 
 NO_BODY = -1
-"""Id of a target that is a point and no body."""
+"""Id of a target that is a point and not a body."""
 
 _LISTED = 4
 
@@ -20,11 +20,11 @@ class TargetComparison(NamedTuple):
     """Amounts of one decision.
 
     motion:   returns the terms of one of the n bodies
-    rule, habituation, total: (n + 1,), the point that a rule may name coming after the
-        bodies; the rule's constant, the factor of habituation and of faces that look elsewhere,
-        and the amount compared, which is -inf where there is nothing
+    rule, habituation, total: (n + 1,), with the point that a rule may name after the bodies; the
+        rule's constant, the factor of habituation and of faces that look elsewhere, and the
+        compared amount, -inf without a target
     best: row of the largest total
-    plan: what the action planner has chosen and why, "" without one
+    plan: choice of the action planner and its reason, "" without one
     """
 
     bodies: Bodies
@@ -38,7 +38,7 @@ class TargetComparison(NamedTuple):
 
     @property
     def point_kind(self) -> str:
-        """Return the kind of the target that the rule's point is."""
+        """Return the kind of the rule's point as a target."""
         return self.rule_target.point_kind if self.rule_target is not None else ""
 
     def target(self, row: int, captured_s: float) -> Target:
@@ -60,7 +60,7 @@ class TargetComparison(NamedTuple):
             p, v = rule_target.point_world_m, rule_target.point_world_m_s
         else:
             p, v = vec(self.bodies.p_world_m[row]), vec(self.bodies.v_world_m_s[row])
-        # How far the head goes follows from the amount itself; boredom moves no head.
+        # The amplitude of the head follows from the amount itself; boredom moves no head.
         amount = max(first.rule, moving)
         return Target(
             p, v, captured_s, first.kind, first.id, amount, by_rule, None, 0, why,

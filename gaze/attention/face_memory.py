@@ -1,9 +1,9 @@
-"""Faces that have left the view are remembered where they were.
+"""Memory of faces that have left the view, at their last positions.
 
-A camera sees less than people do, and it turns away with the head: of several people some are
-always out of its view. What is remembered of them competes for the gaze like what is seen, so that
-the gaze comes back to them. A remembered face that is looked at and not found is forgotten, and so
-is one that is lost while it is looked at: that one is searched for (gazerig.gaze.attention.idle).
+A camera sees less than people do, and it turns away with the head: some of several people are
+always out of its view. Remembered faces compete for the gaze like visible ones, so that the gaze
+returns to them. A remembered face that the gaze does not find is forgotten. So is a face that is
+lost under the gaze: idle gaze searches for it (gazerig.gaze.attention.idle).
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _FOUND_WITHIN_S = 0.7
 
 @dataclass(slots=True)
 class _Remembered:
-    """A face: where and when it was seen last, and since when it has been looked for."""
+    """A face: last position and time, and start of the look for it."""
 
     p_world_m: Vec3
     radius_m: float
@@ -28,7 +28,7 @@ class _Remembered:
 
 
 class FaceMemory:
-    """The faces that were seen a while ago."""
+    """Memory of faces that were seen recently."""
 
     def __init__(self) -> None:
         self.reset()
@@ -43,9 +43,9 @@ class FaceMemory:
 
         Args:
             bodies: seen in the frame.
-            attended_id: what is looked at; -1 for nothing.
+            attended_id: the present target; -1 for none.
             captured_s: of the frame.
-            lasts_s: how long a face is remembered.
+            lasts_s: time for which a face is remembered.
         """
         before, self._captured_s = self._captured_s, captured_s
         seen = frozenset(bodies.ids)
@@ -76,7 +76,7 @@ class FaceMemory:
                 self._faces[bodies.ids[row]] = _Remembered((x, y, z), radius_m, captured_s)
 
     def _joined(self, bodies: Bodies, seen: frozenset[int]) -> Bodies:
-        """Return bodies and the faces that are remembered and not seen."""
+        """Return the bodies and the remembered faces that are not visible."""
         rest = {id: face for id, face in self._faces.items() if id not in seen}
         if not rest:
             return bodies

@@ -1,10 +1,10 @@
 """Habituation to what is attended, and inhibition of return.
 
-Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): a factor h of
-what is attended falls, that of everything else recovers, and what is compared is h times
-the salience. Without it the gaze stares. It belongs to an identity and outlives its
-absence: a person who comes back at once is not new. Several bodies that one rule points at share
-the gaze instead (gazerig.gaze.attention.shared_attention).
+Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): a factor h of the
+attended body falls, that of the others recovers, and h times the salience is compared. Without it
+the gaze stares. It belongs to an identity and outlives its absence: a person who returns
+immediately is not new. Several bodies that one rule selects share the gaze instead
+(gazerig.gaze.attention.shared_attention).
 
 Inhibition of return: for a moment the gaze avoids the place it has just left, as in
 Ruesch et al. 2008 (a Gaussian about that place that decays).
@@ -51,7 +51,7 @@ class Habituation:
         self._at_s = t_s
 
     def leave(self, p_world_m: Vec3, t_s: float) -> None:
-        """Record that the gaze has left a point."""
+        """Record a point that the gaze has left."""
         if self._params.inhibition_of_return_strength > 0.0:
             self._left.append(_Left(p_world_m, t_s))
 
@@ -80,7 +80,7 @@ class Habituation:
     def step_rows(
         self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float
     ) -> list[float]:
-        """Return what ``step`` does, for few bodies."""
+        """Return the result of ``step`` for few bodies."""
         self._go_on(attended_id, t_s)
         if not self._left:
             return [self._habituation.get(id, 1.0) for id in rows.ids]
@@ -93,13 +93,13 @@ class Habituation:
     def share(
         self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
     ) -> list[float]:
-        """Return the factor 0..1 of each of several bodies that a rule points at.
+        """Return the factor 0..1 of each of several bodies that a rule selects.
 
-        One alone keeps 1: what a rule names is not left for habituation.
+        A single one keeps 1: habituation does not make the gaze leave a rule's only body.
 
         Args:
             ids: the bodies that share the gaze.
-            weights: of each; they are looked at for times as their weights.
+            weights: of each; viewing times are in proportion to them.
             attended_id: what has been looked at since the step before; -1 for nothing.
             t_s: now.
         """
@@ -110,7 +110,7 @@ class Habituation:
         return [floor + (1.0 - floor) * exp(-rate * lead) for lead in leads]
 
     def _go_on(self, attended_id: int, t_s: float) -> None:
-        """Bring all factors and the points left to the present."""
+        """Update all factors and the points left to the present time."""
         self._habituate(attended_id, max(0.0, t_s - self._at_s))
         self._at_s = t_s
         if self._left:
@@ -118,7 +118,7 @@ class Habituation:
             self._left = [one for one in self._left if t_s - one.at_s < lasts_s]
 
     def _habituate(self, attended_id: int, dt_s: float) -> None:
-        """Lower the factor of what is attended and raise those of the rest."""
+        """Lower the factor of the attended body and raise those of the rest."""
         risen = self._params.recovery_rate_1_s * dt_s
         attended = self._habituation.pop(attended_id, 1.0)
         self._habituation = {
@@ -129,7 +129,7 @@ class Habituation:
             self._habituation[attended_id] = attended
 
     def _return_factor(self, p_world_m: list[float], p_eye: Vec3, t_s: float) -> float:
-        """Return the factor of one body near points left, as ``_avoid`` does of all."""
+        """Return the factor of one body near points left; scalar form of ``_avoid``."""
         par = self._params
         x, y, z = p_world_m
         way = unit(sub((x, y, z), p_eye))

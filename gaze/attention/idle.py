@@ -1,19 +1,19 @@
 """Idle gaze when there is no target: wait, search, then explore what is in view.
 
-A person who steps out of the frame often comes back at once, and a detector blinks;
-so the gaze first stays where it was. Then it searches: towards the side the person left
-to, and around the place of the loss. With no person found it explores: one to two shifts of
-gaze a second, as people make in front of a scene, with a rest straight ahead now and then.
+A person who steps out of the frame often returns immediately, and a detector has gaps; so the gaze
+first stays. Then it searches: towards the side to which the person left, and around the place of
+the loss. With no person found it explores: one to two shifts of gaze per second, as people make in
+front of a scene, with an occasional rest straight ahead.
 
-A glance goes to something in view, or to where something was a moment ago, or else to a
-plausible point: shifts are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and
-more sideways than up or down, and people look more at the middle of what is before them than
-at its edges, so a shift is drawn from the present point and kept by the odds of where it leads.
+A glance goes to a thing in view, or to a recently seen one, or else to a plausible point. Shifts
+are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and more sideways than up or down,
+and people look more at the middle of a scene than at its edges. So a shift is drawn from the
+present point and accepted by the odds of its end point.
 
-Search points and glances all have kind "search" or "glance" and each has an id of its
-own, -2 - n for the n-th since the reset, counted through both kinds: a shift is counted
-where kind or id changes, so every glance is a shift of gaze. The resting point is "rest"
-with id -1. Directions are seen from a point above the neck base at the resting height.
+Search points and glances all have kind "search" or "glance" and each has an id of its own, -2 - n
+for the n-th since the reset, counted through both kinds: a shift is counted when kind or id
+changes, so every glance is a shift of gaze. The resting point is "rest" with id -1. Directions are
+seen from a point above the neck base at the resting height.
 """
 
 from collections.abc import Sequence
@@ -31,12 +31,12 @@ _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Angles2 = (0.0, 0.0)
 _TRIES = 12
 _THING_HOLDS = 1.6
-"""A thing is looked at this many times as long as a point of the room."""
+"""Duration of a glance at a thing over that at a point of the room."""
 _PLACES = 16
-"""So many things are remembered."""
+"""Largest number of remembered things."""
 _UPRIGHT = 0.5
 """Shifts up or down are this share of those to the side."""
-_SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make no more than 3 to 4 a second
+_SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make at most 3 to 4 per second
 
 
 @dataclass(frozen=True)
@@ -73,14 +73,14 @@ class IdleParams:
         """Check the range of the glances.
 
         Raises:
-            ValueError: the nearest glance lies beyond the farthest.
+            ValueError: the nearest glance is beyond the farthest.
         """
         if self.glance_least_deg > self.glance_yaw_deg:
             raise ValueError("glance_least_deg must not be above glance_yaw_deg")
 
 
 class Idle:
-    """Chooses the target when attention has none."""
+    """Idle gaze: the target when attention has none."""
 
     def __init__(self, params: IdleParams, rng: np.random.Generator | None = None) -> None:
         self._rng = rng
@@ -105,7 +105,7 @@ class Idle:
         self._in_view: frozenset[int] = frozenset()
 
     def retune(self, params: IdleParams) -> None:
-        """Change durations and ranges; the phase under way goes on, its duration scaled."""
+        """Change durations and ranges; the present phase continues, its duration scaled."""
         before = self._params
         self._take(params)
         since_s, left_s = self._now.at_s, self._until_s - self._now.at_s
@@ -115,13 +115,13 @@ class Idle:
         elif self._now.kind == "glance":
             left_s *= params.glance_ms / before.glance_ms
         elif self._now.kind != "search":
-            # A lost target is waited for.
+            # The wait for a lost target.
             left_s += (params.hold_ms - before.hold_ms) / 1e3
             self._search_until_s = since_s + left_s + params.search_ms / 1e3
         if params.explores != before.explores and self._now.kind in ("rest", "glance"):
             self._rest_now(self._t_s)
             left_s = self._until_s - since_s
-        if self._lost:  # else the time of the phase before this target is over
+        if self._lost:  # else the phase before this target has expired
             self._until_s = max(since_s + left_s, self._t_s)
 
     def remember(self, target: Target) -> None:
@@ -131,13 +131,13 @@ class Idle:
             self._keep(target.id, target.p_world_m, target.at_s)
 
     def see(self, ids: Sequence[int], p_world_m: Sequence[Vec3], t_s: float) -> None:
-        """Record what is in view, salient or not."""
+        """Record the bodies in view, salient or not."""
         self._in_view = frozenset(ids)
         for id, place in zip(ids, p_world_m, strict=True):
             self._keep(id, place, t_s)
 
     def forget_places(self) -> None:
-        """Forget what was in view: another scene is shown."""
+        """Forget the bodies in view, as the scene has changed."""
         self._seen, self._in_view = {}, frozenset()
 
     def _keep(self, id: int, place: Vec3, t_s: float) -> None:
@@ -147,10 +147,10 @@ class Idle:
             del self._seen[next(iter(self._seen))]
 
     def step(self, t_s: float, blind: bool = True) -> Target:
-        """Return where to look with nothing in sight: wait, search, rest, glance.
+        """Return the target with nothing in sight: wait, search, rest, glance.
 
-        blind: no pictures come, and a lost target may have gone on; else it has left the picture
-            or has hidden, about where it was seen last
+        blind: no images arrive, and a lost target may have moved on; else it has left the image or
+            is hidden, near its last position
         """
         self._t_s = t_s
         if not self._lost:
@@ -160,12 +160,12 @@ class Idle:
         return self._now
 
     def _lose(self, t_s: float, blind: bool) -> None:
-        """Start to wait for a lost target, where it was seen last or has got to since."""
+        """Start to wait for a lost target, at its last or extrapolated position."""
         self._lost = True
         gone, par = self._last, self._params
         self._gone, self._last = gone, None
         self._until_s = self._search_until_s = t_s
-        if gone is None or gone.id in self._in_view:  # what lies still in view is not lost
+        if gone is None or gone.id in self._in_view:  # a still thing in view is not lost
             self._rest_now(t_s)
             return
         coast_s = min(max(0.0, t_s - gone.at_s), par.coast_ms / 1e3) if blind else 0.0
@@ -182,7 +182,7 @@ class Idle:
         self._search_until_s = self._until_s + par.search_ms / 1e3
 
     def _next(self, t_s: float) -> None:
-        """Go on to the next phase at ``t_s``, when the duration of the last one is over."""
+        """Start the next phase at ``t_s``, when the duration of the last one is over."""
         if self._rng is None:
             self._now, self._until_s = self._resting(t_s), float("inf")
         elif self._gone is not None and t_s < self._search_until_s:
@@ -193,7 +193,7 @@ class Idle:
             self._rest_now(t_s)
 
     def _once_more(self, rng: np.random.Generator) -> bool:
-        """Return whether another glance follows a glance at once."""
+        """Return whether another glance follows a glance immediately."""
         return self._now.kind == "glance" and rng.random() < self._params.again_share
 
     def _rest_now(self, t_s: float) -> None:
@@ -205,12 +205,12 @@ class Idle:
             self._until_s = t_s + self._time_s(self._params.rest_ms, self._rng)
 
     def _search(self, gone: Target, t_s: float, rng: np.random.Generator) -> None:
-        """Start a search fixation: first where the target left to, then around."""
+        """Start a search fixation: first in the direction of the loss, then around."""
         par, first = self._params, self._now.kind != "search"
         rel = sub(gone.p_world_m, self._eye)
         out = self._way_out(rel, gone.v_world_m_s)
         share = 1.0 if first else float(rng.uniform(-0.2, 1.2))
-        # Heads stay at about one height: people are looked for sideways.
+        # Heads keep about one height: the search for people goes sideways.
         spread = 0.0 if first and out != (0.0, 0.0) else radians(par.search_spread_deg)
         yaw, pitch = yaw_pitch(rel)
         to_yaw = yaw + share * out[0] + spread * float(rng.standard_normal())
@@ -225,7 +225,7 @@ class Idle:
         self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
 
     def _way_out(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
-        """Return the yaw and pitch from the loss to where it was heading; 0 for what stood."""
+        """Return the yaw and pitch from the loss towards its heading; 0 for a target at rest."""
         soon = yaw_pitch(add(rel, scale(v_world_m_s, 0.05)))
         now = yaw_pitch(rel)
         yaw, pitch = wrap(soon[0] - now[0]), soon[1] - now[1]
@@ -252,7 +252,7 @@ class Idle:
         self._look("glance", place, par.rest_distance_m, t_s, "glancing around, no one in sight")
 
     def _elsewhere(self, here: Angles2, t_s: float) -> list[Vec3]:
-        """Return the places of things within reach that are not being looked at."""
+        """Return the places of things within reach, except the present target."""
         par, way = self._params, direction(here)
         self._seen = {
             id: (place, at_s)
@@ -268,7 +268,7 @@ class Idle:
         ]
 
     def _plausible(self, here: Angles2, rng: np.random.Generator) -> Angles2:
-        """Draw the next point, by the size of shifts and by how much the middle is looked at."""
+        """Draw the next point, by the size of shifts and the preference for the middle."""
         par = self._params
         wide, high = max(par.glance_yaw_deg, 1e-3), max(par.glance_pitch_deg, 1e-3)
         yaw, pitch = degrees(here[0]), degrees(here[1])
@@ -309,5 +309,5 @@ class Idle:
 
 
 def _off_middle(yaw_share: float, pitch_share: float) -> float:
-    """Return the negative logarithm of how much a point is looked at, 0 in the middle."""
+    """Return the negative logarithm of a point's share of looks, 0 in the middle."""
     return 2.0 * (yaw_share * yaw_share + pitch_share * pitch_share)

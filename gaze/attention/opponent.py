@@ -1,7 +1,7 @@
-"""What is seen of an opponent in a boxing match: which fist comes, and which places are open.
+"""Observation of an opponent in a boxing match: approaching fists and open places.
 
-Time to contact is distance over closing speed. An eye has it from the picture alone, as the size of
-an image over the rate of its growth (Lee 1976, Perception 5, 437-459), and people time their
+Time to contact is distance over closing speed. An eye obtains it from the image alone, as the size
+of the image over the rate of its growth (Lee 1976, Perception 5, 437-459), and people time their
 hitting and catching by it (Lee, Young, Reddish, Lough & Clayton 1983, Quarterly Journal of
 Experimental Psychology 35A, 333-346). World frame, metres, seconds.
 """
@@ -22,17 +22,17 @@ CHEST_M: Vec3 = (0.0, 0.0, -0.30)
 """The middle of the chest from the tip of the nose of a person who stands upright."""
 
 _ARM_M = 0.9
-"""A hand farther than this from a face is not of that person."""
+"""A hand farther than this from a face belongs to another person."""
 HANDS = 2
 
 
 class Approach(NamedTuple):
-    """How a fist comes nearer.
+    """Approach of a fist.
 
     away_m: distance from the eye
-    contact_s: time until it arrives if it goes on as it does; inf: it does not come nearer
-    miss_m: how far from the eye it would pass on its straight line
-    closing_sd_m_s: standard deviation of the closing speed; inf where it is not known
+    contact_s: time to contact at its present speed; inf: it does not approach
+    miss_m: distance from the eye at which its straight line passes
+    closing_sd_m_s: standard deviation of the closing speed; inf if unknown
     """
 
     id: int
@@ -45,7 +45,7 @@ class Approach(NamedTuple):
 
 
 class SeenHand(NamedTuple):
-    """A hand of the opponent where it was seen last; off_m: from the face then."""
+    """A hand of the opponent at its last position; off_m: from the face then."""
 
     id: int
     off_m: Vec3
@@ -53,7 +53,7 @@ class SeenHand(NamedTuple):
 
 
 class HitTarget(NamedTuple):
-    """A place to be hit; clear_m: distance of the nearest hand from the line to it."""
+    """A place to hit; clear_m: distance of the nearest hand from the line to it."""
 
     name: str
     p_world_m: Vec3
@@ -61,10 +61,10 @@ class HitTarget(NamedTuple):
 
 
 def approaches(bodies: Bodies, p_eye: Vec3, contact_m: float, late_s: float) -> list[Approach]:
-    """Return how each fist comes nearer.
+    """Return the approach of each fist.
 
     Args:
-        bodies: what one frame showed.
+        bodies: contents of one frame.
         p_eye: middle of the eyes.
         contact_m: a fist this near has arrived.
         late_s: age of the frame.
@@ -87,24 +87,24 @@ def approaches(bodies: Bodies, p_eye: Vec3, contact_m: float, late_s: float) -> 
 
 
 def _along_sd_m_s(bodies: Bodies, row: int, sight: Vec3) -> float:
-    """Return the standard deviation of a body's speed along a direction, inf where unknown."""
+    """Return the standard deviation of a body's speed along a direction, inf if unknown."""
     if bodies.pv_cov is None:
         return inf
     return sqrt(max(0.0, float(np.array(sight) @ bodies.pv_cov[row][3:, 3:] @ np.array(sight))))
 
 
 def nearest_face(faces: Sequence[Face], p_eye: Vec3, within_m: float) -> Face | None:
-    """Return the nearest face within reach, None where there is none."""
+    """Return the nearest face within reach, None without one."""
     near = [(norm(sub(face.p_world_m, p_eye)), face.id, face) for face in faces]
     away_m, _, face = min(near, default=(inf, -1, None), key=lambda one: one[:2])
     return face if away_m <= within_m else None
 
 
 class OpponentHands:
-    """Where the two hands of the opponent were seen last.
+    """Last positions of the opponent's two hands.
 
-    A detector of motion does not see a hand that rests, and it may give one that moves again
-    another number. So of what is not seen the newest is remembered, up to two hands in all.
+    A motion detector does not see a hand at rest, and it may give another number to one that moves
+    again. So the newest unseen hands are remembered, up to two hands in all.
     """
 
     def __init__(self) -> None:
@@ -115,12 +115,12 @@ class OpponentHands:
         self._known: list[SeenHand] = []
 
     def step(self, bodies: Bodies, p_face: Vec3, memory_s: float, t_s: float) -> list[SeenHand]:
-        """Return the hands that are known, those seen now first.
+        """Return the known hands, those seen now first.
 
         Args:
-            bodies: what one frame showed.
+            bodies: contents of one frame.
             p_face: the opponent's face in it.
-            memory_s: a hand not seen for longer is not known any more.
+            memory_s: a hand unseen for longer is forgotten.
             t_s: time of the frame.
         """
         seen = []
@@ -129,14 +129,14 @@ class OpponentHands:
                 off = sub(vec(bodies.p_world_m[row]), p_face)
                 if norm(off) <= _ARM_M:
                     seen.append(SeenHand(bodies.ids[row], off, t_s))
-        # An opponent has two: a third one is another's, or an arm taken for one, and came later.
+        # An opponent has two hands: a later, third one belongs to another person or is an arm.
         before = {hand.id for hand in self._known}
         seen = sorted(seen, key=lambda hand: hand.id not in before)[:HANDS]
         ids = {hand.id for hand in seen}
         rest = [
             hand for hand in self._known if hand.id not in ids and t_s - hand.seen_s <= memory_s
         ]
-        # A hand with a new number is most likely the one that was nearest to it.
+        # A hand with a new number is most likely the nearest known one.
         for hand in seen:
             if rest and hand.id not in {one.id for one in self._known}:
                 rest.remove(min(rest, key=lambda one: norm(sub(one.off_m, hand.off_m))))
@@ -146,7 +146,7 @@ class OpponentHands:
 
 
 def places(face: Face, hands: Sequence[SeenHand], p_eye: Vec3) -> list[HitTarget]:
-    """Return the places to be hit, the one with the most room around the line to it first."""
+    """Return the places to hit, those with the most room around the line first."""
     known = dict(zip(PARTS, face.parts_world_m, strict=False))
     spots = {
         "chest": add(face.p_world_m, CHEST_M),

@@ -25,7 +25,7 @@ class HabituationParams:
 
 @dataclass(frozen=True)
 class ReactionParams:
-    """Distribution of reaction times, and what shortens them."""
+    """Distribution of reaction times, and their reductions."""
 
     # fmt: off
     median_ms: Annotated[float, Bounds(0, 1000),

@@ -1,6 +1,6 @@
-"""Persons by what they do: the nearest, those who wave or look at the head, the one who came last.
+"""Persons by behaviour: the nearest, those who wave or look at the head, the newest.
 
-Rules can name people so (gazerig.gaze.attention.top_down), however the tracker numbers them.
+Rules can name people by it (gazerig.gaze.attention.top_down), independent of the tracker's numbers.
 
 A hand waves when its velocity across the view has changed sides twice within a little more than a
 second, faster than a hand that only gestures, at the height of the face; the person who waves is
@@ -20,25 +20,26 @@ TRAITS = (NEAREST, WAVING, LOOKING, NEWEST)
 _WAVES_M_S = 0.25
 _TURNS, _TURNS_WITHIN_S = 2, 1.2
 _WAVED_S = 1.5
-"""Time for which a person counts as waving after the hand has turned the last time."""
+"""Time for which a person counts as waving after the hand's last turn."""
 _ARM_M = 0.9
 _HELD_OUT = 0.65
-"""A hand nearer than this share of the face's distance is held out; signs and gestures are not."""
+"""A hand nearer than this share of the face's distance reaches out; signs and gestures do not."""
 _RAISED_M = 0.08
-"""A hand is raised at the height of the face, at most so far below its centre; signs are lower."""
+"""A hand is raised if it is at most this far below the face's centre; signs are lower."""
 _GESTURES_M_S, _GESTURES_S, _GESTURES = 0.25, 2.0, 0.5
-"""Somebody whose lower hands were faster than this for this share of about this time gestures."""
+"""A person gestures whose lower hands were faster than this, in this time window, for this
+share."""
 _HAND, _OWN = "hand", "own"
-"""The robot's own body waves to nobody."""
+"""The robot's own body never waves."""
 _TOGETHER_S = 0.5
-"""Who comes within this time of another has come together with them."""
+"""People who appear within this time of each other came together."""
 _CLEARLY_NEARER = 1.1
 _GONE_S = 120.0
 
 
 @dataclass(slots=True)
 class _Hand:
-    """Motion of something that is no face: the side it moves to, and when it last changed sides."""
+    """Motion of a body other than a face: its side, and the times of its changes of side."""
 
     side: float = 0.0
     turned_s: list[float] = field(default_factory=list)
@@ -46,13 +47,13 @@ class _Hand:
 
 
 class Persons:
-    """What the people in view do.
+    """Behaviour of the people in view.
 
     Attributes:
-        parts: of what moves within a person's reach, the id of that person's face; without what is
-            held out towards the head or raised to the face.
-        raised: ids of what moves within a person's reach at the height of the face; without the
-            hands of somebody who gestures and does not wave: signs reach the face, too.
+        parts: for a body that moves within a person's reach, the id of that person's face; without
+            bodies that reach out towards the head or are raised to the face.
+        raised: ids of bodies that move within a person's reach at the height of the face; without
+            hands of a person who gestures and does not wave, as signs reach the face, too.
     """
 
     def __init__(self) -> None:
@@ -75,8 +76,8 @@ class Persons:
         """Update with a new frame.
 
         Args:
-            percept: what it showed.
-            p_world_eye_m: from where.
+            percept: its percept.
+            p_world_eye_m: position of the eye.
         """
         bodies, before_s, self._at_s = percept.bodies, self._at_s, percept.captured_s
         rows = bodies.p_world_m.tolist()
@@ -107,7 +108,7 @@ class Persons:
         self._drop_old()
 
     def named(self, trait: str) -> frozenset[int]:
-        """Return the ids of the people with a trait, none where nobody has it.
+        """Return the ids of the people with a trait.
 
         Args:
             trait: one of TRAITS.
@@ -122,7 +123,7 @@ class Persons:
         return frozenset(id for id, at_s in self._came_s.items() if latest_s - at_s < _TOGETHER_S)
 
     def _update_nearest(self, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
-        """Update who is nearest; somebody else must be clearly nearer."""
+        """Update the nearest person; another one must be clearly nearer."""
         away = {id: dist(p, p_eye) for id, p in faces.items()}
         if not away:
             self._nearest = -1
@@ -139,7 +140,7 @@ class Persons:
         faces: Mapping[int, Vec3],
         p_eye: Vec3,
     ) -> None:
-        """Update a hand, and who waves with it: the person with the nearest face."""
+        """Update a hand, and its waving person: the one with the nearest face."""
         # Sideways as seen from the eye: level, and across the direction to the hand.
         ahead, aside = place[0] - p_eye[0], place[1] - p_eye[1]
         away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
@@ -149,12 +150,12 @@ class Persons:
                 self._waved_s[owner] = self._at_s
 
     def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> int:
-        """Update whose body something is part of: who is nearest to its line of sight.
+        """Update the owner of a body part: the person nearest to its line of sight.
 
-        The distance of what moves is often only assumed, so it is compared as far away as the face.
+        The distance of a moving body is often only assumed: it is compared at the face's distance.
 
         Returns:
-            The id of that person if it is lower than the face and not held out, else -1.
+            The id of that person if it is lower than the face and does not reach out, else -1.
         """
         away, towards = dist(place, p_eye), sub(place, p_eye)
         beside = {

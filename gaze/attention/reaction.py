@@ -1,14 +1,13 @@
-"""Reaction time: from what wins attention to the change of target.
+"""Reaction time: from a new winner of attention to the change of target.
 
-People look at something new 150 to 250 ms after it has appeared, hardly ever before 120 ms
-(express saccades), and the times are skewed: log-normal here. The time counts from the capture
-of the frame in which the new target won, so the delay of the camera is a part of it and not
-added to it. What wins while the time runs takes it over, since a saccade is programmed as a
-time and a goal; what no longer wins is not looked at. Meanwhile the present target is
-looked at as before.
+People look at a new thing 150 to 250 ms after its appearance, hardly ever before 120 ms (express
+saccades), and the times are skewed: log-normal here. The time counts from the capture of the frame
+in which the new target won, so it includes the delay of the camera. A later winner takes over the
+running time, since a saccade is programmed as a time and a goal; a target that no longer wins is
+dropped. Meanwhile the gaze stays on the present target.
 
-What comes nearer fast is answered sooner, and so is a face that was looked at a moment ago. A
-change of behaviour is the robot's own decision, not a stimulus: it waits for nothing.
+The reaction to a fast approach is quicker, and so is that to a recently viewed face. A change of
+behaviour is the robot's own decision, not a stimulus: it has no reaction time.
 """
 
 from math import exp, inf
@@ -20,11 +19,11 @@ from gazerig.gaze.types import Target
 
 
 class Reaction:
-    """The next target, which waits for its reaction time to be over.
+    """The next target, during its reaction time.
 
     Args:
         params: the distribution.
-        rng: draws one time for each change of target; None: all changes are at once.
+        rng: draws one time for each change of target; None: all changes are immediate.
     """
 
     def __init__(self, params: ReactionParams, rng: np.random.Generator | None = None) -> None:
@@ -33,27 +32,27 @@ class Reaction:
         self.reset(0.0)
 
     def retune(self, params: ReactionParams) -> None:
-        """Change the distribution; a reaction under way is as quick or slow among the new times."""
+        """Change the distribution; a reaction in progress keeps its quantile."""
         self._params = params
 
     def reset(self, t_s: float) -> None:
-        """Forget what waits and what was looked at."""
+        """Forget the waiting target and the former ones."""
         self._next: Target | None = None
         self._deviation = 0.0
         self._won_s = self._free_s = t_s
         self._left_s: dict[int, float] = {}
 
     def record_left(self, kind: str, id: int, t_s: float) -> None:
-        """Record that the gaze has left something."""
+        """Record a target that the gaze has left."""
         if kind == "face":
             lasts_s = self._params.return_s
             self._left_s = {k: at_s for k, at_s in self._left_s.items() if t_s - at_s < lasts_s}
             self._left_s[id] = t_s
 
     def wait(self, target: Target, free_s: float) -> None:
-        """Let a target that wins wait for its time; if another waits, it takes over its time.
+        """Start the reaction time of a winning target, which takes over that of a waiting one.
 
-        free_s: not before this, however quick the reaction
+        free_s: earliest time of the change
         """
         if self._next is None:
             self._won_s = target.at_s
@@ -61,16 +60,16 @@ class Reaction:
         self._next, self._free_s = target, free_s
 
     def drop(self) -> None:
-        """Drop what waits: it no longer wins."""
+        """Drop the waiting target: it no longer wins."""
         self._next = None
 
     @property
     def waits(self) -> bool:
-        """Return whether a target waits for its time."""
+        """Return whether a target waits for its reaction time."""
         return self._next is not None
 
     def take(self, t_s: float) -> Target | None:
-        """Return the target whose time is over, once; None while there is none."""
+        """Return the target whose reaction time is over, once; None without one."""
         target = self._next
         if target is None or t_s < max(self._free_s, self._due_s(target)) - 1e-9:
             return None
@@ -78,7 +77,7 @@ class Reaction:
         return target
 
     def _due_s(self, target: Target) -> float:
-        """Return when the reaction time of a target is over."""
+        """Return the end of a target's reaction time."""
         par = self._params
         if self._rng is None or par.median_ms <= 0.0:
             return -inf
@@ -86,7 +85,7 @@ class Reaction:
         return self._won_s + self._ratio(target) * drawn_s
 
     def _ratio(self, target: Target) -> float:
-        """Return the share of the drawn time that a target takes."""
+        """Return the share of the drawn time that applies to a target."""
         par, first = self._params, target.saliences[0]
         ratio = 1.0
         if first.looming > max(first.translation, first.rotation, first.onset, first.rule):

@@ -1,11 +1,11 @@
-"""How several bodies of one rule share the gaze: each by its weight, and none is left out.
+"""Shared attention: the bodies of one rule share the gaze by their weights.
 
-Of several people whom a rule points at, habituation to each by itself forgets within a second who
-has not been looked at for half a minute: the two or three nearest would take turns for ever. So
-every body has a lead: the time for which it was looked at, divided by its weight, over that of the
-body that was looked at least (weighted fair queueing, as schedulers of processes do it). The larger
-the lead, the lower the factor. Looks then last the longer the heavier the body is, they are shorter
-the more bodies there are, and times are as the weights: the matching law (Herrnstein 1961).
+With habituation alone, the two or three nearest of several people would alternate for ever, as each
+recovers within a second, and a person unseen for half a minute gains no more. So every body has a
+surplus: its viewing time divided by its weight, minus that of the least viewed body (weighted fair
+queueing, as in process schedulers). The larger the surplus, the lower the factor. Looks then last
+longer for heavier bodies, are shorter for more bodies, and total times are in proportion to the
+weights: the matching law (Herrnstein 1961).
 """
 
 from collections.abc import Sequence
@@ -13,58 +13,62 @@ from math import exp
 from typing import NamedTuple
 
 _FADES_S = 10.0
-"""Time constant with which leads fade: a minute of being looked at is not made up for."""
+"""Time constant with which a surplus decays: a minute of looks need not be compensated."""
 _LARGEST_S = 5.0
 _KEPT_S = 60.0
 _FIRST_S = 0.1
-"""Of those who come the heaviest is looked at first: a body of weight 0 starts so far ahead."""
+"""Initial surplus of a body of weight 0: the heaviest of new bodies comes first."""
 
 
-class _Lead(NamedTuple):
-    """A lead in seconds, and when the body shared the gaze last."""
+class _Surplus(NamedTuple):
+    """A surplus in seconds, and the body's last time in the shared gaze."""
 
-    lead_s: float
+    surplus_s: float
     at_s: float
 
 
 class SharedAttention:
-    """Leads of the bodies that share the gaze."""
+    """Surpluses of the bodies that share the gaze."""
 
     def __init__(self) -> None:
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
         """Forget all bodies."""
-        self._leads: dict[int, _Lead] = {}
+        self._surpluses: dict[int, _Surplus] = {}
         self._at_s = t_s
 
     def step(
         self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
     ) -> list[float]:
-        """Return the lead of each body in seconds, 0 for the one that was looked at least.
+        """Return the surplus of each body in seconds, 0 for the least viewed one.
 
         Args:
-            ids: the bodies that share the gaze now. Who joins them is behind nobody.
+            ids: the bodies that share the gaze now. A new one starts without a deficit.
             weights: of each, above 0; only their ratios matter.
-            attended_id: what was looked at since the step before; -1 for nothing.
+            attended_id: the target since the last step; -1 for none.
             t_s: now.
         """
         dt_s, self._at_s = max(0.0, t_s - self._at_s), t_s
         if len(ids) <= 1:
             return [0.0] * len(ids)
         most = max(*weights, 1e-9)
-        leads = []
+        surpluses = []
         for id, weight in zip(ids, weights, strict=True):
             share = max(weight / most, 1e-3)
-            known = self._leads.get(id)
+            known = self._surpluses.get(id)
             if known is None:
-                lead = _FIRST_S * (1.0 - share)
+                surplus = _FIRST_S * (1.0 - share)
             else:
-                lead = known.lead_s * exp((known.at_s - t_s) / _FADES_S)
-            leads.append(lead + (dt_s / share if id == attended_id else 0.0))
-        least = min(leads)
-        leads = [min(lead - least, _LARGEST_S) for lead in leads]
-        self._leads.update((id, _Lead(lead, t_s)) for id, lead in zip(ids, leads, strict=True))
-        if len(self._leads) > 2 * len(ids):
-            self._leads = {k: one for k, one in self._leads.items() if t_s - one.at_s < _KEPT_S}
-        return leads
+                surplus = known.surplus_s * exp((known.at_s - t_s) / _FADES_S)
+            surpluses.append(surplus + (dt_s / share if id == attended_id else 0.0))
+        least = min(surpluses)
+        surpluses = [min(surplus - least, _LARGEST_S) for surplus in surpluses]
+        self._surpluses.update(
+            (id, _Surplus(surplus, t_s)) for id, surplus in zip(ids, surpluses, strict=True)
+        )
+        if len(self._surpluses) > 2 * len(ids):
+            self._surpluses = {
+                k: one for k, one in self._surpluses.items() if t_s - one.at_s < _KEPT_S
+            }
+        return surpluses

@@ -1,14 +1,13 @@
-"""Top-down attention: the target of the behaviour in force (Mitake et al. 3.3.3).
+"""Top-down attention: the target of the present behaviour (Mitake et al. 3.3.3).
 
-The paper's rules are attack -> attack target, guard -> guard target, wait -> the
-opponent's face, each with a constant amount of attention whose value it does not give.
-Here a rule may point at a kind of body, at persons by what they do
-(gazerig.gaze.attention.persons), at one body by its id, or at a place. Where several bodies are of
-the wanted kind, each is wanted, the nearer the more. Where no person does what a rule names, it
-points at all faces.
+The paper's rules are attack -> attack target, guard -> guard target, wait -> the opponent's face,
+each with a constant amount of attention whose value it does not give. Here a rule may select a kind
+of body, persons by behaviour (gazerig.gaze.attention.persons), one body by its id, or a place. If
+several bodies match, all are targets, nearer ones with more weight. If no person shows the
+behaviour that a rule names, it selects all faces.
 
-With an action planner (gazerig.gaze.attention.action_planner) the behaviour follows from what is
-seen, unless the user has chosen one, until they give it back (``PLANNED``).
+With an action planner (gazerig.gaze.attention.action_planner) the behaviour follows from the
+percept. A user's choice overrides it until they return to the planner (``PLANNED``).
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,15 +36,15 @@ _NO_ONE: frozenset[int] = frozenset()
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 
 PLANNED = "planned"
-"""Choice of the menu of behaviours that leaves them to the action planner."""
+"""Choice in the menu of behaviours that leaves them to the action planner."""
 
 GUARD_TARGET, ATTACK_TARGET = "guard_target", "attack_target"
-"""What comes and the place to be hit: what a rule looks at that leaves it to the action planner."""
+"""Targets of a rule from the action planner: the approaching fist, and the place to hit."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """One behaviour's rule."""
+    """Rule of one behaviour."""
 
     # fmt: off
     look_at: Annotated[str,
@@ -74,10 +73,10 @@ class Rule:
             raise ValueError("look_at: point and point_world_m go together; give both or neither")
 
     def _check_person(self) -> None:
-        """Check that a rule names persons by what they may do.
+        """Check that a rule names persons by a known trait.
 
         Raises:
-            ValueError: it does not; the message lists what can be written.
+            ValueError: it does not; the message lists the possible words.
         """
         prefix, colon, word = self.look_at.partition(":")
         traits = ", ".join(f'"{_PERSON}{trait}"' for trait in TRAITS)
@@ -93,7 +92,7 @@ class Rule:
 
     @property
     def person(self) -> str | None:
-        """Return what the persons do whom it names, None where it names none."""
+        """Return the trait of the persons that it names, None without one."""
         named = self.look_at.startswith(_PERSON)
         return self.look_at[len(_PERSON) :] if named else None
 
@@ -104,7 +103,7 @@ class Rule:
 
     @property
     def body_id(self) -> int | None:
-        """Return the id of the one body it names, None where it names none."""
+        """Return the id of the single body that it names, None without one."""
         return int(self.look_at[len(_BY_ID) :]) if self.look_at.startswith(_BY_ID) else None
 
 
@@ -118,7 +117,7 @@ def _shipped_rules() -> dict[str, Rule]:
 
 @dataclass(frozen=True)
 class TopDownParams:
-    """The rule set and the behaviour in force at the start."""
+    """The rule set and the initial behaviour."""
 
     # fmt: off
     behaviour: Annotated[str, "name of the behaviour that is active at the start"] = "wait"
@@ -134,7 +133,7 @@ class TopDownParams:
         """Check the start behaviour and those of the planner.
 
         Raises:
-            ValueError: one is not among the rules.
+            ValueError: a behaviour has no rule.
         """
         wanted = (self.behaviour, *ACTIONS) if self.planner.enabled else (self.behaviour,)
         for behaviour in wanted:
@@ -146,14 +145,14 @@ class TopDownParams:
 
 
 class RuleTarget(NamedTuple):
-    """What the rule in force points at.
+    """Targets of the present rule.
 
-    rows:     (k,) rows of the bodies wanted; none for a place
+    rows:     (k,) rows of the selected bodies; none for a place
     nearness: (k,) weight of each, 1 for the nearest
-    stay:     factor by which the body that was looked at last is preferred
-    point_world_m: the place wanted, None for bodies
+    stay:     factor by which the last target is preferred
+    point_world_m: the selected place, None for bodies
     salience, behaviour: the rule's constant and name
-    point_kind, point_world_m_s: what the place is called, and how fast it moves
+    point_kind, point_world_m_s: kind of the place, and its velocity
     """
 
     rows: NDArray[np.intp] | list[int]
@@ -167,11 +166,11 @@ class RuleTarget(NamedTuple):
 
 
 class TopDown:
-    """The rules, and the behaviour in force.
+    """Top-down attention: the rules, and the present behaviour.
 
-    behaviour: in force
-    named_ids: the people who do what the rule in force names, where it names persons; set by who
-        knows them before each step
+    behaviour: the present one
+    named_ids: the people with the trait that the present rule names, if it names persons; set by
+        the caller before each step
     """
 
     def __init__(self, params: TopDownParams) -> None:
@@ -181,10 +180,10 @@ class TopDown:
         self.reset(0.0)
 
     def retune(self, params: TopDownParams) -> None:
-        """Change the rules; the behaviour in force stays unless its rule is gone.
+        """Change the rules; the present behaviour stays unless its rule is gone.
 
-        Another behaviour of the start is in force at once: what was asked for is its rule. That of
-        the start also follows a planner that is switched off.
+        A changed initial behaviour becomes the present one immediately. The initial behaviour
+        also follows a planner that is switched off.
         """
         before, self._params = self._params, params
         self._planner.retune(params.planner)
@@ -194,18 +193,18 @@ class TopDown:
 
     @property
     def rule(self) -> Rule:
-        """Return the rule in force."""
+        """Return the present rule."""
         return self._params.rules[self.behaviour]
 
     @property
     def behaviours(self) -> tuple[str, ...]:
-        """Return what can be chosen: the behaviours in the order of the rules, and the planner."""
+        """Return the choices: the behaviours in the order of the rules, and the planner."""
         rules = tuple(self._params.rules)
         return (*rules, PLANNED) if self._params.planner.enabled else rules
 
     @property
     def chosen(self) -> str:
-        """Return which of ``behaviours`` is chosen."""
+        """Return the chosen one of ``behaviours``."""
         return PLANNED if self.plans and not self._by_user else self.behaviour
 
     @property
@@ -215,24 +214,24 @@ class TopDown:
 
     @property
     def plan_text(self) -> str:
-        """Return what the action planner means to do and why, "" without a planner."""
+        """Return the plan of the action planner and its reason, "" without a planner."""
         now = self._planner.plan
         return now.text if self.plans and now.action == self.behaviour else ""
 
     def plan(self, percept: Percept, p_eye: Vec3, t_s: float) -> None:
         """Let the action planner choose the behaviour; once for each new percept.
 
-        Where the user has chosen one, it only finds what that is for.
+        If the user has chosen one, the planner only finds its target.
         """
         asked: Action | None = None
         if self._by_user:
             asked = next((one for one in ACTIONS if one == self.behaviour), None)
-            if asked is None:  # a behaviour beside the match
+            if asked is None:  # a behaviour outside the match
                 return
         self.behaviour = self._planner.step(percept, p_eye, t_s, asked).action
 
     def reset(self, t_s: float) -> None:
-        """Return to the behaviour of the start, which the planner may change."""
+        """Return to the initial behaviour, which the planner may change."""
         self.behaviour = self._params.behaviour
         self._by_user = False
         self._planner.reset()
@@ -241,10 +240,10 @@ class TopDown:
         self._rows_named = np.zeros(0, dtype=np.intp)
 
     def behave(self, behaviour: str) -> None:
-        """Set the behaviour in force, or leave it to the planner again.
+        """Set the present behaviour, or leave it to the planner again.
 
         Raises:
-            ValueError: there is no rule for it; the message lists what there is.
+            ValueError: it has no rule; the message lists the behaviours.
         """
         if behaviour not in self.behaviours:
             known = ", ".join(sorted(self.behaviours))
@@ -259,7 +258,7 @@ class TopDown:
         seen: NDArray[np.bool_],
         p_world_eye_m: Vec3,
     ) -> RuleTarget | None:
-        """Return what the rule points at among the bodies in view, None where nothing.
+        """Return the rule's targets among the bodies in view, None without any.
 
         seen: (n,) which bodies are in view
         """
@@ -283,7 +282,7 @@ class TopDown:
         seen: list[bool],
         p_world_eye_m: Vec3,
     ) -> RuleTarget | None:
-        """Return what ``step`` does, for few bodies."""
+        """Return the result of ``step`` for few bodies."""
         rule = self._params.rules[self.behaviour]
         if self.plans and (planned := self._planned(rule, bodies.ids, seen)):
             return planned
@@ -305,7 +304,7 @@ class TopDown:
         return RuleTarget(rows, near, self._stay, None, rule.salience, self.behaviour)
 
     def _planned(self, rule: Rule, ids: Sequence[int], seen: list[bool]) -> RuleTarget | None:
-        """Return what the plan looks at, where the rule leaves it to the planner."""
+        """Return the plan's target, if the rule leaves it to the planner."""
         plan = self._planner.plan
         if rule.look_at == GUARD_TARGET and plan.body_id in ids:
             row = ids.index(plan.body_id)
@@ -320,7 +319,7 @@ class TopDown:
 
     @property
     def _stay(self) -> float:
-        """Return the factor by which the present person is preferred: as if nearer."""
+        """Return the factor by which the present person is preferred, as if nearer."""
         return float(self._params.stay_with_person**self._params.nearness)
 
     def _nearness(self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3) -> Floats:
@@ -333,14 +332,14 @@ class TopDown:
         return factor
 
     def _rows(self, bodies: Bodies, rule: Rule) -> NDArray[np.intp]:
-        """Return the rows of the bodies that a rule names."""
+        """Return the rows of the bodies that a rule selects."""
         if rule.point_world_m is not None:
             return np.zeros(0, dtype=np.intp)
         if rule.body_id is not None:
             rows = [bodies.ids.index(rule.body_id)] if rule.body_id in bodies.ids else []
             return np.array(rows, dtype=np.intp)
-        # The same kinds in the same order come again and again; comparing tuples of the
-        # same strings is many times faster than looking through them.
+        # Frames repeat the same kinds in the same order; comparing tuples of identical strings is
+        # many times faster than a search.
         if (rule.kind, bodies.kinds) != self._named:
             same = [kind == rule.kind for kind in bodies.kinds]
             self._named = rule.kind, bodies.kinds
