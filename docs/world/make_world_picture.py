@@ -22,7 +22,7 @@ import mujoco  # noqa: E402
 from world_rigs import rig_in_world  # noqa: E402
 
 from gazerig.features.world.figure import Figures  # noqa: E402
-from gazerig.features.world.figure_model import PlacedPeople  # noqa: E402
+from gazerig.features.world.figure_model import PeoplePlacer  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.renderer import Renderer, RendererParams  # noqa: E402
 
@@ -66,7 +66,7 @@ def _picture(moment: Moment) -> np.ndarray:
     data = mujoco.MjData(model)
     for joint, angle in moment.neck.items():
         data.qpos[model.joint(joint).qposadr[0]] = angle
-    PlacedPeople(model, figures).place(data, moment.t_s)
+    PeoplePlacer(model, figures).place(data, moment.t_s)
     mujoco.mj_forward(model, data)
     width, height = (2 * one for one in _SIZE)
     renderer = Renderer(model, width, height, RendererParams(shadow_px=0, samples=8))

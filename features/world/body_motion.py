@@ -8,23 +8,23 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gazerig.features.world import faces, handed_over, motions
+from gazerig.features.world import faces, motions, object_handover
 from gazerig.features.world.gait import Base, base_motion
 from gazerig.features.world.measures import Measures
 from gazerig.features.world.room import places_for, places_of
 from gazerig.features.world.rotations import (
-    directed,
+    axes_along,
     pitch_of,
     quaternions,
-    turned,
+    rotate,
     two_bones,
     unit,
-    wrapped,
+    wrap_angle,
     yaw_of,
     yaw_pitch_roll,
 )
 from gazerig.features.world.script import HEAD, WorldScript
-from gazerig.features.world.time_profiles import periodic, rise, smoothed, there_and_back
+from gazerig.features.world.time_profiles import periodic, rise, smooth, there_and_back
 from gazerig.features.world.timeline import HEAD_M, TimedAct, floor_m
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.person_shape import EYE_FACE_M, MOUTH_FACE_M
@@ -71,12 +71,12 @@ class BodyMotion:
     """One person over a round.
 
     Args:
-        script: of all people.
-        timelines: of all people.
-        name: of this one.
-        body: measures.
+        script: script of all people.
+        timelines: timed acts of all people.
+        name: name of this person.
+        body: measures of this person.
         t_s: times of the rows (n,).
-        seed: of blinks, sway and the wandering of the gaze.
+        seed: seed of blinks, sway and gaze wandering.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class BodyMotion:
         self.eyes_about_m = self.hips_m + 0.07 * self.ahead + (0.0, 0.0, upright)
 
     def _hips(self) -> Floats:
-        """Return the middle between the hip joints, as low as the legs need it."""
+        """Return the middle between the hip joints, low enough for the legs to reach the ground."""
         base, body = self.base, self.body
         sway = 0.006 * np.stack(
             [
@@ -128,13 +128,13 @@ class BodyMotion:
             away = np.linalg.norm(hip - ankle[:, :2], axis=1)
             reach = np.sqrt(np.maximum((_REACH_SHARE * body.leg_m) ** 2 - away**2, 0.01))
             limit = np.minimum(limit, ankle[:, 2] - self.floor + reach)
-        standing = smoothed(np.minimum(limit, smoothed(limit, 31)), 21)
+        standing = smooth(np.minimum(limit, smooth(limit, 31)), 21)
         seat = base.seat_m + _SEAT_FLESH_M
         z = standing + base.seated * (np.where(base.seat_m > 0.0, seat, standing) - standing)
         return np.concatenate((flat, (self.floor + z)[:, None]), axis=1)
 
     def heel(self, foot: int) -> Floats:
-        """Return how far a foot is pitched (n,): heel up behind the hips, toes up before them."""
+        """Return the pitch of a foot (n,): heel up behind the hips, toes up in front of them."""
         base = self.base
         way = base.hips_m - base.feet_m[:, foot, :2]
         back = (way * self.ahead[:, :2]).sum(axis=1) * (1.0 - np.clip(4.0 * base.seated, 0.0, 1.0))
@@ -157,7 +157,7 @@ class BodyMotion:
     def pose(self, eyes: Mapping[str, Floats]) -> list[Floats]:
         """Return places and quaternions (n, 7) of every segment, in their order."""
         found: dict[str, Pose] = {}
-        taken = handed_over.received(self.timelines, self.name)
+        taken = object_handover.receiving_acts(self.timelines, self.name)
         hand_acts = [one for one in (*self.acts, *taken) if motions.is_of_arm(one)]
         hand_acts.sort(key=lambda one: one.start_s)
         at = [self._at(one, eyes) for one in hand_acts]
@@ -169,7 +169,7 @@ class BodyMotion:
         return [_row(*found[name]) for name in SEGMENTS]
 
     def _at(self, one: TimedAct, eyes: Mapping[str, Floats]) -> Floats:
-        """Return what an act is directed at, at all times."""
+        """Return the target point of an act at all times."""
         if one.target is not None:
             return np.broadcast_to(np.array(one.target), (len(self.t_s), 3))
         if one.act.do == "pass":
@@ -194,13 +194,13 @@ class BodyMotion:
         R_pelvis = yaw_pitch_roll(self.yaw + 0.3 * twist, -0.25 * lean)
         R_torso = yaw_pitch_roll(self.yaw + twist, -lean)
         found["pelvis"] = (self.hips_m, R_pelvis)
-        waist = self.hips_m + turned(R_pelvis, np.array((0.0, 0.0, body.waist_m)))
+        waist = self.hips_m + rotate(R_pelvis, np.array((0.0, 0.0, body.waist_m)))
         found["torso"] = (waist, R_torso)
 
     def _head(self, found: dict[str, Pose], eyes: Mapping[str, Floats]) -> None:
         body = self.body
         waist, R_torso = found["torso"]
-        base_m = waist + turned(R_torso, np.array((-0.012, 0.0, self._neck_base())))
+        base_m = waist + rotate(R_torso, np.array((-0.012, 0.0, self._neck_base())))
         eyes_about = base_m + 0.08 * self.ahead + (0.0, 0.0, body.neck_m + 0.05)
         rows = (len(self.t_s), 3)
         targets = {HEAD: np.broadcast_to(np.array(HEAD_M), rows), **eyes}
@@ -211,7 +211,7 @@ class BodyMotion:
         if first is None:
             place = places_of(self.script)[self.person.looks_at]
             first = np.broadcast_to((place.x_m, place.y_m, self.floor + place.height_m), rows)
-        chest_yaw = self.yaw + 0.5 * wrapped(yaw_of(R_torso[:, :, 0]) - self.yaw)
+        chest_yaw = self.yaw + 0.5 * wrap_angle(yaw_of(R_torso[:, :, 0]) - self.yaw)
         look = faces.looks(
             self.t_s, self.acts, first, targets, eyes_about, chest_yaw, HEAD, self.rng
         )
@@ -219,9 +219,9 @@ class BodyMotion:
         yaw, pitch = yaw + look.yaw, pitch + look.pitch
         torso_pitch = pitch_of(R_torso[:, :, 0])
         R_neck = yaw_pitch_roll(
-            self.yaw + 0.4 * wrapped(yaw - self.yaw), 0.6 * torso_pitch + 0.35 * pitch - 0.12
+            self.yaw + 0.4 * wrap_angle(yaw - self.yaw), 0.6 * torso_pitch + 0.35 * pitch - 0.12
         )
-        skull = base_m + turned(R_neck, np.array((0.0, 0.0, body.neck_m)))
+        skull = base_m + rotate(R_neck, np.array((0.0, 0.0, body.neck_m)))
         R_head = yaw_pitch_roll(yaw, pitch)
         found["neck"], found["head"] = (base_m, R_neck), (skull, R_head)
         self._face(found, skull, R_head, look)
@@ -233,7 +233,7 @@ class BodyMotion:
         self, found: dict[str, Pose], skull: Floats, R_head: Floats, look: faces.Looks
     ) -> None:
         body = self.body
-        nose = skull - turned(R_head, np.array(body.skull_m))
+        nose = skull - rotate(R_head, np.array(body.skull_m))
         shut = faces.lids_shut(self.t_s, self.rng)
         speaks = faces.lips_open(self.t_s, self.acts, self.rng)
         still = np.zeros_like(self.t_s)
@@ -246,11 +246,11 @@ class BodyMotion:
         down = np.array(MOUTH_FACE_M) * body.head_scale - (
             _LIPS_DOWN_M * body.head_scale * speaks[:, None] * np.array((-0.15, 0.0, 1.0))
         )
-        found["lips"] = (nose + turned(R_head, down), R_head)
+        found["lips"] = (nose + rotate(R_head, down), R_head)
 
     def _eye(self, nose: Floats, R_head: Floats, side: float) -> Floats:
         x, y, z = (self.body.head_scale * one for one in EYE_FACE_M)
-        return nose + turned(R_head, np.array((x, side * y, z)))
+        return nose + rotate(R_head, np.array((x, side * y, z)))
 
     def _arm(
         self, found: dict[str, Pose], side: float, acts: Sequence[TimedAct], at: Sequence[Floats]
@@ -258,7 +258,7 @@ class BodyMotion:
         body, name = self.body, SIDES[0 if side > 0 else 1]
         waist, R_torso = found["torso"]
         up = body.shoulder_m - body.hip_m - body.waist_m
-        shoulder = waist + turned(R_torso, np.array((-0.01, side * body.half_shoulders_m, up)))
+        shoulder = waist + rotate(R_torso, np.array((-0.01, side * body.half_shoulders_m, up)))
         chin = self.hips_m + (0.0, 0.0, 0.885 * body.stature_m - body.hip_m) + 0.08 * self.ahead
         ahead = unit(R_torso[:, :, 0] * (1.0, 1.0, 0.0))
         left = np.stack((-ahead[:, 1], ahead[:, 0], 0.0 * ahead[:, 0]), axis=1)
@@ -277,9 +277,9 @@ class BodyMotion:
             shoulder, hand.wrist_m, body.upper_arm_m, body.forearm_m, hand.pole
         )
         ahead_of_plane = np.cross(plane, unit(shoulder - elbow))
-        found[f"{name}_upper_arm"] = (shoulder, directed(shoulder - elbow, ahead_of_plane))
+        found[f"{name}_upper_arm"] = (shoulder, axes_along(shoulder - elbow, ahead_of_plane))
         forearm = np.cross(plane, unit(elbow - wrist))
-        found[f"{name}_forearm"] = (elbow, directed(elbow - wrist, forearm))
+        found[f"{name}_forearm"] = (elbow, axes_along(elbow - wrist, forearm))
         self.hands[name] = (wrist, motions.hand_axes(hand, elbow, wrist))
         found[f"{name}_hand"] = self.hands[name]
 
@@ -290,7 +290,7 @@ class BodyMotion:
         ahead = (way * self.ahead[:, :2]).sum(axis=1) * (1.0 - rise(2.0 * self.base.seated))
         if self.person.gloves:
             ahead = 0.0 * ahead
-        return np.asarray(np.clip(1.1 * smoothed(ahead, 30), -0.5, 0.5) + 0.03)
+        return np.asarray(np.clip(1.1 * smooth(ahead, 30), -0.5, 0.5) + 0.03)
 
     def _guarding(self) -> Floats:
         total = np.full_like(self.t_s, 0.0)
@@ -306,8 +306,8 @@ class BodyMotion:
     def _holding(self, side: str) -> Floats:
         total = np.zeros_like(self.t_s)
         for thing in self.script.things:
-            found = handed_over.holders(self.script, self.timelines, thing)
-            share = handed_over.held_share(self.t_s, found, self.name, side)
+            found = object_handover.holders(self.script, self.timelines, thing)
+            share = object_handover.holding_share(self.t_s, found, self.name, side)
             total = np.maximum(total, share)
         return total
 
@@ -321,9 +321,9 @@ class BodyMotion:
         out = 0.25 * self.base.seated[:, None] * side * self.left
         pole = self.ahead + 0.7 * toes + out + 0.4 * self.base.seated[:, None] * motions.UP
         knee, ankle, plane = two_bones(hip, self.ankle(foot), body.thigh_m, body.shank_m, pole)
-        found[f"{name}_thigh"] = (hip, directed(hip - knee, np.cross(unit(hip - knee), plane)))
+        found[f"{name}_thigh"] = (hip, axes_along(hip - knee, np.cross(unit(hip - knee), plane)))
         shank = np.cross(unit(knee - ankle), plane)
-        found[f"{name}_shank"] = (knee, directed(knee - ankle, shank))
+        found[f"{name}_shank"] = (knee, axes_along(knee - ankle, shank))
         found[f"{name}_foot"] = (ankle, yaw_pitch_roll(yaw, -self.heel(foot)))
 
 

@@ -1,7 +1,7 @@
 """Bodies below the head as meshes: clothes, hands, shoes and gloves, a segment each.
 
-Each lies in the frame of its segment (gazerig.features.world.figure) and follows from the measures
-of its body. Sections are ellipses through which a skin is laid.
+Each mesh is in the frame of its segment (gazerig.features.world.figure) and follows from the
+measures of its body. Sections are ellipses that a skin connects.
 """
 
 from collections.abc import Mapping, Sequence
@@ -117,8 +117,8 @@ _TORSO: tuple[Row, ...] = (
     (0.390, -0.015, 0.061, 0.069),
 )
 _LEANS_M, _LEAN = 0.27, 0.52
-"""From which height on the sections of a torso lean forward, and how steep that of the collar is:
-the neck comes out of a body lower in front than behind."""
+"""Height from which the sections of a torso lean forward, and slope of the collar: the neck leaves
+the body lower in front than behind."""
 
 
 def _scaled(rows: Sequence[Row], k: float) -> list[Row]:
@@ -126,8 +126,8 @@ def _scaled(rows: Sequence[Row], k: float) -> list[Row]:
 
 
 def _fine(rows: Sequence[Row], each: int) -> list[Row]:
-    """Return so many sections for each of these, on a smooth line through them."""
-    from scipy.interpolate import PchipInterpolator  # where no mesh is made, scipy is not loaded
+    """Return ``each`` interpolated sections per given section, on a smooth curve through them."""
+    from scipy.interpolate import PchipInterpolator  # loads SciPy only to build a mesh
 
     at = np.linspace(0.0, len(rows) - 1.0, each * (len(rows) - 1) + 1)
     smooth = PchipInterpolator(np.arange(len(rows)), np.array(rows))(at)

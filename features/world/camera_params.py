@@ -1,4 +1,4 @@
-"""The camera in a world: how large, how fast and how true its pictures are."""
+"""Parameters of a camera in a world: size, rate and fidelity of its pictures."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -8,7 +8,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class WorldCameraParams:
-    """Pictures of the rig's camera; where it sits, and its lens, are the rig's (section camera)."""
+    """Pictures of the rig's camera; its mount and lens come from the rig (section camera)."""
 
     # fmt: off
     width_px: Annotated[int, Bounds(64, 1920), "width of a picture"] = 320

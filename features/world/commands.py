@@ -1,4 +1,4 @@
-"""What can be done to a world as a line of text: ``push head 5 left 0.5``."""
+"""Commands to a world as lines of text: ``push head 5 left 0.5``."""
 
 from math import cos, sin
 
@@ -20,13 +20,13 @@ DIRECTIONS = {
     "up": (0.0, 0.0, 1.0),
     "down": (0.0, 0.0, -1.0),
 }
-"""As the rig's base stands: to its own left."""
+"""In the frame of the rig's base: its own left."""
 
 PUSH_S = 0.5
-"""Duration of a push that is given none."""
+"""Default duration of a push."""
 
 MOST_N = 100.0
-"""More than that breaks a head."""
+"""A larger force breaks a head."""
 
 
 def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH_S) -> str:

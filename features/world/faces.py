@@ -1,7 +1,7 @@
-"""What a person's head, eyes, lids and lips do over a round.
+"""Motion of a person's head, eyes, lids and lips over a round.
 
-Eyes jump to what is looked at and the head follows more slowly, so that the eyes turn back in it
-meanwhile. People look about on a face they look at, and blink some 15 times a minute.
+The eyes jump to a target and the head follows more slowly, so the eyes turn back in the head
+meanwhile. People scan the face that they look at, and blink about 15 times a minute.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.features.world.rotations import pitch_of, within, wrapped, yaw_of
-from gazerig.features.world.time_profiles import hump, periodic, rise, smoothed, there_and_back
+from gazerig.features.world.rotations import limit_angle, pitch_of, wrap_angle, yaw_of
+from gazerig.features.world.time_profiles import hump, periodic, rise, smooth, there_and_back
 from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
 
@@ -22,7 +22,7 @@ LID_SHUT_RAD = radians(46.0)
 
 _SACCADE_S, _HEAD_LATER_S = 0.06, 0.16
 _EASED_ROWS = 24
-"""Rows over which a head's turns are averaged: it is heavy."""
+"""Rows over which a head's turns are averaged, because a head is heavy."""
 _HEAD_S, _HEAD_S_PER_RAD = 0.30, 0.25
 _OTHERS_SHARE = 0.8
 _WANDER_RAD = radians(2.2)
@@ -31,10 +31,10 @@ _SYLLABLES_HZ = 4.5
 
 
 class Looks(NamedTuple):
-    """Where head and eyes are turned, a row a time.
+    """Direction of head and eyes, a row a time.
 
-    yaw, pitch: of the head in the world, rad; p_m: (n, 3) what the eyes are on
-    wander: (n, 2) yaw and pitch by which they are off its middle
+    yaw, pitch: of the head in the world, rad; p_m: (n, 3) gaze target
+    wander: (n, 2) offset of the gaze from the target in yaw and pitch, rad
     """
 
     yaw: Floats
@@ -53,17 +53,17 @@ def looks(
     robot: str,
     rng: np.random.Generator,
 ) -> Looks:
-    """Return what a person looks at.
+    """Return the gaze of a person over a round.
 
     Args:
         t_s: times of the rows (n,).
-        acts: the person's, of which those that look count.
-        first: (n, 3) what is looked at before the first.
-        targets: (n, 3) places of what can be looked at, by name.
-        eyes_m: (n, 3) about where the eyes are.
-        body_yaw: where the chest faces (n,), unwrapped.
-        robot: the name that the head turns to fully; to others it turns most of the way.
-        rng: for how the gaze wanders.
+        acts: acts of the person; only those that look are used.
+        first: (n, 3) gaze target before the first of them.
+        targets: (n, 3) positions of the gaze targets, by name.
+        eyes_m: (n, 3) approximate positions of the eyes.
+        body_yaw: direction of the chest (n,), unwrapped, rad.
+        robot: name of the target that the head turns to fully; it turns 0.8 of the angle to others.
+        rng: random numbers for the wandering of the gaze.
     """
     found = [one for one in acts if one.act.do == "look_at"]
     start = targets[found[-1].act.to] if found else first
@@ -74,20 +74,20 @@ def looks(
         target = targets[one.act.to]
         new_yaw, new_pitch = _turn(target, one.act.to == robot, eyes_m, body_yaw)
         row = min(len(t_s) - 1, int(np.searchsorted(t_s, one.start_s)))
-        far = float(abs(wrapped(new_yaw[row] - yaw[row])) + abs(new_pitch[row] - pitch[row]))
+        far = float(abs(wrap_angle(new_yaw[row] - yaw[row])) + abs(new_pitch[row] - pitch[row]))
         share = rise((t_s - one.start_s - _HEAD_LATER_S) / (_HEAD_S + _HEAD_S_PER_RAD * far))
-        yaw = yaw + share * wrapped(new_yaw - yaw)
+        yaw = yaw + share * wrap_angle(new_yaw - yaw)
         pitch = pitch + share * (new_pitch - pitch)
         eyes = rise((t_s - one.start_s) / _SACCADE_S)[:, None]
         p_m = p_m + eyes * (target - p_m)
-    aside = smoothed(yaw - body_yaw, _EASED_ROWS)
-    return Looks(body_yaw + aside, smoothed(pitch, _EASED_ROWS), p_m, _wander(t_s, rng))
+    aside = smooth(yaw - body_yaw, _EASED_ROWS)
+    return Looks(body_yaw + aside, smooth(pitch, _EASED_ROWS), p_m, _wander(t_s, rng))
 
 
 def _turn(target: Floats, fully: bool, eyes_m: Floats, body_yaw: Floats) -> tuple[Floats, Floats]:
     way = target - eyes_m
-    aside = wrapped(yaw_of(way) - body_yaw)
-    # What is behind, or is being passed closely, is not turned to.
+    aside = wrap_angle(yaw_of(way) - body_yaw)
+    # People do not turn to a target behind them, nor to a target that they pass closely.
     near = np.hypot(way[:, 0], way[:, 1])
     share = (1.0 if fully else _OTHERS_SHARE) * rise((near - 0.25) / 0.6)
     share = share * (1.0 - rise((np.abs(aside) - 1.9) / 1.0))
@@ -97,7 +97,7 @@ def _turn(target: Floats, fully: bool, eyes_m: Floats, body_yaw: Floats) -> tupl
 
 
 def _wander(t_s: Floats, rng: np.random.Generator) -> Floats:
-    """Return small jumps (n, 2) of the gaze about what it is on; none where a round ends."""
+    """Return small jumps (n, 2) of the gaze around its target; none at the end of a round."""
     out, at_s = np.zeros((len(t_s), 2)), float(rng.uniform(0.4, 1.5))
     while at_s < t_s[-1] - 0.6:
         new = rng.normal(0.0, _WANDER_RAD, 2).clip(-2.0 * _WANDER_RAD, 2.0 * _WANDER_RAD)
@@ -110,7 +110,7 @@ def eyes_in_head(R_head: Floats, eyes_m: Floats, look: Looks) -> tuple[Floats, F
     """Return yaw and pitch of the eyes in the head."""
     way = ((look.p_m - eyes_m)[:, None, :] @ R_head)[:, 0]
     way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-    way = within(way, np.broadcast_to((1.0, 0.0, 0.0), way.shape), EYE_RAD - 0.1)
+    way = limit_angle(way, np.broadcast_to((1.0, 0.0, 0.0), way.shape), EYE_RAD - 0.1)
     return yaw_of(way) + look.wander[:, 0], pitch_of(way) + 0.7 * look.wander[:, 1]
 
 

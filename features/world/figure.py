@@ -1,8 +1,8 @@
-"""People as articulated figures: where every segment of every body is at any time.
+"""People as articulated figures: the pose of every segment of every body at any time.
 
-A script and a seed say all there is to know, so every process computes the same places from the
-time alone. The motion of a whole round is computed once, a row every 10 ms; a time in between lies
-on the line between two rows. The frames of segments are those of body_motion.
+A script and a seed determine the motion, so every process computes the same poses from the time
+alone. The motion of a whole round is computed once, with a row every 10 ms, and interpolated
+linearly between rows. The frames of segments are those of body_motion.
 """
 
 from collections.abc import Mapping
@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gazerig.features.world import handed_over
+from gazerig.features.world import object_handover
 from gazerig.features.world.body_motion import SEGMENTS as SEGMENTS
 from gazerig.features.world.body_motion import SIDES as SIDES
 from gazerig.features.world.body_motion import BodyMotion
 from gazerig.features.world.gait import RATE_HZ
 from gazerig.features.world.measures import Measures, measures
 from gazerig.features.world.script import WorldScript
-from gazerig.features.world.timeline import TimedAct, timed
+from gazerig.features.world.timeline import TimedAct, timed_acts
 from gazerig.gaze.types import Floats
 
 
@@ -36,8 +36,8 @@ class Figures:
 
     Args:
         script: checked (see script_faults).
-        seed: of what may vary: blinks, the wandering of the gaze, and acts that say so.
-        shared: the file in which several processes have the motion in common, None for none.
+        seed: seed of blinks, gaze wandering, and acts with a random time.
+        shared: file in which several processes share the motion, None for none.
     """
 
     def __init__(self, script: WorldScript, seed: int = 0, shared: Path | None = None) -> None:
@@ -55,7 +55,7 @@ class Figures:
     @cached_property
     def timelines(self) -> Mapping[str, tuple[TimedAct, ...]]:
         """Return what each person does when."""
-        return {name: timed(self.script, name, self.seed) for name in self.script.people}
+        return {name: timed_acts(self.script, name, self.seed) for name in self.script.people}
 
     @cached_property
     def measures(self) -> Mapping[str, Measures]:
@@ -66,7 +66,7 @@ class Figures:
     def _table(self) -> Floats:
         """Return places and quaternions (rows, n, 7) over a round."""
         if self.shared is not None:
-            with suppress(OSError):  # nobody has written it, or it is gone with the run
+            with suppress(OSError):  # the file is not written yet, or was deleted with the run
                 return np.asarray(np.load(self.shared, mmap_mode="r"))
         return _round(self)
 
@@ -75,14 +75,14 @@ class Figures:
         return type(self)(self.script, self.seed, file)
 
     def share(self) -> None:
-        """Write the motion into the file for the other processes, where there is one."""
+        """Write the motion into the shared file for the other processes, if there is one."""
         if self.shared is not None:
             half = self.shared.with_suffix(".half.npy")
             np.save(half, self._table)
             half.rename(self.shared)
 
     def segments(self, t_s: float) -> Segments:
-        """Return all segments at a time, which counts on over rounds."""
+        """Return all segments at a time, which continues over rounds."""
         if self._last is not None and self._last[0] == t_s:
             return self._last[1]
         at = (t_s % self.script.round_s) * RATE_HZ
@@ -112,6 +112,6 @@ def _round(figures: Figures) -> Floats:
     hands = {(body.name, side): body.hands[side] for body in bodies for side in SIDES}
     ahead = {body.name: body.ahead for body in bodies}
     for name in script.things:
-        found = handed_over.holders(script, figures.timelines, name)
-        rows.append(handed_over.thing_poses(t_s, found, hands, ahead))
+        found = object_handover.holders(script, figures.timelines, name)
+        rows.append(object_handover.thing_poses(t_s, found, hands, ahead))
     return np.stack(rows, axis=1) if rows else np.zeros((len(t_s), 0, 7))

@@ -50,7 +50,7 @@ def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Pai
     return found
 
 
-class PlacedPeople:
+class PeoplePlacer:
     """Puts people and things where they are: the mocap poses of MuJoCo's data.
 
     Args:
@@ -67,7 +67,7 @@ class PlacedPeople:
             self._rows = slice(first, first + len(rows))
 
     def place(self, data: Any, t_s: float) -> None:
-        """Put all where they are at a time of their script."""
+        """Put everything in its place at a time of the script."""
         found = self._figures.segments(t_s)
         data.mocap_pos[self._rows], data.mocap_quat[self._rows] = found.p_m, found.quat
 

@@ -1,7 +1,8 @@
-"""Where a person's hips and feet are over a round: walks, steps, turns, sitting down, standing up.
+"""Motion of a person's hips and feet over a round: walks, steps, turns, sitting down, standing up.
 
-A foot that stands does not move: it is planted where the hips will be in the middle of its stance,
-and moves to its next place while the other one stands. Not modelled: running, stairs.
+A planted foot does not move. It is planted below the later position of the hips in the middle of
+its stance, and moves to its next place while the other foot is planted. Not modelled: running,
+stairs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from gazerig.features.world.room import (
     Place,
     way_points,
 )
-from gazerig.features.world.time_profiles import hump, rise, smoothed
+from gazerig.features.world.time_profiles import hump, rise, smooth
 from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
 
@@ -38,8 +39,8 @@ class Base(NamedTuple):
     """Hips and feet of a person, a row a time; heights above the floor.
 
     hips_m: (n, 2) on the floor; heading_rad: (n,) unwrapped; seated: (n,) 0 standing .. 1 sitting
-    seat_m: (n,) height of the seat that is sat upon; feet_m: (n, 2, 3) ankles' places with z the
-        height a foot is lifted by; feet_rad: (n, 2) where the feet point; left first
+    seat_m: (n,) height of the seat in use; feet_m: (n, 2, 3) ankle positions with z the height of
+        a lifted foot; feet_rad: (n, 2) direction of the toes; left first
     """
 
     hips_m: Floats
@@ -58,7 +59,7 @@ class _SteppingTime(NamedTuple):
 
 
 class _Path:
-    """The hips' way, filled act by act."""
+    """The path of the hips, filled act by act."""
 
     def __init__(self, t_s: Floats, start: Place, places: Mapping[str, Place]) -> None:
         self.t_s, self.places, self.at = t_s, places, start
@@ -72,7 +73,7 @@ class _Path:
         self.stretches: list[_SteppingTime] = []
 
     def add(self, one: TimedAct) -> None:
-        """Let the person do an act that moves hips or feet."""
+        """Add an act that moves hips or feet."""
         act, start_s, end_s = one.act, one.start_s, one.end_s
         rows = self.t_s >= start_s
         share = rise((self.t_s - start_s) / (end_s - start_s))
@@ -104,7 +105,7 @@ class _Path:
 
     def _walk(self, target: Place, via: Sequence[Place], start_s: float, end_s: float) -> None:
         points = way_points(self.at, target, via, (float(self.way[-1][0]), float(self.way[-1][1])))
-        # One who is there already only turns.
+        # A person who is at the target already only turns.
         longer = np.linalg.norm(np.diff(points, axis=0), axis=1) > _SAME_M
         points = points[np.concatenate(((True,), longer))]
         if len(points) < 2:
@@ -141,17 +142,17 @@ def base_motion(
 
     Args:
         t_s: times of the rows (n,), RATE_HZ a second.
-        start: where the round begins; on a seat, sitting.
+        start: place at the beginning of the round; on a seat the person sits.
         acts: those that move hips or feet, in order.
         places: by name.
         body: measures.
-        boxes: stands as a boxer does, one foot ahead and knees bent.
+        boxes: the person has a boxer's stance, one foot ahead and knees bent.
     """
     path = _Path(t_s, start, places)
     for act in acts:
         path.add(act)
-    way = smoothed(path.way, round(_PATH_S * RATE_HZ))
-    heading = smoothed(path.heading, round(_HEADING_S * RATE_HZ))
+    way = smooth(path.way, round(_PATH_S * RATE_HZ))
+    heading = smooth(path.heading, round(_HEADING_S * RATE_HZ))
     feet = _Feet(t_s, way, heading, body, boxes)
     for stretch in path.stretches:
         feet.step(stretch)
@@ -175,7 +176,7 @@ class _Feet:
             self.p_m[:, foot, :2], self.yaw_rad[:, foot] = place, yaw
 
     def step(self, stretch: _SteppingTime) -> None:
-        """Let the feet follow the hips within a stretch, the outer one first."""
+        """Move the feet after the hips within a stretch, the outer one first."""
         last = len(self.t_s) - 1
         begin, end = (min(last, round(s * RATE_HZ)) for s in stretch)
         turn = self.heading[end] - self.heading[begin]
@@ -202,7 +203,7 @@ class _Feet:
         self.p_m[rows, foot, 2] = _LIFT_M * min(1.0, far / 0.3) * hump(share)[rows]
 
     def _home(self, foot: int, row: int) -> tuple[Floats, float]:
-        """Return where a foot stands under the hips of a row, and where it points."""
+        """Return place and direction of a foot under the hips of a row."""
         heading, side = float(self.heading[row]), 1.0 - 2.0 * foot
         ahead, aside, out = 0.0, side * self.half, side * 0.10
         if self.boxes:
@@ -217,7 +218,7 @@ class _Feet:
 
 
 def _steady(share: Floats, lasts_s: float) -> Floats:
-    """Return a way from 0 to 1 at a steady speed that begins and ends smoothly."""
+    """Return a path from 0 to 1 at constant speed with a smooth start and end."""
     ramp = min(0.5, 0.45 / lasts_s)
     fine = np.linspace(0.0, 1.0, 400)
     speed = rise(fine / ramp) * rise((1.0 - fine) / ramp)
@@ -226,5 +227,5 @@ def _steady(share: Floats, lasts_s: float) -> Floats:
 
 
 def _nearest(angle_rad: float, to_rad: float) -> float:
-    """Return an angle plus whole turns, as near to another as it gets."""
+    """Return an angle plus whole turns, as near as possible to another."""
     return angle_rad + 2.0 * np.pi * round((to_rad - angle_rad) / (2.0 * np.pi))

@@ -1,4 +1,4 @@
-"""The geoms of a compiled MuJoCo model as meshes with colours, where they stand at first."""
+"""The geoms of a compiled MuJoCo model as coloured meshes in their initial poses."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from math import cos, pi, sin
@@ -17,13 +17,13 @@ from gazerig.robot.description.world_shapes import WorldPart
 _SHOWN_GROUPS = 3
 """Groups of geoms below this are shown, as MuJoCo's own viewer does."""
 _FAR_M = 10.0
-"""Half the size of a plane without an end."""
+"""Half the size of an infinite plane."""
 _ROUND = 24
 _NO_COLOUR = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's colour of a geom that names none: its material's counts."""
+"""MuJoCo's colour of a geom without a colour; the colour of its material is then used."""
 _WALL_THICK_M, _WALL_WIDE_M = 0.06, 0.9
-"""A box as thin and as wide is a wall: only the side of it is shown that faces the room, so that
-one who looks into the room from outside does."""
+"""A box as thin and as wide is a wall. Only the side that faces the room is shown, so that a view
+from outside sees the room."""
 _ROOM_M = np.array((1.0, 0.0, 0.0))
 """A point in the room."""
 
@@ -39,12 +39,12 @@ class _Surface(NamedTuple):
 def still_parts(
     model: Any, moving: Collection[str], rig_joints: Collection[str]
 ) -> Iterator[WorldPart]:
-    """Yield everything of a model that stands still, where it is.
+    """Yield every static part of a model, in place.
 
     Args:
         model: mujoco.MjModel
         moving: bodies that are shown elsewhere
-        rig_joints: what hangs at these joints is left out, too
+        rig_joints: bodies at these joints are left out, too
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -60,11 +60,11 @@ def still_parts(
 
 
 def body_parts(model: Any, bodies: Iterable[int]) -> Iterator[tuple[int, WorldPart]]:
-    """Yield what moves with bodies, in the frame of its body, with the body's number.
+    """Yield the parts of moving bodies in the frame of their body, with the body's number.
 
     Args:
         model: mujoco.MjModel
-        bodies: their numbers; what has no picture on it is one part a body
+        bodies: their numbers; all geoms of a body without a picture become one part
     """
     for body in bodies:
         plain: list[Painted] = []
@@ -85,7 +85,7 @@ def body_parts(model: Any, bodies: Iterable[int]) -> Iterator[tuple[int, WorldPa
 
 
 def _surface(model: Any, geom: int) -> _Surface | None:
-    """Return the surface of a geom in its own frame, None where it is not shown."""
+    """Return the surface of a geom in its own frame, None for a hidden geom."""
     make = _SURFACES.get(int(model.geom_type[geom]))
     if make is None or model.geom_group[geom] >= _SHOWN_GROUPS or _rgba(model, geom)[3] == 0.0:
         return None
@@ -93,7 +93,7 @@ def _surface(model: Any, geom: int) -> _Surface | None:
 
 
 def _left_out(model: Any, moving: Collection[str], rig_joints: Collection[str]) -> set[int]:
-    """Return the numbers of bodies that are not shown, with all that hangs on them."""
+    """Return the numbers of bodies that are not shown, with all their descendants."""
     found = {model.jnt_bodyid[i] for i in range(model.njnt) if model.joint(i).name in rig_joints}
     for body in range(1, model.nbody):  # parents first
         if model.body(body).name in moving or model.body_parentid[body] in found:
@@ -150,7 +150,7 @@ def _is_wall(model: Any, geom: int) -> bool:
 
 
 def _facing(surface: _Surface, point_m: Floats) -> _Surface:
-    """Return those faces only that can be seen from a point."""
+    """Return only the faces that are visible from a point."""
     (vertices, faces), normals, _ = surface
     first = faces[:, 0]
     seen = ((point_m - vertices[first]) * normals[first]).sum(axis=1) > 0.0
@@ -158,7 +158,7 @@ def _facing(surface: _Surface, point_m: Floats) -> _Surface:
 
 
 def _projected(model: Any, geom: int, vertices: Floats, half: Floats) -> Floats:
-    """Return where vertices lie in a picture that MuJoCo lays over a geom along its z axis."""
+    """Return texture coordinates of vertices for a picture projected along the geom's z axis."""
     material = int(model.geom_matid[geom])
     repeat = np.ones(2) if material < 0 else model.mat_texrepeat[material].astype(float)
     if material >= 0 and not model.mat_texuniform[material]:
@@ -199,7 +199,7 @@ def _plane(model: Any, geom: int) -> _Surface:
 def _cylinder(model: Any, geom: int) -> _Surface:
     radius, half = model.geom_size[geom][:2].tolist()
     edge = [(0.0, -half), (radius, -half)]
-    # Rows that stand twice make sharp edges.
+    # Repeated rows make sharp edges.
     profile = [*edge, (radius, -half), (radius, half), (radius, half), (0.0, half)]
     return _smooth(model, geom, turned(profile, _ROUND))
 

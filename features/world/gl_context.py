@@ -1,7 +1,7 @@
 """OpenGL without a display: EGL or OSMesa, whichever works here.
 
-MuJoCo renders through one of three libraries. Which one is installed differs from machine to
-machine, and each fails in its own words, so all are tried and each failure is told.
+MuJoCo renders through one of three libraries. Machines differ in which one is installed, and each
+library reports failures differently, so all are tried and every failure is reported.
 """
 
 import os
@@ -22,7 +22,7 @@ _PACKAGES: dict[Backend, str] = {
     "glfw": "a display: xvfb-run",
 }
 _OFF = ("disable", "disabled", "off", "false", "0")
-_chosen: Backend | None = None  # what worked in this process: OpenGL is loaded once in it
+_chosen: Backend | None = None  # the first that worked: a process loads OpenGL only once
 
 Made = TypeVar("Made")
 
@@ -40,16 +40,16 @@ class Context(Protocol):
 
 
 class NoRenderer(SetupError):
-    """Nothing here can render: the message says what was tried and why each failed."""
+    """No library can render here; the message lists what was tried and why each failed."""
 
 
 def open_context(make: Callable[[], Made]) -> tuple[Backend, Context, Made]:
-    """Return the first context in which something can be made, the context being current.
+    """Return the first context in which something can be made while the context is current.
 
-    MUJOCO_GL, where the user has set it, names the only one that is tried.
+    If the user has set MUJOCO_GL, only that library is tried.
 
     Args:
-        make: is called with a context current, and raises where that is not good enough.
+        make: called with a context current; raises if the context is not good enough.
 
     Raises:
         NoRenderer: none works.
@@ -57,12 +57,12 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Context, Made]:
     global _chosen
     why: dict[Backend, str] = {}
     for backend in _candidates():
-        # MuJoCo reads it once more when it looks for the library's functions.
+        # MuJoCo reads the variable again when it looks for the library's functions.
         with _environment("MUJOCO_GL", backend):
             try:
                 context = _context(backend)
                 try:
-                    with context.as_current():  # only meanwhile: another thread may render
+                    with context.as_current():  # no longer than needed: another thread may render
                         made = make()
                 except Exception:
                     context.free()
@@ -77,25 +77,25 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Context, Made]:
 
 
 def render_in_calling_thread() -> None:
-    """Have Mesa's llvmpipe render without threads of its own, unless the user has said how many.
+    """Make Mesa's llvmpipe render without its own threads, unless the user has set their number.
 
-    To be called before this process's first context. The threads, one a core, wake on every core
-    at once for a few milliseconds of each picture, and what waits for servos is late then,
-    whatever their priority: on two cores 290 to 320 of 6,000 ticks of 200 Hz (133 of 4,000 with
-    one thread), in the calling thread 10 of 4,000; 28 pictures a second either way. On the
-    simulated clock nothing can be late.
+    Call this before the first context of the process. The threads, one per core, wake on every core
+    at once for a few milliseconds per picture and delay the threads that wait for servos, whatever
+    their priority: on two cores 290 to 320 of 6,000 ticks of 200 Hz (133 of 4,000 with one thread),
+    in the calling thread 10 of 4,000. Both render 28 pictures a second. On the simulated clock
+    nothing can be late.
     """
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
 
 def import_mujoco() -> ModuleType:
-    """Return MuJoCo's module, imported without a look at what can render.
+    """Import MuJoCo without a check of what can render, and return its module.
 
-    With MUJOCO_GL it fails to import where that library is missing, also where nothing is to be
+    With MUJOCO_GL set, MuJoCo fails to import if that library is missing, even if nothing is
     rendered.
 
     Raises:
-        SetupError: it is not installed.
+        SetupError: MuJoCo is not installed.
     """
     with _environment("MUJOCO_GL", "off"):
         try:
@@ -108,7 +108,7 @@ def import_mujoco() -> ModuleType:
 
 @contextmanager
 def _environment(name: str, value: str) -> Iterator[None]:
-    """Set a variable of the environment for a while."""
+    """Set an environment variable temporarily."""
     before = os.environ.get(name)
     os.environ[name] = value
     try:
@@ -121,7 +121,7 @@ def _environment(name: str, value: str) -> Iterator[None]:
 
 
 def _candidates() -> tuple[Backend, ...]:
-    """Return what is to be tried, best first."""
+    """Return the libraries to try, best first."""
     wanted = os.environ.get("MUJOCO_GL", "").strip().lower()
     if wanted in _OFF:
         raise NoRenderer(f"no pictures of a world: MUJOCO_GL={wanted} forbids to render")
@@ -142,7 +142,7 @@ def _context(backend: Backend) -> Context:
 
 
 def _forget_opengl() -> None:
-    """Unload PyOpenGL, which binds itself to the first library that it is asked for."""
+    """Unload PyOpenGL, which binds itself to the first library that it loads."""
     for name in [*sys.modules]:
         if name.split(".")[0] == "OpenGL" or name.startswith(("mujoco.egl", "mujoco.osmesa")):
             del sys.modules[name]
@@ -156,7 +156,7 @@ _OWN_PLATFORM = "PYOPENGL_PLATFORM" in os.environ
 def _line(error: Exception) -> str:
     """Return an error as one short line."""
     if isinstance(error, AttributeError) and "NoneType" in str(error):
-        return "its library is not here"  # PyOpenGL's own words tell of neither
+        return "its library is not here"  # PyOpenGL's own message names neither
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else f"{text[:157]}..."
 

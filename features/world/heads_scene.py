@@ -1,4 +1,4 @@
-"""A world's people and its other heads, as one of its heads has them before itself."""
+"""A world's people and its other heads, in the frame of one of its heads."""
 
 from collections.abc import Callable, Sequence
 from math import atan2, hypot
@@ -10,21 +10,21 @@ from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing
 
 
 class RigFrame(NamedTuple):
-    """Where a rig's neck base stands in the world; all that a robot knows is as from there."""
+    """Pose of a rig's neck base in the world; everything in the robot is in this frame."""
 
     R: Mat3
     p_m: Vec3
 
     def point(self, p_world_m: Vec3) -> Vec3:
-        """Return a point of the world as from the rig."""
+        """Return a point of the world in the frame of the rig."""
         return rotate_back(self.R, sub(p_world_m, self.p_m))
 
     def way(self, v_world: Vec3) -> Vec3:
-        """Return a direction of the world as from the rig."""
+        """Return a direction of the world in the frame of the rig."""
         return rotate_back(self.R, v_world)
 
     def in_world(self, R: Mat3, p_m: Vec3) -> tuple[Mat3, Vec3]:
-        """Return a pose that the rig knows as one in the world."""
+        """Return a pose in the rig's frame as a pose in the world."""
         return compose(self.R, R), add(self.p_m, rotate(self.R, p_m))
 
 
@@ -36,9 +36,9 @@ class HeadFace(NamedTuple):
 
 
 class HeadsScene:
-    """A scene of the world's frame, and the faces of other heads, as from one rig.
+    """A scene in the world's frame and the faces of other heads, in the frame of one rig.
 
-    What is expected of a gaze in a scene is said of the first head alone.
+    The events of a scene state expectations of the first head only.
 
     Args:
         scene: the people of the script.
@@ -77,7 +77,7 @@ class HeadsScene:
         return tuple(one._replace(p_world_m=self._frame.point(one.p_world_m)) for one in things)
 
     def events(self) -> tuple[Event, ...]:
-        """Return what happens before the first head; of the others nothing is expected."""
+        """Return the events before the first head; nothing is expected of the other heads."""
         return self._scene.events() if self._first else ()
 
 

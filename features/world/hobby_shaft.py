@@ -1,4 +1,4 @@
-"""A hobby servo whose mechanics are a world's: pulses in, torque within its data sheet's out."""
+"""A hobby servo with the mechanics of a world: pulses in, torque within its data sheet's out."""
 
 from math import inf
 from typing import NamedTuple
@@ -10,12 +10,12 @@ from gazerig.sim_mock.smart_servo.physics import Physics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
 PHYSICS = Physics(rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, supply_ohm=0.0)
-"""A small motor: to speed in 8 ms without a load; friction of cheap gears [A]. Its supply is a
-battery, of which nothing is known."""
+"""A small motor that reaches full speed in 8 ms without a load; friction of cheap gears [A]. The
+supply is a battery of unknown resistance."""
 
 DAMPING = 1.0
-"""Share of the duty that its controller takes back at full speed, so that a load overshoots little
-[A]."""
+"""Share of the duty that its controller takes back at full speed, so that a load overshoots only a
+little [A]."""
 
 REST_STEPS_MS = 1e-3
 """Speed below which it counts as resting."""
@@ -31,10 +31,10 @@ class HobbyMotor(NamedTuple):
 
 
 class DeadBandShaft(WorldShaft):
-    """A shaft that does nothing about small errors.
+    """A shaft that ignores small errors.
 
     Attributes:
-        dead: errors that it leaves alone, in steps of 4096 a turn.
+        dead: largest error that it ignores, in steps of 4096 a turn.
     """
 
     __slots__ = ("dead",)
@@ -51,12 +51,12 @@ class WorldHobbyServo(HobbyServo):
     """One servo and the joint it moves, in a world.
 
     Args:
-        spec: its speed, lag, dead band and torque; start and stops are the world's.
+        spec: its speed, lag, dead band and torque; the world has its start and stops.
         axis: its shaft in the world.
         steps_per_turn: quarter microseconds of a whole turn.
 
     Attributes:
-        shaft: what the world moves.
+        shaft: the shaft that the world moves.
     """
 
     def __init__(self, spec: HobbySpec, axis: ShaftAxis, steps_per_turn: float) -> None:
@@ -72,16 +72,16 @@ class WorldHobbyServo(HobbyServo):
 
     @property
     def place_steps(self) -> float:
-        """Return where its shaft is."""
+        """Return the position of its shaft."""
         return self.shaft.axis.position() / self._unit
 
     @place_steps.setter
     def place_steps(self, steps: float) -> None:
-        """Leave it to the world, in which it stands somewhere already."""
+        """Do nothing: the world already has its position."""
 
     @property
     def width_steps(self) -> int:
-        """Return the pulses that come; 0: none do."""
+        """Return the width of the received pulses, 0 without pulses."""
         return self._width
 
     @width_steps.setter
@@ -101,7 +101,7 @@ class WorldHobbyServo(HobbyServo):
 
     @property
     def stuck(self) -> bool:
-        """Return whether nothing moves it."""
+        """Return whether it is jammed."""
         return self._stuck
 
     @stuck.setter

@@ -1,4 +1,4 @@
-"""Servos without bytes that move a world's joints: goals in, a lag out, whatever they carry."""
+"""Servos without bytes that move a world's joints: goals in, a lag out, whatever the load."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,15 +9,15 @@ from gazerig.sim_mock.smart_servo.controller import MS_S
 
 ROTOR_KG_M2 = 2e-4
 FRICTION_NM = 0.006
-"""As an XL330 has, so that a limp head does not fall."""
+"""The friction of an XL330, so that a limp head does not fall."""
 
 HOLD_NM_S = 2.0
-"""Torque for each rad/s by which the shaft is slower than it should be."""
+"""Torque for each rad/s by which the shaft is too slow."""
 MOST_NM = 3.0
 
 
 class IdealShaft:
-    """A shaft that closes the distance to its goal with a time constant.
+    """A shaft that approaches its goal with a time constant.
 
     Args:
         axis: the shaft in the world.
@@ -37,23 +37,23 @@ class IdealShaft:
 
     @property
     def place_steps(self) -> float:
-        """Return where it is."""
+        """Return its position."""
         return self.axis.position() / self._unit
 
     @property
     def speed_steps_s(self) -> float:
-        """Return how fast it turns."""
+        """Return its speed."""
         return self._v / (MS_S * self._unit)
 
     def command(self) -> Effort:
-        """Return what its motor does in the next millisecond."""
+        """Return the effort of its motor in the next millisecond."""
         if self.goal is None:
             return LIMP
         wanted = (self.goal * self._unit - self._x) / (LAG_S * 1000.0)
         return HOLD_NM_S * wanted / SPEED_UNIT, -HOLD_NM_S, -MOST_NM, MOST_NM
 
     def sense(self, x: float, v: float) -> None:
-        """Set position (4096 steps a turn) and speed (steps/ms) to what the world has made."""
+        """Set position (4096 steps a turn) and speed (steps/ms) to the results of the world."""
         self._x, self._v = x, v
 
 
@@ -112,7 +112,7 @@ class WorldIdealBus(IdealBus):
             one.goal = None
 
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
-        """Lead the shafts to goals from where they are now; return the goals within the limits."""
+        """Move the shafts from their positions to goals; return the goals within the limits."""
         self._now_s()
         goals = super()._follow(goals_steps)
         for one, goal in zip(self._shafts, goals, strict=True):

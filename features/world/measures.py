@@ -48,7 +48,7 @@ class Measures(NamedTuple):
 
     @property
     def skull_m(self) -> Vec3:
-        """Return where the head turns (between skull and spine) from the tip of the nose."""
+        """Return the joint between skull and spine, from the tip of the nose."""
         x, y, z = SKULL_M
         return self.head_scale * x, y, self.head_scale * z
 

@@ -1,7 +1,7 @@
 """Limits of a user's MJCF file, checked before MuJoCo reads it.
 
-MuJoCo allocates whatever a file names while it parses: a height field of 36,000 x 36,000 points is
-5 GB, and a gravity that is not a number makes every state one.
+MuJoCo allocates whatever a file requests while it parses: a height field of 36,000 x 36,000 points
+takes 5 GB, and a gravity of NaN makes every state NaN.
 """
 
 import os
@@ -16,15 +16,15 @@ from gazerig.drivers.files.file_input import open_regular, read_limited
 
 MOST_XML_BYTES = 20_000_000
 MOST_ASSET_BYTES = 200_000_000
-"""Of a mesh, a picture or a height field in a file of its own."""
+"""Size of a mesh, a picture or a height field in its own file."""
 MOST_CELLS = 4_000_000
 """Points of a height field."""
 MOST_PIXELS = 32_000_000
-"""Of a texture."""
+"""Size of a texture."""
 MOST_ELEMENTS = 10_000
-"""Elements of the file, those that are repeated counted as often."""
+"""Elements of the file, with every repetition counted."""
 MOST_FILES = 100
-"""Files that are included."""
+"""Number of included files."""
 MOST_GRAVITY_M_S2 = 100.0
 MOST_ARENA_BYTES = 1 << 30
 MOST_SIZES = {"nconmax": 100_000, "njmax": 500_000, "nuserdata": 1_000_000, "nkey": 1000,
@@ -41,8 +41,8 @@ def refuse_excessive(path: Path) -> None:
     """Check that a world can be loaded in reasonable time and memory.
 
     Raises:
-        SetupError: it is absent or no XML, or something in it exceeds its limit; names the file,
-            the element and what would be right.
+        SetupError: the file is absent or no XML, or something in it exceeds its limit; the message
+            names the file, the element and the permitted value.
     """
     waiting, seen, elements = [path], set[Path](), 0
     while waiting:
@@ -75,7 +75,7 @@ def refuse_excessive(path: Path) -> None:
 def _repeated(
     element: ElementTree.Element, times: int = 1
 ) -> Iterator[tuple[ElementTree.Element, int]]:
-    """Return all elements below one, with how often each is there."""
+    """Yield all elements below one, with the number of repetitions."""
     inside = times
     if element.tag in _REPEATED:
         inside *= max(1, prod(int(n) for n in _numbers(element.get("count", "")) if isfinite(n)))
@@ -85,7 +85,7 @@ def _repeated(
 
 
 def _assets(folder: Path, folders: set[str], element: ElementTree.Element) -> Iterator[Path]:
-    """Return the files that an element names, wherever MuJoCo may look for them."""
+    """Yield the files that an element names, in all folders that MuJoCo searches."""
     named = [value for key, value in element.items() if key.startswith("file")]
     for name in named:
         for within in {"", *folders}:
@@ -124,7 +124,7 @@ def _check_product(
 
 
 def _check_asset(file: Path, element: ElementTree.Element, asset: Path) -> None:
-    """Check a file by its size and, of a picture, by its header."""
+    """Check the size of a file and, for a picture, its header."""
     try:
         with open_regular(asset) as opened:
             size, head = os.fstat(opened.fileno()).st_size, opened.read(24)
@@ -141,7 +141,7 @@ def _check_asset(file: Path, element: ElementTree.Element, asset: Path) -> None:
 
 
 def _numbers(text: str) -> list[float]:
-    """Return the numbers of an attribute, none if it holds anything else."""
+    """Return the numbers of an attribute, none if it contains anything else."""
     try:
         return [float(word) for word in text.split()]
     except ValueError:

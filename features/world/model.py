@@ -20,29 +20,29 @@ STEP_S = 0.001
 """Time of a step of physics: the control loop of the emulated servos has the same."""
 
 MOUNT = "gazerig"
-"""Name of the site or frame of a user's MJCF that the neck base of the first rig stands on;
-that of a further rig has the rig's prefix behind it: ``gazerig_other``."""
+"""Name of the site or frame in a user's MJCF for the neck base of the first rig; that of a further
+rig has the rig's prefix appended: ``gazerig_other``."""
 
 BASE_LINK = "base_link"
-"""The body of a rig that does not move; its frame is that of the neck base."""
+"""The body of a rig that does not move; its frame is the frame of the neck base."""
 
 ROTOR_KG_M2 = 1e-5
-"""Inertia of a shaft until a servo is joined to it, so that a light lid is no trouble."""
+"""Inertia of a shaft until a servo is joined to it, so that a light lid stays stable."""
 
 FIRST = "rig_"
-"""Before the names of a rig that has no prefix of its own: a room may have a head, too."""
+"""Prefix of a rig without its own prefix, because a room may have a head, too."""
 
 STOP_TIME_S = 0.004
-"""Time in which a hard stop takes up what runs against it; it is damped so that nothing bounces."""
+"""Time constant of a hard stop; it is damped so that nothing bounces."""
 
 
 class RigIndices(NamedTuple):
-    """Where the parts of one rig stand in the arrays of MuJoCo.
+    """The indices of one rig's parts in the arrays of MuJoCo.
 
-    names: what stands before its names in the model
+    names: prefix of its names in the model
     qpos, dof: of each joint by its name without the prefix
     tendon, actuator: of each servo, by the name of its entry
-    R_world_base, p_world_base_m: where its neck base stands; all that a rig knows is as from there
+    R_world_base, p_world_base_m: pose of its neck base; everything in the rig is in this frame
     """
 
     rig: RigInWorld
@@ -59,8 +59,8 @@ class WorldModel(NamedTuple):
     """A compiled world.
 
     mj: mujoco.MjModel
-    figures: the people in it, None for nobody
-    rigs: in the order given
+    figures: the people in it, None for a world without people
+    rigs: in the given order
     """
 
     mj: Any
@@ -128,7 +128,7 @@ def _spec_of(path: Path) -> Any:
 
 
 def _one_line(error: Exception) -> str:
-    """Return what MuJoCo says, which is often several lines, as one."""
+    """Return MuJoCo's message, which often has several lines, as one line."""
     return " ".join(str(error).split())
 
 
@@ -136,7 +136,7 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
     """Put a rig's body into the world, unless a user's world has its joints.
 
     Returns:
-        What stands before its names there.
+        Prefix of its names there.
 
     Raises:
         SetupError: the user's world has a part of its joints, or no place for it.
@@ -162,21 +162,21 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
     head = mujoco.MjSpec.from_string(xml, assets=dict(assets))
     for actuator in tuple(head.actuators):
         head.delete(actuator)
-    # A site is given by another argument than a frame.
+    # A site and a frame have different arguments.
     where = {"site": frame} if isinstance(frame, mujoco.MjsSite) else {"frame": frame}
     spec.attach(head, prefix=rig.prefix or FIRST, **where)
     return rig.prefix or FIRST
 
 
 def _free_joints(spec: Any, joints: Sequence[str]) -> None:
-    """Remove the actuators that a user's head has at its joints: servos turn them."""
+    """Remove the actuators of a user's head at joints that servos turn."""
     for actuator in tuple(spec.actuators):
         if actuator.target in joints:
             spec.delete(actuator)
 
 
 def _mount(spec: Any, rig: RigInWorld, path: Path) -> Any:
-    """Return the site or frame of a user's world on which the neck base stands.
+    """Return the site or frame of a user's world for the neck base.
 
     Raises:
         SetupError: there is none.
@@ -205,7 +205,7 @@ def _add_servos(spec: Any, rig: RigInWorld, prefix: str) -> None:
         joint.solref_limit = [STOP_TIME_S, 1.0]
     for servo in rig.servos:
         angles = [rig.start_rad.get(name, 0.0) for name in servo.joints]
-        _, slopes = servo.gearing.at(angles)
+        _, slopes = servo.transmission.at(angles)
         shaft = spec.add_tendon(name=shaft_name(prefix, servo.name), armature=ROTOR_KG_M2)
         for name, slope in zip(servo.joints, slopes, strict=True):
             shaft.wrap_joint(prefix + name, shaft_rad_of(servo.steps_per_turn) * slope)
@@ -252,7 +252,7 @@ def _indices(model: Any, rig: RigInWorld, prefix: str) -> RigIndices:
 
 
 def _base(model: Any, rig: RigInWorld, prefix: str) -> tuple[Mat3, Vec3]:
-    """Return where a rig's neck base stands: its base, or the site that a user's own head has."""
+    """Return the pose of a rig's neck base: its base body, or the site of a user's own head."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, prefix + BASE_LINK)

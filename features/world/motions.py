@@ -1,6 +1,6 @@
-"""Where a person's hands are over a round: hanging, in the lap, on guard, and what acts do.
+"""Motion of a person's hands over a round: hanging, in the lap, on guard, and during acts.
 
-A hand is given by its wrist, where its fingers point and where its palm faces; the elbow follows.
+A hand is given by its wrist and the directions of its fingers and palm; the elbow follows.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.features.world.measures import Measures
-from gazerig.features.world.rotations import directed, unit, within
-from gazerig.features.world.time_profiles import blended, hump, rise, there_and_back
+from gazerig.features.world.rotations import axes_along, limit_angle, unit
+from gazerig.features.world.time_profiles import blend, hump, rise, there_and_back
 from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
 
@@ -25,7 +25,7 @@ _FOREHEAD = np.array((0.0, 0.0, 0.045))
 class Frame(NamedTuple):
     """The body at all times, for an arm.
 
-    shoulder_m, hips_m, chin_m: (n, 3); ahead, left: (n, 3) where the body is turned, level
+    shoulder_m, hips_m, chin_m: (n, 3); ahead, left: (n, 3) level directions of the body
     side: 1 the left arm, -1 the right one
     """
 
@@ -39,7 +39,7 @@ class Frame(NamedTuple):
 
 
 class HandPose(NamedTuple):
-    """A hand at all times, rows (n, 3): wrist, where the fingers point, the palm, the elbow."""
+    """A hand at all times, rows (n, 3): wrist, directions of the fingers, palm and elbow."""
 
     wrist_m: Floats
     fingers: Floats
@@ -47,12 +47,12 @@ class HandPose(NamedTuple):
     pole: Floats
 
     def towards(self, other: "HandPose", share: Floats) -> "HandPose":
-        """Return a hand between two, by a share a row."""
-        return HandPose(*(blended(a, b, share) for a, b in zip(self, other, strict=True)))
+        """Return a hand between two, with a share per row."""
+        return HandPose(*(blend(a, b, share) for a, b in zip(self, other, strict=True)))
 
 
 class PostureShares(NamedTuple):
-    """How much of the time a way of holding the hands is in force (n,), 0..1."""
+    """Shares of the postures of the hands (n,), 0..1."""
 
     seated: Floats
     guard: Floats
@@ -63,7 +63,7 @@ UP = np.array((0.0, 0.0, 1.0))
 
 
 def _point(frame: Frame, origin: Floats, ahead: float, out: float, up: float) -> Floats:
-    """Return a point beside an origin; ``out`` is to the arm's own side."""
+    """Return a point near an origin; ``out`` is to the arm's own side."""
     return np.asarray(origin + ahead * frame.ahead + out * frame.side * frame.left + up * UP)
 
 
@@ -73,7 +73,7 @@ def _way(frame: Frame, ahead: float, out: float, up: float) -> Floats:
 
 
 def resting(frame: Frame, held: PostureShares, swing_rad: Floats, boxes: bool) -> HandPose:
-    """Return a hand with nothing to do: it hangs and swings, lies in the lap, holds, or guards."""
+    """Return an idle hand: it hangs and swings, rests in the lap, holds a thing, or guards."""
     arm = frame.body.arm_m
     swing = swing_rad[:, None]
     down = 0.965 * arm * (np.sin(swing) * frame.ahead - np.cos(swing) * UP)
@@ -207,11 +207,11 @@ OUT_S: Mapping[str, tuple[float, float]] = {
     "reach": (0.28, 0.25),
     "pass": (0.34, 0.34),
 }
-"""Share of an act's time in which the hand goes out, and in which it comes back."""
+"""Shares of an act's time for the hand's motion out and back."""
 
 
-def in_force(one: TimedAct, t_s: Floats) -> Floats:
-    """Return how far a hand is from where it rests to where an act has it (n,), 0..1."""
+def act_share(one: TimedAct, t_s: Floats) -> Floats:
+    """Return how far a hand has moved from rest to the pose of an act (n,), 0..1."""
     lasts_s = one.end_s - one.start_s
     out, back = (min(1.2, share * lasts_s) for share in OUT_S[one.act.do])
     if one.act.do in ("wave", "gesture", "reach", "point"):
@@ -228,14 +228,14 @@ def hand(
         frame: the body.
         t_s: times of the rows.
         acts: of this arm.
-        at: (n, 3) what each of them is directed at.
-        rest: where the hand is without them.
+        at: (n, 3) target of each act.
+        rest: the hand without acts.
     """
     now = rest
     for one, target in zip(acts, at, strict=True):
-        share = in_force(one, t_s)
+        share = act_share(one, t_s)
         now = now.towards(_MOTIONS[one.act.do](frame, one, t_s, target, now), share)
-        # A hand that comes up does so before the body, not through it.
+        # A raised hand passes in front of the body, not through it.
         wide = 0.12 if one.act.do not in ("punch", "feint") else 0.0
         bow = wide * 4.0 * share * (1.0 - share) * (1.0 - 0.5 * rise(share))
         now = now._replace(wrist_m=now.wrist_m + bow[:, None] * frame.ahead)
@@ -248,35 +248,35 @@ def is_of_arm(one: TimedAct) -> bool:
 
 
 def twist_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:
-    """Return how far the chest is turned to the left by what the hands do (n,)."""
+    """Return the turn of the chest to the left due to the acts of the hands (n,)."""
     total = np.zeros_like(t_s)
     for one in acts:
         if one.act.do in ("punch", "reach", "push", "point"):
             most = 0.45 if one.act.do == "punch" else 0.2
-            total += most * (1.0 if one.act.side == "right" else -1.0) * in_force(one, t_s)
+            total += most * (1.0 if one.act.side == "right" else -1.0) * act_share(one, t_s)
     return total
 
 
 def lean_rad(
     t_s: Floats, acts: Sequence[TimedAct], at: Sequence[Floats], chest_m: Floats, body: Measures
 ) -> Floats:
-    """Return how far the chest leans ahead so that the hands get where they go (n,)."""
+    """Return the forward lean of the chest that brings the hands to their targets (n,)."""
     total = np.zeros_like(t_s)
     for one, target in zip(acts, at, strict=True):
         if one.act.do in ("reach", "push", "pass"):
             short = {"push": PUSH_FROM_M - PUSH_BY_M}.get(one.act.do, 0.0)
             away = np.linalg.norm(target - chest_m, axis=1) - short - FIST_M - 0.86 * body.arm_m
             needed = np.clip(away / (0.26 * body.stature_m), 0.0, 0.75)
-            total += in_force(one, t_s) * needed
+            total += act_share(one, t_s) * needed
         elif one.act.do == "punch":
-            total += 0.10 * in_force(one, t_s)
+            total += 0.10 * act_share(one, t_s)
         elif one.act.do == "open_guard":
-            total -= 0.04 * in_force(one, t_s)
+            total -= 0.04 * act_share(one, t_s)
     return total
 
 
 def hit_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:
-    """Return how far blows throw the chest back (n,)."""
+    """Return the backward lean of the chest due to blows (n,)."""
     total = np.zeros_like(t_s)
     for one in acts:
         if one.act.do == "be_hit":
@@ -287,5 +287,5 @@ def hit_rad(t_s: Floats, acts: Sequence[TimedAct]) -> Floats:
 def hand_axes(hand: HandPose, elbow_m: Floats, wrist_m: Floats) -> Floats:
     """Return rotations of a hand: x out of the palm, z from the fingers to the wrist."""
     along = unit(wrist_m - elbow_m)
-    fingers = within(unit(hand.fingers), along, np.radians(55.0))
-    return directed(-fingers, hand.palm)
+    fingers = limit_angle(unit(hand.fingers), along, np.radians(55.0))
+    return axes_along(-fingers, hand.palm)

@@ -1,7 +1,7 @@
-"""The other heads of a world as the page draws them: every body of theirs where it truly is.
+"""The other heads of a world as the page draws them: every body at its true pose.
 
-The emulator's process writes the newest state; whoever draws reads the joints in it, and where the
-bodies are follows from a model of its own.
+The emulator's process writes the newest state. The process that draws reads the joints in it and
+computes the poses of the bodies with its own model.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,11 +21,11 @@ Poses = Mapping[str, tuple[Quaternion, Vec3]]
 
 
 class HeadInState(NamedTuple):
-    """Another head than the one that the page leads.
+    """A head other than the page's own.
 
     Attributes:
-        rig: with all that can be seen of it.
-        joints: where each joint stands in the state of the world.
+        rig: with all of its visible parts.
+        joints: index of each joint in the state of the world.
     """
 
     rig: RigInWorld
@@ -52,7 +52,7 @@ class OtherHeads:
 
     @property
     def rigs(self) -> tuple[RigInWorld, ...]:
-        """Return the heads as rigs that nothing moves."""
+        """Return the heads as rigs without servos."""
         return tuple(head.rig._replace(servos=()) for head in self._heads)
 
     def parts(self, model: "WorldModel", first: int) -> Iterator[WorldPart]:
@@ -83,7 +83,7 @@ class OtherHeads:
         return [i for i in there if names and model.mj.body(i).name.startswith(names)]
 
     def poses(self) -> Poses:
-        """Return where all parts are now; none before ``parts`` was asked for."""
+        """Return the poses of all parts; none before a call of ``parts``."""
         if self._model is None:
             return {}
         import mujoco
@@ -102,7 +102,7 @@ class OtherHeads:
         if self._reader is None:
             try:
                 self._reader = StateReader(self._state)
-            except OSError:  # the emulator has ended, or not begun
+            except OSError:  # the emulator has ended, or not started
                 return None
         newest = self._reader.newest()
         return None if newest is None else newest.qpos

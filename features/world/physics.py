@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.errors import SetupError
 from gazerig.errors import Error
-from gazerig.features.world.figure_model import PlacedPeople
+from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.hobby_shaft import WorldHobbyServo
 from gazerig.features.world.ideal_bus import IdealShaft
 from gazerig.features.world.model import WorldModel
@@ -23,27 +23,27 @@ from gazerig.sim_mock.smart_servo.physics import Physics
 from gazerig.sim_mock.smart_servo.span import whole_ms
 
 DEVICE_MS = 5
-"""So often all devices are brought up to date, so that no watchdog trips late; their servos check
-heat and load every 20 ms."""
+"""Period of the update of all devices, so that no watchdog trips late; their servos check heat and
+load every 20 ms."""
 
 LONGEST_GAP_MS = 10_000
-"""Of a longer pause in which nobody asked for the time only the end is lived through."""
+"""Only the last part of a longer pause between queries of the time is simulated."""
 
 
 PEOPLE_MS = 4
-"""Every so often people are put where they are."""
+"""Period of the update of the people's poses."""
 
 
 _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
-"""MuJoCo's warnings of numbers that have run away; it then begins anew, which no servo may see."""
+"""MuJoCo's warnings of diverged numbers; MuJoCo then resets, which no servo may see."""
 
 
 class WorldUnstable(Error):
-    """The numbers of a world have run away; nothing that it says of joints is true any more."""
+    """The numbers of a world have diverged; its joint angles are no longer valid."""
 
 
 class WorldState(NamedTuple):
-    """Where everything in a world is: with the script of its people, all that a picture needs.
+    """The state of a world: with the script of its people, all that a picture needs.
 
     t_s: time since the script of its people began, 0 before
     qpos: positions of its joints as MuJoCo orders them, shape (nq,)
@@ -67,38 +67,38 @@ class MovingShaft(Protocol):
     axis: ShaftAxis
 
     def command(self) -> Effort:
-        """Return what its motor does in the next millisecond."""
+        """Return the effort of its motor in the next millisecond."""
         ...
 
     def sense(self, x: float, v: float) -> None:
-        """Set position (steps) and speed (steps/ms) to what the world has made of them."""
+        """Set position (steps) and speed (steps/ms) to the results of the world."""
         ...
 
 
 def _no_log(text: str) -> None:
-    """Leave a warning of MuJoCo to whoever counts them."""
+    """Drop a warning of MuJoCo: the world reads their counts."""
 
 
 class World:
-    """A world that is brought up to a time on demand; nothing runs by itself.
+    """A world that is simulated up to a time on demand.
 
-    The devices built in it share its time: whenever one asks its clock, the world and all other
-    devices come up to date first.
+    The devices built in it share its time: when a device queries its clock, the world and all other
+    devices are simulated up to that time first.
 
     Args:
-        model: compiled.
-        clock_s: the time.
+        model: the compiled world.
+        clock_s: returns the time.
     """
 
     def __init__(self, model: WorldModel, clock_s: Callable[[], float]) -> None:
         self.model = model
         self._mj = model.mj
         self._data: Any = mujoco.MjData(model.mj)
-        # Views of its arrays: each look into MuJoCo's structures costs a call.
+        # Views of its arrays: each access to MuJoCo's structures costs a call.
         self._ctrl, self._qpos, self._qvel = self._data.ctrl, self._data.qpos, self._data.qvel
         self._gain, self._range = model.mj.actuator_biasprm[:, 2], model.mj.actuator_forcerange
         self._warned = self._data.warning.number
-        # Else MuJoCo writes a file into the user's folder.
+        # By default MuJoCo writes a file into the user's folder.
         mujoco.set_mju_user_warning(_no_log)
         self._clock_s = clock_s
         self._ms = whole_ms(clock_s())
@@ -109,7 +109,7 @@ class World:
         self._actuators: slice | NDArray[np.intp] = slice(0, 0)
         self._pushes: list[_Push] = []
         figures = model.figures
-        self._people = None if figures is None else PlacedPeople(model.mj, figures)
+        self._people = None if figures is None else PeoplePlacer(model.mj, figures)
         if self._people is not None:
             self._people.place(self._data, 0.0)
         for rig in model.rigs:
@@ -123,14 +123,14 @@ class World:
         """Build the servos of one bus, moved by this world.
 
         Args:
-            line: what is on the bus.
+            line: the servos on the bus.
             bus: its name in the rig.
-            seed: of the random numbers that its faults draw.
-            rig: which one of the world's.
+            seed: seed of the random numbers of its faults.
+            rig: number of the rig in the world.
 
         Raises:
-            ValueError: it cannot exist.
-            SetupError: it is a package's own.
+            ValueError: the device cannot exist.
+            SetupError: the device comes from a plugin package.
         """
         if isinstance(line, PluginLine):
             raise SetupError(
@@ -159,7 +159,7 @@ class World:
             self._shafts.append(made.shaft)
             return made
 
-        self._busy = True  # no time passes while some of its shafts are in the world and some not
+        self._busy = True  # no time passes while only some of its shafts are in the world
         try:
             device = build(line, self.now_s, seed, ShaftMakers(shaft, hobby))
         finally:
@@ -180,7 +180,7 @@ class World:
         return shafts
 
     def _join(self) -> None:
-        """Let all shafts be moved from now on."""
+        """Move all shafts from now on."""
         numbers = [one.axis.actuator for one in self._shafts]
         first = min(numbers, default=0)
         self._actuators = np.array(numbers, dtype=np.intp)
@@ -189,7 +189,7 @@ class World:
         self._settle_constants()
 
     def _settle_constants(self) -> None:
-        """Compute what MuJoCo derives from inertias again: shafts have got their rotors."""
+        """Let MuJoCo update the constants that depend on inertias: shafts now have rotors."""
         kept = np.array(self._data.qpos), np.array(self._data.qvel)
         mujoco.mj_setConst(self._mj, self._data)
         self._data.qpos[:], self._data.qvel[:] = kept
@@ -198,18 +198,18 @@ class World:
     # --- time
 
     def now_s(self) -> float:
-        """Return the time; the world has come up to it."""
-        if self._busy:  # a device asks while the world brings it up to date
+        """Return the time; the world has been simulated up to it."""
+        if self._busy:  # a device queries the time while the world simulates it
             return self._ms / 1000.0
         now_s = self._clock_s()
         self.advance(whole_ms(now_s))
         return now_s
 
     def advance(self, until_ms: int) -> None:
-        """Bring the world and its devices up to a time, in steps of a millisecond.
+        """Simulate the world and its devices up to a time, in steps of a millisecond.
 
         Raises:
-            WorldUnstable: its numbers have run away.
+            WorldUnstable: the numbers have diverged.
         """
         if self._busy or until_ms <= self._ms:
             return
@@ -222,7 +222,7 @@ class World:
             self._busy = False
 
     def _step(self) -> None:
-        """Let a millisecond pass."""
+        """Simulate a millisecond."""
         data, shafts = self._data, self._shafts
         if shafts:
             efforts = np.array([one.command() for one in shafts])
@@ -259,7 +259,7 @@ class World:
         return max(0, self._ms - self._begun_ms) / 1000.0
 
     def begin(self, at_ms: int) -> None:
-        """Let the script of the people begin at a time; until then they stand at its beginning."""
+        """Begin the script of the people at a time; until then they keep their first pose."""
         self._begun_ms = at_ms
 
     # --- from outside
@@ -271,9 +271,9 @@ class World:
 
         Args:
             body: its name in the rig, such as "head", with the prefix that a further rig has.
-            force_n: in the world's directions.
-            for_s: how long.
-            rig: which one of the world's.
+            force_n: force in the world's directions.
+            for_s: duration.
+            rig: number of the rig in the world.
 
         Raises:
             ValueError: there is no such body.
@@ -291,7 +291,7 @@ class World:
         return self._body(body, rig) >= 0
 
     def _body(self, body: str, rig: int) -> int:
-        """Return the number of a rig's body, -1 where there is none."""
+        """Return the number of a rig's body, -1 if there is none."""
         placed = self.model.rigs[rig]
         name = placed.names + body.removeprefix(placed.rig.prefix)
         if placed.rig.prefix and not body.startswith(placed.rig.prefix):
@@ -311,7 +311,7 @@ class World:
         self._data.mocap_pos[place] = p_m
 
     def _apply_pushes(self) -> None:
-        """Apply the forces of this millisecond, and take away those whose time is over."""
+        """Apply the forces of this millisecond, and remove the expired ones."""
         wrenches = self._data.xfrc_applied
         for one in self._pushes:
             wrenches[one.body] = 0.0
@@ -322,9 +322,9 @@ class World:
             wrenches[one.body, 3:] += np.cross(lever, one.force_n)
 
     def state(self) -> WorldState:
-        """Return where everything is now."""
+        """Return the current state."""
         return WorldState(self._script_s(), np.array(self._data.qpos))
 
     def joints_rad(self, rig: int = 0) -> dict[str, float]:
-        """Return the true joint angles of a rig now."""
+        """Return the current true joint angles of a rig."""
         return {n: float(self._data.qpos[at]) for n, at in self.model.rigs[rig].qpos.items()}

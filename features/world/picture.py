@@ -1,4 +1,4 @@
-"""What a camera in a world sees: a view for gazerig.sim_mock.cameras, in the process that draws."""
+"""The view of a camera in a world, for gazerig.sim_mock.cameras in the rendering process."""
 
 from collections.abc import Callable, Collection
 
@@ -11,23 +11,23 @@ from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.scene_view import PinholeView, Rendered
 
 PlaceBodies = Callable[[mujoco.MjData, float], None]
-"""Puts people and joints where they are at a time of the world, seconds: qpos and mocap poses."""
+"""Sets people and joints to their poses at a time of the world, seconds: qpos and mocap poses."""
 
 
 class WorldPicture:
-    """A SceneView of a world: everything is put where it is at a time, and rendered.
+    """A SceneView of a world: everything is set to its pose at a time, and rendered.
 
-    The renderer is made with the first picture, in the process and thread that wants it, and made
-    anew where a larger one is wanted.
+    The renderer is created with the first picture, in the process and thread that requests it, and
+    created again for a larger picture.
 
     Args:
         model: the world.
-        place: puts people and joints where they are.
-        params: what the pictures show.
-        hidden: names of bodies that are not shown, with all that hangs on them: the head that
-            carries the camera.
-        R_world_base: with
-        p_world_base_m: where the neck base stands from which the camera's places are given.
+        place: sets people and joints to their poses.
+        params: content of the pictures.
+        hidden: names of bodies that are not shown, with their descendants: the head that carries
+            the camera.
+        R_world_base: rotation, and
+        p_world_base_m: position of the neck base, the frame of the camera's poses.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class WorldPicture:
 
     @property
     def backend(self) -> str:
-        """Return what renders, "" before the first picture."""
+        """Return the name of the rendering library, "" before the first picture."""
         return self._renderer.backend if self._renderer is not None else ""
 
     def draw(
@@ -75,7 +75,7 @@ class WorldPicture:
         self._renderer, self._size = None, (0, 0)
 
     def _fitting(self, width: int, height: int) -> Renderer:
-        """Return a renderer that can make pictures of a size."""
+        """Return a renderer for pictures of a size."""
         if self._renderer is None or width > self._size[0] or height > self._size[1]:
             wide, high = max(width, self._size[0]), max(height, self._size[1])
             self.close()

@@ -29,7 +29,7 @@ _SHADOWS_REACH_M = 1.5  # behind the camera
 
 @dataclass(frozen=True)
 class RendererParams:
-    """What the pictures show; each costs time."""
+    """Content of the pictures; each item costs time."""
 
     # fmt: off
     shadow_px: Annotated[int, Bounds(0, 8192), "side of the shadow map; 0: no shadows"] = 512
@@ -43,12 +43,12 @@ class Renderer:
     """Renders one model; may be used by several threads, one at a time.
 
     Args:
-        model: what is rendered.
+        model: the model to render.
         width_px: of the largest picture.
         height_px: of the largest picture.
-        params: what the pictures show.
-        hidden: names of bodies that are not shown, with all that hangs on them: the head that
-            carries the camera.
+        params: content of the pictures.
+        hidden: names of bodies that are not shown, with their descendants: the head that carries
+            the camera.
 
     Raises:
         NoRenderer: nothing on this machine can render.
@@ -87,7 +87,7 @@ class Renderer:
         self._groups = model.geom_group.copy()
         self._groups[_geoms_of(model, hidden)] = _UNSEEN
         self._shadows = params.shadow_px > 0
-        self._finalizer = weakref.finalize(self, _freed, self._context, self._mjr)
+        self._finalizer = weakref.finalize(self, _free, self._context, self._mjr)
 
     def render(
         self,
@@ -100,19 +100,19 @@ class Renderer:
         depth: bool = False,
         rows: tuple[int, int] | None = None,
     ) -> Rendered:
-        """Return what a camera sees, without the lens's distortion.
+        """Return the picture of a camera, without the lens's distortion.
 
         Args:
-            data: where everything is; its positions have been computed.
-            lens: for pictures of this size.
+            data: the state; its positions must have been computed.
+            lens: of pictures of this size.
             R: (3, 3) rotation of the camera in the world, its axes optical.
             p_m: (3,) position of the camera in the world.
             size_px: width and height; None: the largest.
-            depth: with distances.
-            rows: the first row and the one after the last, where only these are wanted.
+            depth: also return distances.
+            rows: the first row and the one after the last, if only these are wanted.
 
         Raises:
-            ValueError: the picture is larger than the renderer was made for, or the renderer is
+            ValueError: the picture is larger than the renderer's largest, or the renderer is
                 closed.
         """
         width, height = size_px or self._size
@@ -147,11 +147,11 @@ class Renderer:
             self._finalizer()
 
     def _pick(self, data: mujoco.MjData, sides: Floats, R: Floats, p_m: Floats) -> None:
-        """Leave out what is wholly outside the picture: MuJoCo would have every triangle drawn."""
+        """Hide geoms wholly outside the picture: MuJoCo would draw each of their triangles."""
         model = self._model
         camera = (data.geom_xpos - p_m) @ R
         out = (camera @ sides.T > model.geom_rbound[:, None]).any(axis=1)
-        if self._shadows:  # what is beside the picture may throw one into it
+        if self._shadows:  # a geom outside the picture may cast a shadow into it
             out = camera[:, 2] < -_SHADOWS_REACH_M - model.geom_rbound
         out &= model.geom_rbound > 0.0  # a plane has no size
         model.geom_group[:] = np.where(out, _UNSEEN, self._groups)
@@ -164,7 +164,7 @@ class Renderer:
         width: int,
         rows: tuple[int, int],
     ) -> None:
-        """Put the scene's camera, and a light that it carries, where the camera is."""
+        """Move the scene's camera, and a light fixed to it, to the pose of the camera."""
         forward, up = R[:, 2], -R[:, 1]
         # Pixels have their centres at whole numbers: the frame reaches half a pixel further.
         left = (-0.5 - lens.cx_px) / lens.fx_px * _NEAREST_M
@@ -182,7 +182,7 @@ class Renderer:
 
 
 def _sides(lens: Intrinsics, width: int, rows: tuple[int, int]) -> Floats:
-    """Return the unit vectors (5, 3) out of the sides of what is seen, in the camera's axes."""
+    """Return the outward unit normals (5, 3) of the view's sides, in the camera's axes."""
     left, right = (-0.5 - lens.cx_px) / lens.fx_px, (width - 0.5 - lens.cx_px) / lens.fx_px
     top, bottom = ((row - 0.5 - lens.cy_px) / lens.fy_px for row in rows)
     out = np.array(
@@ -192,7 +192,7 @@ def _sides(lens: Intrinsics, width: int, rows: tuple[int, int]) -> Floats:
 
 
 def _geoms_of(model: mujoco.MjModel, bodies: Collection[str]) -> NDArray[np.bool_]:
-    """Return which geoms (n,) hang on bodies of these names, or on what hangs on them.
+    """Return a mask (n,) of the geoms of bodies with these names and of their descendants.
 
     Raises:
         ValueError: there is no such body.
@@ -216,7 +216,7 @@ def _metres(z: NDArray[np.float32]) -> NDArray[np.float32]:
     return out
 
 
-def _freed(context: Context, mjr: Any) -> None:
+def _free(context: Context, mjr: Any) -> None:
     with context.as_current():
         mjr.free()
     context.free()

@@ -1,4 +1,4 @@
-"""A rig as a world needs it: its body as MJCF, and what lies between its servos and its joints."""
+"""A rig in a world: its body as MJCF, and the transmission from its servos to its joints."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
@@ -7,24 +7,24 @@ from gazerig.robot.model.coupling import Coupling, Unreachable
 from gazerig.robot.model.transmission import Line, Linkage
 
 RELINEARISE_RAD = 0.003
-"""A coupling is computed anew when a joint has turned so far; between it is a straight line.
-The servo's position is then wrong by less than 1e-5 rad with any rods of a neck."""
+"""A coupling is linearised again after a joint has turned this far. The error of the servo's
+position is less than 1e-5 rad with any rods of a neck."""
 
 
-class Gearing(Protocol):
-    """What lies between one servo and the joints that it helps to turn.
+class Transmission(Protocol):
+    """The transmission from one servo to the joints that it helps to turn.
 
-    line: where it turns one joint by a straight gear; else None
+    line: of a linear transmission to one joint; else None
     """
 
     line: Line | None
 
     def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        """Return the servo's position in its steps, and the steps a radian of each joint."""
+        """Return the servo's position in steps, and the steps per radian of each joint."""
         ...
 
 
-class JointGearing:
+class JointTransmission:
     """A servo that turns one joint."""
 
     def __init__(self, linkage: Linkage) -> None:
@@ -32,14 +32,14 @@ class JointGearing:
         self.line = linkage.line
 
     def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        """Return the servo's position in its steps, and the steps a radian of the joint."""
+        """Return the servo's position in steps, and the steps per radian of the joint."""
         if self.line is not None:
             return self.line.zero + self.line.slope * joints_rad[0], (self.line.slope,)
         steps = self._linkage.steps(joints_rad[0])
         return steps, (1.0 / self._linkage.rate_rad(steps),)
 
 
-class PairGearing:
+class PairTransmission:
     """One of two servos that turn two joints together.
 
     Args:
@@ -56,9 +56,9 @@ class PairGearing:
         self._slopes = (0.0, 0.0)
 
     def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        """Return the servo's position in its steps, and the steps a radian of each joint.
+        """Return the servo's position in steps, and the steps per radian of each joint.
 
-        Where the rods cannot follow, a little beyond the joints' range, their last slope goes on.
+        A little beyond the joints' range the rods cannot follow; their last slope is then used.
         """
         first, second = joints_rad
         before = self._at_rad
@@ -83,10 +83,10 @@ class PairGearing:
 class ServoInWorld(NamedTuple):
     """One servo of a rig.
 
-    name: of the joint that its entry in the rig's file stands under
+    name: of the joint of its entry in the rig's file
     bus: name of its bus; id: on it
-    joints: that it turns, one, or both of a coupled pair
-    gearing: between it and them
+    joints: that it turns: one, or both of a coupled pair
+    transmission: from it to them
     steps_per_turn: of its shaft
     """
 
@@ -94,20 +94,20 @@ class ServoInWorld(NamedTuple):
     bus: str
     id: int
     joints: tuple[str, ...]
-    gearing: Gearing
+    transmission: Transmission
     steps_per_turn: float
 
 
 class RigInWorld(NamedTuple):
-    """A rig and where it stands.
+    """A rig and its pose.
 
-    body: returns its body as MJCF with the rig's joint names, and the files that this names; can
-        be sent, so that only those processes pay for it that have MuJoCo
+    body: returns its body as MJCF with the rig's joint names, and the files that the MJCF names.
+        It can be sent, so that only processes with MuJoCo compute it
     stops_rad: hard stops of each joint
-    start_rad: angle of each joint at first, 0 where not given
-    servos: that turn the joints
+    start_rad: initial angle of each joint, 0 if not given
+    servos: the servos that turn the joints
     prefix: of its names in the world, "" for the first rig
-    p_m, yaw_rad: place of its neck base in the world, and how far it is turned left there
+    p_m, yaw_rad: position of its neck base in the world, and its turn to the left there
     """
 
     body: Callable[[], tuple[str, Mapping[str, bytes]]]

@@ -1,4 +1,4 @@
-"""The rooms of a world: where one can stand, sit, come in, and which way round the furniture.
+"""The rooms of a world: places to stand, sit and come in, and the paths around the furniture.
 
 Places are on the floor, in the world's axes: the neck base of the first head is above (0, 0).
 """
@@ -18,11 +18,11 @@ Point = tuple[float, float]
 class Place(NamedTuple):
     """Somewhere to be: on the floor, or on a seat.
 
-    x_m, y_m: of the hips' middle; facing_rad: where one who is there faces
-    seat_m: height of the seat above the floor, None to stand
+    x_m, y_m: of the hips' middle; facing_rad: direction of a person there
+    seat_m: height of the seat above the floor, None without a seat
     approach: points that a walk from the room's middle passes before it
-    outside: beyond a door, where several wait unseen
-    height_m: of what is looked, pointed or reached at there
+    outside: beyond a door, where several people wait unseen
+    height_m: of the target of looking, pointing or reaching there
     """
 
     x_m: float
@@ -48,11 +48,11 @@ def _chair(x_m: float, y_m: float, seat_m: float, *approach: Point) -> Place:
 
 _WAITING_M = 0.6
 SEAT_AHEAD_M = 0.40
-"""How far before a seat's middle one stands who is about to sit down."""
+"""Distance in front of a seat's middle from which a person sits down."""
 WALK_STARTS_S, WALK_ENDS_S = 0.6, 0.8
-"""How long a walk's turns to its way and to where it ends take before and after it."""
+"""Durations of the turns before and after a walk."""
 SEAT_M, SOFA_M = 0.45, 0.41
-"""Heights of a chair's and of the sofa's seat under one who sits."""
+"""Seat heights of a chair and of the sofa under a seated person."""
 
 LIVING_ROOM: Mapping[str, Place] = {
     "door": Place(0.75, 3.55, 0.0, None, ((1.55, 2.35), (1.55, 3.30)), True),
@@ -106,7 +106,7 @@ def places_of(script: WorldScript) -> dict[str, Place]:
 
 
 def places_for(script: WorldScript, name: str) -> dict[str, Place]:
-    """Return all places as one person uses them: people who wait outside stand in a row."""
+    """Return all places as one person uses them: people who wait outside form a row."""
     row = _WAITING_M * list(script.people).index(name)
     return {
         key: place._replace(x_m=place.ahead(-row)[0], y_m=place.ahead(-row)[1])
@@ -117,17 +117,17 @@ def places_for(script: WorldScript, name: str) -> dict[str, Place]:
 
 
 def way_points(start: Place, target: Place, via: Sequence[Place], at: Point) -> Floats:
-    """Return the corners of a walk (n, 2), from where one stands to where one will stand."""
+    """Return the corners of a walk (n, 2), from the current point to the standing point."""
     middle = [(one.x_m, one.y_m) for one in via]
-    return np.array([at, *start.approach[::-1], *middle, *target.approach, standing(target)])
+    return np.array([at, *start.approach[::-1], *middle, *target.approach, standing_point(target)])
 
 
-def standing(place: Place) -> Point:
-    """Return where one stands who is at a place, before it where it is a seat."""
+def standing_point(place: Place) -> Point:
+    """Return the standing point of a place; in front of a seat."""
     return place.ahead(0.0 if place.seat_m is None else SEAT_AHEAD_M)
 
 
 def walk_s(points: Floats, speed_m_s: float) -> float:
-    """Return how long a walk along corners takes."""
+    """Return the duration of a walk along corners."""
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     return length / speed_m_s + WALK_STARTS_S + WALK_ENDS_S + 0.5

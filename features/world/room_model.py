@@ -17,9 +17,9 @@ from gazerig.robot.description.parts import FLOOR_M
 _BOX, _CYLINDER = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
 _CEILING: Colour = (238, 236, 230)
 _GLOWS: dict[Colour | str, float] = {"window": 0.7, _CEILING: 0.42, (250, 232, 196): 0.18}
-"""Pictures and colours that shine by themselves; no lamp shines up to a ceiling."""
+"""Pictures and colours that emit light; no lamp lights the ceiling."""
 _TABLE_BELOW_M = 0.20
-"""How far a table's top is below the neck base that stands over it on its plinth."""
+"""Height of the neck base on its plinth above the table's top."""
 
 
 def add_room(
@@ -29,8 +29,8 @@ def add_room(
 
     Args:
         spec: of the world.
-        script: says which room, how high the neck base is, and how bright it is.
-        plinths_m: the neck bases of all rigs, each of which stands on something.
+        script: gives the room, the height of the neck base, and the brightness.
+        plinths_m: the neck bases of all rigs, each of which gets a base.
     """
     room = _Room(spec, -script.neck_height_m)
     {"living-room": _living_room, "gym": _gym, "hall": _hall}[script.room](room)
@@ -40,7 +40,7 @@ def add_room(
 
 
 class _Room:
-    """Puts geoms into the world; heights are above the floor."""
+    """Adds geoms to the world; heights are above the floor."""
 
     def __init__(self, spec: Any, floor_m: float) -> None:
         self.spec, self.floor_m = spec, floor_m
@@ -56,7 +56,7 @@ class _Room:
         solid: bool = False,
         repeat: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """Add a box by its middle and its whole sizes; a colour or the name of a picture."""
+        """Add a box by its middle and its full sizes, with a colour or the name of a picture."""
         x, y, z = middle
         geom = self.body.add_geom(
             type=_BOX,
@@ -78,7 +78,7 @@ class _Room:
         shine: float = 0.02,
         repeat: tuple[float, float] = (1.0, 1.0),
     ) -> None:
-        """Add an upright panel, width and height, that shows its picture to where it faces."""
+        """Add an upright panel, width and height, that shows its picture on its front."""
         x, y, z = middle
         c, s = cos(facing), sin(facing)
         geom = self.body.add_geom(
@@ -96,7 +96,7 @@ class _Room:
     def cylinder(
         self, foot: Vec3, radius: float, height: float, colour: Colour | str, shine: float = 0.1
     ) -> None:
-        """Add an upright cylinder that stands on a point."""
+        """Add an upright cylinder by the middle of its foot."""
         x, y, z = foot
         geom = self.body.add_geom(
             type=_CYLINDER,
@@ -108,7 +108,7 @@ class _Room:
         self._paint(geom, colour, shine, (1.0, 1.0))
 
     def bush(self, middle: Vec3, size: Vec3, colour: Colour) -> None:
-        """Add an ellipsoid by its middle and its whole sizes."""
+        """Add an ellipsoid by its middle and its full sizes."""
         x, y, z = middle
         geom = self.body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
@@ -187,7 +187,7 @@ def _living_room(room: _Room) -> None:
     for x in (1.05, 2.05):
         room.box((x, left - 0.02, 1.04), (0.07, 0.06, 2.08), _WHITE)
     room.box((2.28, 3.02, 1.0), (0.05, 0.86, 2.0), (206, 196, 178), yaw=-0.5)
-    # What hangs on the walls, and the window on the right.
+    # Pictures on the walls, and the window on the right.
     room.panel((1.35, right + 0.02, 1.45), 0.5 * pi, (1.5, 1.25), "window", shine=0.3)
     for x in (0.58, 1.35, 2.12):
         room.box((x, right + 0.045, 1.45), (0.05, 0.03, 1.35), _WHITE)
@@ -197,7 +197,7 @@ def _living_room(room: _Room) -> None:
     room.panel((back - 0.03, 0.15, 1.62), pi, (0.95, 0.68), "landscape")
     room.panel((back - 0.03, 1.05, 1.55), pi, (0.50, 0.64), "shapes")
     room.panel((0.1, left - 0.03, 1.55), -0.5 * pi, (0.8, 0.58), "landscape")
-    # Behind the head: seen by who looks at its face.
+    # Behind the head: visible to a person who looks at its face.
     room.panel((rear + 0.03, -0.8, 1.5), 0.0, (0.6, 0.78), "shapes")
     room.panel((rear + 0.03, 0.22, 1.42), 0.0, (1.0, 1.1), "window", shine=0.3)
     room.box((rear + 0.01, 0.22, 1.42), (0.03, 1.14, 1.24), _WHITE)
@@ -231,7 +231,7 @@ def _sofa(room: _Room, x: float, y: float) -> None:
 
 
 def _chair(room: _Room, place: Place) -> None:
-    """Build a chair that faces where one who sits on it does."""
+    """Build a chair that faces the same direction as a person on it."""
     yaw, (x, y) = place.facing_rad, (place.x_m, place.y_m)
     c, s = cos(yaw), sin(yaw)
 
@@ -247,7 +247,7 @@ def _chair(room: _Room, place: Place) -> None:
 
 
 def _stand(room: _Room, name: str, x: float, y: float, z: float) -> None:
-    """Build what a rig stands on: a table and a plinth, in the gym a post."""
+    """Build the base of a rig: a table and a plinth, in the gym a post."""
     above = z - room.floor_m
     if name == "gym":
         room.cylinder((x - 0.05, y, 0.0), 0.09, above + FLOOR_M, (60, 62, 70))

@@ -1,4 +1,4 @@
-"""Pictures that rooms are covered with, painted by the program: wood, cloth, books, a view.
+"""Pictures for the surfaces of rooms, painted by the program: wood, cloth, books, a view.
 
 Each is (rows, columns, 3) in red, green, blue, 0..255, the first row at the top.
 """
@@ -18,7 +18,7 @@ Image = NDArray[np.uint8]
 
 
 class _Sheet(NamedTuple):
-    """A picture in the making: x and y in 0..1 from the left and the top."""
+    """A picture under construction: x and y in 0..1 from the left and the top."""
 
     rgb: Floats
     x: Floats
@@ -32,7 +32,7 @@ def _sheet(rows: int, columns: int, colour: Colour) -> _Sheet:
 
 
 def _noise(rows: int, columns: int, cells: tuple[int, int], seed: int) -> Floats:
-    """Return smooth noise about 0, of standard deviation 1, that many cells high and wide."""
+    """Return smooth noise with mean 0, standard deviation 1 and ``cells`` rows and columns."""
     rng = np.random.default_rng(seed)
     coarse = rng.normal(size=cells).astype(np.float32)
     return np.asarray(cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC), float)
@@ -203,7 +203,7 @@ PICTURES: Mapping[str, Callable[[], Floats]] = {
     "poster": _poster,
     "tiles": _tiles,
 }
-"""What can be painted, by name."""
+"""The painters of all pictures, by name."""
 
 
 @lru_cache(maxsize=len(PICTURES))

@@ -24,7 +24,7 @@ def yaw_pitch_roll(yaw: Floats, pitch: Floats, roll: Floats | float = 0.0) -> Fl
     return out
 
 
-def turned(R: Floats, v: Floats) -> Floats:
+def rotate(R: Floats, v: Floats) -> Floats:
     """Return vectors (n, 3) or one (3,) turned by rotations (n, 3, 3)."""
     return np.asarray((R @ np.asarray(v)[..., None])[..., 0])
 
@@ -39,8 +39,8 @@ def dot(a: Floats, b: Floats) -> Floats:
     return np.asarray((a * b).sum(axis=-1, keepdims=True))
 
 
-def directed(z: Floats, x_wanted: Floats) -> Floats:
-    """Return rotations whose z axis is given and whose x axis is as near to another as can be."""
+def axes_along(z: Floats, x_wanted: Floats) -> Floats:
+    """Return rotations with the given z axis and an x axis as near as possible to another."""
     up = unit(z)
     ahead = unit(x_wanted - dot(x_wanted, up) * up)
     return np.stack((ahead, np.cross(up, ahead), up), axis=-1)
@@ -56,13 +56,13 @@ def pitch_of(v: Floats) -> Floats:
     return np.asarray(np.arctan2(v[..., 2], np.hypot(v[..., 0], v[..., 1])))
 
 
-def wrapped(angle: Floats) -> Floats:
+def wrap_angle(angle: Floats) -> Floats:
     """Return angles in -pi..pi."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def within(v: Floats, axis: Floats, most_rad: float) -> Floats:
-    """Return directions, turned towards an axis where they are farther from it than an angle."""
+def limit_angle(v: Floats, axis: Floats, most_rad: float) -> Floats:
+    """Return directions, turned towards an axis if they are farther from it than an angle."""
     aside = v - dot(v, axis) * axis
     angle = np.arctan2(np.linalg.norm(aside, axis=-1, keepdims=True), dot(v, axis))
     kept = np.minimum(angle, most_rad)
@@ -71,9 +71,9 @@ def within(v: Floats, axis: Floats, most_rad: float) -> Floats:
 
 def quaternions(R: Floats) -> Floats:
     """Return rotations (n, 3, 3) as quaternions (n, 4), w first, of one sign over time."""
-    from scipy.spatial.transform import Rotation  # 24 MB, where nothing is computed
+    from scipy.spatial.transform import Rotation  # 24 MB, not needed without motion
 
-    # SciPy 1.17 need not look whether these are rotations, which takes 6/7 of the time.
+    # SciPy 1.17 can skip the check for rotations, which takes 6/7 of the time.
     known = "assume_valid" in signature(Rotation.from_matrix).parameters
     sure = {"assume_valid": True} if known else {}
     q = Rotation.from_matrix(R, **sure).as_quat(scalar_first=True)
@@ -97,11 +97,11 @@ def rotation_matrix(quat: Floats) -> Floats:
 def two_bones(
     start: Floats, end: Floats, upper_m: float, lower_m: float, pole: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the joint between two bones, the end that they reach, and their plane's normal.
+    """Return the joint between two bones, the end that they reach, and the normal of their plane.
 
     Args:
-        start: where the upper bone begins (n, 3).
-        end: where the lower one should end; nearer or farther than they reach is brought back.
+        start: upper end of the upper bone (n, 3).
+        end: wanted end of the lower one (n, 3); moved into the reach of the bones.
         upper_m: length of the upper bone.
         lower_m: length of the lower one.
         pole: direction in which the joint between them points (n, 3).

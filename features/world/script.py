@@ -1,7 +1,7 @@
-"""The script of a world: which room, who is in it, and what each of them does when.
+"""The script of a world: its room, its people, and their acts over time.
 
-Read from YAML by the configuration's loader (worlds/*.yaml are shipped). A script repeats
-after every round: who is in it ends the round where it was begun.
+The configuration's loader reads it from YAML (worlds/*.yaml are shipped). A script repeats after
+every round, so every person must end the round at its starting place.
 
 Place frame: the world's, with the neck base of the (first) head as its origin, on the floor.
 """
@@ -35,13 +35,13 @@ Do = Literal[
     "feint",
     "open_guard",
 ]
-"""What a person can do."""
+"""The acts of a person."""
 
 RoomName = Literal["living-room", "gym", "hall"]
-"""The rooms there are (gazerig.features.world.room)."""
+"""The rooms (gazerig.features.world.room)."""
 
 HEAD = "head"
-"""What a script calls the robot's head."""
+"""Name of the robot's head in a script."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class PlaceScript:
 
 @dataclass(frozen=True)
 class HeadScript:
-    """Another head in the same world, which a robot of its own leads."""
+    """Another head in the same world, controlled by its own robot."""
 
     # fmt: off
     rig: Annotated[str, "name or file of its rig; empty: that of the first head"] = ""
@@ -112,7 +112,7 @@ class HeadScript:
 
 @dataclass(frozen=True)
 class LightParams:
-    """How bright the room is."""
+    """Brightness of the room."""
 
     # fmt: off
     ambient: Annotated[float, Bounds(0, 1), "light that comes from everywhere"] = 0.5

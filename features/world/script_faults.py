@@ -1,30 +1,30 @@
-"""What keeps a script from being played: each fault with its key, what is wrong and the cure."""
+"""Faults that prevent a script from being played: each with its key, the fault and the cure."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import hypot
 
-from gazerig.features.world.handed_over import passing_faults
+from gazerig.features.world.object_handover import handover_faults
 from gazerig.features.world.room import Place, places_of
 from gazerig.features.world.script import HEAD, Act, Fault, PersonScript, WorldScript
 from gazerig.features.world.timeline import (
     NEEDS_TARGET,
     WALKS_TO_PLACES,
     TimedAct,
-    timed,
+    timed_acts,
 )
 
 HEADS_APART_M = 0.4
-"""Necks nearer to each other would run into each other."""
+"""Smallest distance of two necks."""
 
 
 def faults(script: WorldScript) -> Iterable[Fault]:
-    """Yield what keeps a script from being played, each with its key."""
+    """Yield the faults of a script, each with its key."""
     yield from _misplaced_heads(script)
     yield from _unknown(script)
     if next(iter(_unknown(script)), None) is not None:
         return
-    timelines = {name: timed(script, name, 0) for name in script.people}
-    yield from passing_faults(script, timelines)
+    timelines = {name: timed_acts(script, name, 0) for name in script.people}
+    yield from handover_faults(script, timelines)
     for name, person in script.people.items():
         yield from _overlaps(script, name, timelines[name])
         yield from _legs(script, name, person)
@@ -32,12 +32,12 @@ def faults(script: WorldScript) -> Iterable[Fault]:
 
 
 def _misplaced_heads(script: WorldScript) -> Iterator[Fault]:
-    """Find heads that cannot be where they are said to be."""
+    """Find heads with an invalid name or too close to another."""
     placed = [("", 0.0, 0.0)]
     for name, head in script.heads.items():
         key = f"heads.{name}"
         if not name.isidentifier() or name == HEAD or name in script.people:
-            yield key, "a name is letters, digits and _, a letter first, and nobody else's"
+            yield key, "a name has letters, digits and _, begins with a letter and is unique"
         for other, x_m, y_m in placed:
             if hypot(head.x_m - x_m, head.y_m - y_m) < HEADS_APART_M:
                 beside = f"head {other}" if other else "the first head"
@@ -53,7 +53,7 @@ def _unknown(script: WorldScript) -> Iterator[Fault]:
     for name, person in script.people.items():
         key = f"people.{name}"
         if not name.isidentifier() or name == HEAD:
-            yield key, "a name is letters, digits and _, a letter first, and not head"
+            yield key, "a name has letters, digits and _, begins with a letter and is not head"
         if person.start not in places:
             yield f"{key}.start", f"{script.room} has no place {person.start!r}; it has {seats}"
         targets = {HEAD, *script.people, *places}
@@ -89,7 +89,7 @@ def _unknown_of(
 
 
 def _overlaps(script: WorldScript, name: str, acts: tuple[TimedAct, ...]) -> Iterator[Fault]:
-    """Find acts on one track at once, and those that last beyond the round."""
+    """Find simultaneous acts on one track, and acts that last beyond the round."""
     busy: dict[str, tuple[float, int]] = {}
     for i, one in enumerate(acts):
         key, spare_s = f"people.{name}.acts.{i}", one.act.vary_s
@@ -113,7 +113,7 @@ def _overlaps(script: WorldScript, name: str, acts: tuple[TimedAct, ...]) -> Ite
 
 
 def _legs(script: WorldScript, name: str, person: PersonScript) -> Iterator[Fault]:
-    """Find who walks while seated, sits where no seat is, or ends a round elsewhere."""
+    """Find a walk of a seated person, a sitting without a seat, or an end of round elsewhere."""
     places = places_of(script)
     at = person.start
     seated = places[at].seat_m is not None
@@ -121,19 +121,19 @@ def _legs(script: WorldScript, name: str, person: PersonScript) -> Iterator[Faul
         key = f"people.{name}.acts.{i}.do"
         if act.do in ("walk", "step", "turn"):
             if seated:
-                yield key, f"a {act.do} of one who sits on {at}; let the person stand up before it"
+                yield key, f"the person is seated on {at}; add `stand` before {act.do}"
             if act.do != "turn":
                 at = act.to or "away"
             seated = False
         elif act.do == "sit":
             if seated:
-                yield key, f"sits on {at} already"
+                yield key, f"is already seated on {at}"
             elif at not in places or places[at].seat_m is None:
                 yield key, f"there is no seat at {at}; walk to one before it"
             seated = True
         elif act.do == "stand":
             if not seated:
-                yield key, "stands already"
+                yield key, "is already standing"
             seated = False
     if any(act.do in ("walk", "sit", "stand") for act in person.acts) and (
         at != person.start or seated != (places[at].seat_m is not None)
@@ -146,11 +146,11 @@ def _legs(script: WorldScript, name: str, person: PersonScript) -> Iterator[Faul
 
 
 def _crowded(script: WorldScript) -> Iterator[Fault]:
-    """Find two people at one place at once."""
+    """Find two people at one place at the same time."""
     stays: dict[str, list[tuple[float, float, str, str]]] = {}
     for name, person in script.people.items():
         at, since_s, key = person.start, 0.0, f"people.{name}.start"
-        for i, one in enumerate(timed(script, name, 0)):
+        for i, one in enumerate(timed_acts(script, name, 0)):
             if one.act.do == "walk" and one.act.to != at:
                 stays.setdefault(at, []).append((since_s, one.start_s, name, key))
                 at, since_s, key = one.act.to, one.end_s, f"people.{name}.acts.{i}.to"

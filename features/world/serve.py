@@ -1,4 +1,4 @@
-"""Make the world of a server; light, so that MuJoCo is imported only here and as it needs."""
+"""Entry point of a server's world; light, so that MuJoCo is imported only on use."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +21,7 @@ def serve(folder: Path, clock_s: Callable[[], float]) -> "ServedWorld":
     Raises:
         SetupError: MuJoCo is not installed, or a user's own world cannot be used.
     """
-    import_mujoco()  # whatever MUJOCO_GL says of pictures
+    import_mujoco()  # whatever MUJOCO_GL permits
     from gazerig.features.world.served_world import ServedWorld
 
     return ServedWorld(WorldSpec.read(folder), state_file(folder), clock_s)

@@ -1,7 +1,7 @@
-"""The world of emulated buses in a process of its own: kept up to date, its state for others.
+"""The world of emulated buses in its own process: it is kept up to date and publishes its state.
 
-People stand at the beginning of their script until the first client has spoken: a program may take
-seconds to start, and nothing is to be missed of a round.
+People keep their first pose until the first client has sent something: a program may take seconds
+to start and must not miss a part of the round.
 """
 
 import json
@@ -17,19 +17,19 @@ from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.smart_servo.span import whole_ms
 
 PUBLISH_MS = 5
-"""A state is written so often; a camera sees one in six."""
+"""Period of the states; a camera uses one in six."""
 
 
 class ServedWorld:
     """The world of all buses of a server.
 
     Args:
-        spec: what it is made of.
-        state: the file in which its newest state is found.
+        spec: content of the world.
+        state: the file of its newest state.
         clock_s: the host's monotonic clock.
 
     Attributes:
-        commands: the first words of what ``obey`` carries out.
+        commands: the first words of the commands for ``obey``.
 
     Raises:
         SetupError: a user's own world cannot be used.
@@ -46,7 +46,7 @@ class ServedWorld:
         self._begun = False
 
     def joints(self) -> list[dict[str, int]]:
-        """Return for each rig where its joints stand in a state."""
+        """Return the indices of the joints of each rig in a state."""
         return [rig.qpos for rig in self.world.model.rigs]
 
     def device(self, bus: BusSettings) -> Device:
@@ -66,9 +66,9 @@ class ServedWorld:
         return max(0.0, self._due_ms / 1e3 - self._clock_s())
 
     def serve(self, heard: bool) -> None:
-        """Bring the world up to now, and write its state where it is time.
+        """Simulate the world up to now, and write its state if it is due.
 
-        heard: a client has spoken: the script of the people begins, unless it has before
+        heard: a client has sent something; the first time this begins the script of the people
         """
         now_ms = whole_ms(self._clock_s())
         if heard and not self._begun:

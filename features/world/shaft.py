@@ -1,10 +1,11 @@
-"""The shaft of an emulated servo whose mechanics are the world's: its control loop moves a joint.
+"""The shaft of an emulated servo with the mechanics of a world: its control loop moves a joint.
 
 Registers, modes, profiles and protections stay those of the servo. Each millisecond its control
-loop makes a torque of the shaft's position; what depends on the speed at the millisecond's end,
-which is D, part of P and what the turning motor induces, goes into MuJoCo's implicit step. So the
-equations are those of ``ShaftMotion``, with the world's inertia, gravity, contacts and stops.
-Left out: play between shaft and joint. The axis of a shaft is its place in MuJoCo's arrays.
+loop computes a torque from the shaft's position. The part that depends on the speed at the end of
+the millisecond (D, part of P and the induced voltage of the motor) goes into MuJoCo's implicit
+step. So the equations are those of ``ShaftMotion``, with the world's inertia, gravity, contacts
+and stops. Left out: play between shaft and joint. The axis of a shaft is its index in MuJoCo's
+arrays.
 """
 
 from collections.abc import Sequence
@@ -31,12 +32,12 @@ JAM_NM = 20.0
 """Dry friction of a jammed joint."""
 
 SPEED_UNIT = STEPS_PER_RAD * MS_S
-"""Steps/ms of a radian a second."""
+"""Steps/ms for one rad/s."""
 
 
 Effort = tuple[float, float, float, float]
-"""What an actuator does in the next millisecond: a torque and a gain on the shaft's speed, whose
-sum acts within a lowest and a highest torque; Nm, and Nm a rad/s."""
+"""Effort of an actuator in the next millisecond: a torque and a gain on the shaft's speed, then the
+lowest and highest value of their sum; Nm, and Nm per rad/s."""
 LIMP: Effort = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -48,13 +49,13 @@ class ShaftAxis:
     Args:
         mj: mujoco.MjModel.
         data: mujoco.MjData.
-        rig: whose servo it is.
-        servo: which one.
+        rig: rig of the servo.
+        servo: the servo.
 
     Attributes:
         actuator: its number in the model.
-        zero, slope: its position at joint angle 0 and the steps a radian, of a servo that turns
-            one joint by a straight gear; slope is None where that depends on the joints' angles.
+        zero, slope: its position at joint angle 0 and the steps per radian, for a linear
+            transmission to one joint; slope is None if it depends on the joints' angles.
         qpos, dof: of its first joint.
     """
 
@@ -68,8 +69,8 @@ class ShaftAxis:
         self._unit = STEPS_PER_TURN / servo.steps_per_turn
         self._load_nm = self._friction_nm = 0.0
         self._applied_nm = [0.0] * len(self._dof)
-        _, self._slopes = servo.gearing.at(self._angles(data.qpos))
-        line = servo.gearing.line
+        _, self._slopes = servo.transmission.at(self._angles(data.qpos))
+        line = servo.transmission.line
         self.slope = None if line is None else self._unit * line.slope
         self.zero = 0.0 if line is None else self._unit * line.zero
         self.qpos, self.dof = self._qpos[0], self._dof[0]
@@ -80,8 +81,8 @@ class ShaftAxis:
     # --- every millisecond
 
     def motion(self, qpos: Sequence[float], qvel: Sequence[float]) -> tuple[float, float]:
-        """Return position in steps and speed in steps a second, where the gear is not straight."""
-        steps, slopes = self._servo.gearing.at([qpos[at] for at in self._qpos])
+        """Return position in steps and speed in steps a second of a nonlinear transmission."""
+        steps, slopes = self._servo.transmission.at([qpos[at] for at in self._qpos])
         if slopes != self._slopes:
             self._slopes = slopes
             self._turn_with_joints()
@@ -89,7 +90,7 @@ class ShaftAxis:
         return self._unit * steps, self._unit * speed
 
     def _turn_with_joints(self) -> None:
-        """Let the tendon turn with the joints as the gear does where they are now."""
+        """Set the tendon's coefficients to the transmission's current slopes."""
         rad = shaft_rad_of(self._servo.steps_per_turn)
         for nth, slope in enumerate(self._slopes):
             self._mj.wrap_prm[self._wrap + nth] = rad * slope
@@ -99,8 +100,8 @@ class ShaftAxis:
     # --- on demand
 
     def position(self) -> float:
-        """Return where the shaft is, in steps."""
-        return self._unit * self._servo.gearing.at(self._angles(self._data.qpos))[0]
+        """Return the position of the shaft, in steps."""
+        return self._unit * self._servo.transmission.at(self._angles(self._data.qpos))[0]
 
     def turn(self, steps: float) -> None:
         """Turn the shaft by hand, as far as its joints' stops allow.
@@ -114,12 +115,12 @@ class ShaftAxis:
             self._data.qpos[at] = min(max(angle, low), high)
 
     def build(self, rotor_kg_m2: float, friction_nm: float, viscous_nm_s: float) -> None:
-        """Set what a servo's motor and gear have at its shaft.
+        """Set the properties of a servo's motor and gear at its shaft.
 
         Args:
             rotor_kg_m2: inertia of the rotor behind its gear.
             friction_nm: dry friction.
-            viscous_nm_s: torque a rad/s that friction takes beside it.
+            viscous_nm_s: viscous friction, torque per rad/s.
         """
         self._mj.tendon_armature[self._tendon] = rotor_kg_m2
         self._friction_nm = friction_nm
@@ -127,11 +128,11 @@ class ShaftAxis:
         self.damp(viscous_nm_s)
 
     def damp(self, nm_s: float) -> None:
-        """Set the torque that each rad/s of the shaft takes."""
+        """Set the damping torque per rad/s of the shaft."""
         self._mj.tendon_damping[self._tendon] = nm_s
 
     def jam(self, stuck: bool) -> None:
-        """Jam the shaft where it is, or free it."""
+        """Jam the shaft at its position, or free it."""
         self._mj.tendon_frictionloss[self._tendon] = JAM_NM if stuck else self._friction_nm
 
     def load(self, nm: float) -> None:
@@ -140,7 +141,7 @@ class ShaftAxis:
         self._apply_load()
 
     def _apply_load(self) -> None:
-        """Apply the load to the joints; another servo's load may act on them, too."""
+        """Apply the load to the joints, on which another servo's load may act, too."""
         rad = shaft_rad_of(self._servo.steps_per_turn)
         before, self._applied_nm = self._applied_nm, [self._load_nm * rad * s for s in self._slopes]
         for at, now, earlier in zip(self._dof, self._applied_nm, before, strict=True):
@@ -148,7 +149,7 @@ class ShaftAxis:
 
 
 class WorldShaft(Shaft):
-    """A shaft whose position and speed are the world's.
+    """A shaft with position and speed from the world.
 
     Args:
         model: motor and gear.
@@ -183,12 +184,12 @@ class WorldShaft(Shaft):
     # --- from outside
 
     def resume(self) -> None:
-        """Go on; the world does so by itself."""
+        """Continue; the world moves the shaft."""
         self.quiet = True
         self._since_ms = 0
 
     def place(self, position_steps: float) -> None:
-        """Set the shaft to where the world has it, whatever position is given."""
+        """Set the shaft to its position in the world, whatever position is given."""
         self.x = self.joint = self.axis.position()
         self.v = self._rv = self.u = self.effort = self._integral = 0.0
         if isinstance(self.profile, PositionProfile):
@@ -201,7 +202,7 @@ class WorldShaft(Shaft):
         self.x = self.joint = self.axis.position()
 
     def jam(self, stuck: bool) -> None:
-        """Jam the shaft where it is, or free it."""
+        """Jam the shaft at its position, or free it."""
         self.axis.jam(stuck)
 
     def set_load(self, share: float) -> None:
@@ -224,15 +225,15 @@ class WorldShaft(Shaft):
             self._brake()
 
     def _brake(self) -> None:
-        """Let the motor brake with what it induces, unless it is off or its torque is limited."""
-        # A torque limit counts that torque in, so it is then a part of the effort.
+        """Let the motor brake with its induced torque, unless it is off or has a torque limit."""
+        # A torque limit includes that torque, which is then a part of the effort.
         braked = self._loop.torque_max == inf
         self.axis.damp(self._free_nm_s + (self._induced_nm_s if braked else 0.0))
 
     # --- from the world, every millisecond
 
     def command(self) -> Effort:
-        """Let the control loop have one millisecond; return what the motor does in it."""
+        """Run the control loop for one millisecond; return the effort of the motor in it."""
         if self._off:
             return LIMP
         kp, _, kd, _, f1, f2, bias, most, torque_max, slew = self._loop
@@ -264,7 +265,7 @@ class WorldShaft(Shaft):
     def _within(
         self, torque_max: float, torque: float, gain: float, low: float, high: float
     ) -> Effort:
-        """Limit a torque in which what the motor induces counts."""
+        """Limit a torque that includes the motor's induced torque."""
         most = self._stall_nm * torque_max
         induced = self._induced_nm_s * self.v / SPEED_UNIT
         low, high = max(-most, low - induced), min(most, high - induced)
@@ -275,7 +276,7 @@ class WorldShaft(Shaft):
         return r - self.x
 
     def sense(self, x: float, v: float) -> None:
-        """Set position (steps) and speed (steps/ms) to what the world has made of them."""
+        """Set position (steps) and speed (steps/ms) to the results of the world."""
         if -SLOWEST < v < SLOWEST:
             v = 0.0
         self.x = self.joint = x
@@ -303,7 +304,7 @@ class WorldShaft(Shaft):
         self.u, self.effort = u, t
 
     def _sum_up(self, loop: Loop, v: float) -> None:
-        """Let the I part go on."""
+        """Update the integral part."""
         i, error = self._integral, self.profile.r - self.x
         if loop.vi:
             i += loop.vi * (self._rv - v)

@@ -1,6 +1,6 @@
-"""How a world looks, for a process that draws it: every geom of its model, and people's segments.
+"""The shapes of a world for a process that draws it: geoms of its model and people's segments.
 
-MuJoCo is loaded where the shapes are made, not where they are sent from.
+MuJoCo is loaded in the process that creates the shapes, not in the sender.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,15 +18,15 @@ from gazerig.robot.model.quaternion import Quaternion
 _SKIN = ("head", "neck", "lips", "left_hand", "right_hand", "left_lid", "right_lid")
 
 _FINENESS = 0.6
-"""People on the page stand farther off than before the rig's camera."""
+"""People on the page are farther away than those before the rig's camera."""
 
 
 class SpecShapes(NamedTuple):
-    """The shapes of a world without its first rig, which is drawn as it was measured.
+    """The shapes of a world without its first rig, which the page draws from measurements.
 
-    spec: its rigs are places only
-    rig_joints: bodies of a user's world that one of these turns are the rig's
-    others: the other heads in it, None where they are not shown
+    spec: with rigs that are only places
+    rig_joints: a body of a user's world at one of these joints belongs to the rig
+    others: the other heads in it, None if they are not shown
     """
 
     spec: WorldSpec
@@ -53,7 +53,7 @@ class SpecShapes(NamedTuple):
         )
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
-        """Return where all that moves is; see ``WorldShapes.poses``."""
+        """Return the poses of all moving parts; see ``WorldShapes.poses``."""
         figures = self.spec.figures
         heads = {} if self.others is None else self.others.poses()
         if figures is None:
@@ -69,7 +69,7 @@ def shapes_of(spec: WorldSpec, others: OtherHeads | None = None) -> SpecShapes:
 
     Args:
         spec: of the world, with its rigs.
-        others: all of its rigs but the first, None where they are not shown.
+        others: all of its rigs but the first, None if they are not shown.
     """
     joints = {rig.prefix + name for rig in spec.rigs for name in rig.stops_rad}
     places = tuple(_place(rig) for rig in spec.rigs)
@@ -94,7 +94,7 @@ def script_shapes(figures: Figures) -> SpecShapes:
 
 
 def _place(rig: RigInWorld) -> RigInWorld:
-    """Return a rig of which nothing is left but where it stands."""
+    """Return a rig reduced to its pose."""
     return RigInWorld(_no_body, {}, {}, (), rig.prefix, rig.p_m, rig.yaw_rad)
 
 

@@ -1,4 +1,4 @@
-"""How a world looks as from the neck base of another rig than the first."""
+"""The shapes of a world in the frame of the neck base of a rig other than the first."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from gazerig.robot.model.quaternion import Quaternion, quaternion
 
 
 class ShapesFrom(NamedTuple):
-    """The shapes of a world, all places of which are as from a rig.
+    """The shapes of a world in the frame of a rig.
 
     Attributes:
         shapes: in the world's own frame.
@@ -26,11 +26,11 @@ class ShapesFrom(NamedTuple):
     frame: RigFrame
 
     def parts(self) -> Sequence[WorldPart]:
-        """Return everything that is to be seen; see ``WorldShapes.parts``."""
+        """Return all visible parts; see ``WorldShapes.parts``."""
         return tuple(part if part.moves else self._turned(part) for part in self.shapes.parts())
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
-        """Return where all that moves is; see ``WorldShapes.poses``."""
+        """Return the poses of all moving parts; see ``WorldShapes.poses``."""
         back = np.array(self.frame.R).T
         found = {}
         for name, (turn, p_m) in self.shapes.poses(world_s).items():
@@ -39,7 +39,7 @@ class ShapesFrom(NamedTuple):
         return found
 
     def _turned(self, part: WorldPart) -> WorldPart:
-        """Return a part that stands still where it is as from the rig."""
+        """Return a static part in the frame of the rig."""
         R, p_m, shape = np.array(self.frame.R), np.array(self.frame.p_m), part.shape
         if isinstance(shape, TexturedMesh):
             return part._replace(

@@ -1,4 +1,4 @@
-"""Where the shipped worlds are; light, as the options of the command line name them."""
+"""Folder of the shipped worlds; a light module, because the command line's options list them."""
 
 from pathlib import Path
 

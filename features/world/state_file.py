@@ -1,8 +1,8 @@
-"""The newest state of a world, from the process that computes it to those that look at it.
+"""The newest state of a world, from the process that computes it to its readers.
 
-A small file that both map into memory: its writer fills the older of two entries and then counts
-it, a reader looks at the count before and after. Processes find it by its path, so that one that is
-started again finds it as well; no lock can be left behind by one that was killed.
+Both sides map a small file into memory. The writer fills the older of two entries and then
+increments a count; a reader reads the count before and after. Processes find the file by its path,
+so a restarted process finds it as well, and a killed process cannot leave a lock behind.
 """
 
 import mmap
@@ -14,16 +14,16 @@ import numpy as np
 
 from gazerig.gaze.types import Floats
 
-_HEADER = 3  # count of states, numbers in a state, host's time at which the world's began
+_HEADER = 3  # count of states, numbers in a state, host's time at the start of the world
 
 
 class HostState(NamedTuple):
-    """State of a world and when it was so.
+    """State of a world and its time.
 
     Attributes:
-        host_s: the host's monotonic clock.
+        host_s: time of the host's monotonic clock.
         t_s: the world's own time, seconds from its beginning.
-        qpos: every coordinate of its joints, as MuJoCo orders them.
+        qpos: all coordinates of its joints, in MuJoCo's order.
     """
 
     host_s: float
@@ -35,8 +35,8 @@ class StateWriter:
     """The one process that writes states.
 
     Args:
-        path: the file, which is made.
-        size: how many coordinates a state has.
+        path: the file to create.
+        size: number of coordinates in a state.
     """
 
     def __init__(self, path: Path, size: int) -> None:
@@ -55,13 +55,13 @@ class StateWriter:
 
 
 class StateReader:
-    """Reads the newest state; the file must have been made.
+    """Reads the newest state; the file must exist.
 
     Args:
         path: of the file.
 
     Raises:
-        OSError: it is not there.
+        OSError: there is no such file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -72,26 +72,26 @@ class StateReader:
 
     @property
     def count(self) -> int:
-        """Return how many states have been written."""
+        """Return the number of written states."""
         return int(self._numbers[0])
 
     @property
     def begin_s(self) -> float | None:
-        """Return the host's time at which the world's own began, None before the first state."""
+        """Return the host's time at the start of the world, None before the first state."""
         return float(self._numbers[2]) if self.count else None
 
     def newest(self) -> HostState | None:
         """Return the newest state, None before the first."""
         while count := self.count:
             row = self._rows[(count - 1) % 2].copy()
-            # Whoever was overtaken by two states meanwhile may have copied of both.
+            # If two states were written meanwhile, the copy may mix both.
             if self.count <= count:
                 return HostState(float(row[0]), float(row[1]), row[2:])
         return None
 
 
 def _mapped(path: Path, size: int) -> Floats:
-    """Return the numbers of a new file for states of so many coordinates."""
+    """Return the numbers of a new file for states of ``size`` coordinates."""
     length = _HEADER + 2 * (size + 2)
     with path.open("xb+") as file:
         file.truncate(8 * length)

@@ -1,4 +1,4 @@
-"""How a motion goes over time, for whole arrays of times: from 0 to 1, there and back."""
+"""Time profiles of motions, for whole arrays of times: from 0 to 1, there and back."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from gazerig.gaze.types import Floats
 
 
 def rise(share: Floats) -> Floats:
-    """Return a minimum-jerk path from 0 to 1 for shares of its time, held before and after."""
+    """Return a minimum-jerk path from 0 to 1 for shares of its time, constant before and after."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(s * s * s * (10.0 + s * (6.0 * s - 15.0)))
 
@@ -16,7 +16,7 @@ def rise(share: Floats) -> Floats:
 def there_and_back(
     t_s: Floats, start_s: float, out_s: float, hold_s: float, back_s: float
 ) -> Floats:
-    """Return 0, smoothly up to 1 within ``out_s`` of the start, held, and smoothly down again."""
+    """Return 0, a smooth rise to 1 within ``out_s`` of the start, a hold, and a smooth fall."""
     down_s = start_s + out_s + hold_s
     return np.asarray(rise((t_s - start_s) / out_s) - rise((t_s - down_s) / back_s))
 
@@ -27,8 +27,8 @@ def hump(share: Floats) -> Floats:
     return np.asarray(16.0 * s * s * (1.0 - s) ** 2)
 
 
-def smoothed(values: Floats, width: int) -> Floats:
-    """Return a row a time, averaged over ``width`` rows with a bell's weights; ends are held."""
+def smooth(values: Floats, width: int) -> Floats:
+    """Return averages over ``width`` rows with bell-shaped weights; the end values are repeated."""
     if width < 2:
         return values
     bell = np.hanning(width + 2)[1:-1]
@@ -42,8 +42,8 @@ def smoothed(values: Floats, width: int) -> Floats:
     return np.asarray(out.reshape(values.shape))
 
 
-def blended(before: Floats, after: Floats, share: Floats) -> Floats:
-    """Return rows between two, by a share a row."""
+def blend(before: Floats, after: Floats, share: Floats) -> Floats:
+    """Return rows between two, with a share per row."""
     part = share.reshape(-1, *([1] * (max(before.ndim, after.ndim) - 1)))
     return np.asarray(before + part * (after - before))
 
@@ -51,7 +51,7 @@ def blended(before: Floats, after: Floats, share: Floats) -> Floats:
 def periodic(
     t_s: Floats, round_s: float, rates_hz: Sequence[float], phases: Sequence[float]
 ) -> Floats:
-    """Return a sum of sines that repeats after the round, whose rates are moved to fit it."""
+    """Return a sum of sines that repeats after the round; rates are rounded to fit it."""
     total = np.zeros_like(t_s)
     for rate_hz, phase in zip(rates_hz, phases, strict=True):
         turns = max(1, round(rate_hz * round_s))

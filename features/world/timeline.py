@@ -1,7 +1,7 @@
-"""A script's acts with their true beginnings and ends.
+"""A script's acts with their true start and end times.
 
-What a person does is on tracks: legs, mouth, head, eyes, left arm, right arm. Acts on one track
-follow each other; those on different ones may be done at once.
+The acts of a person are on tracks: legs, mouth, head, eyes, left arm, right arm. Acts on one track
+follow each other; acts on different tracks may overlap.
 """
 
 from collections.abc import Mapping
@@ -9,12 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.features.world.room import Place, places_for, places_of, standing, walk_s, way_points
+from gazerig.features.world.room import (
+    Place,
+    places_for,
+    places_of,
+    standing_point,
+    walk_s,
+    way_points,
+)
 from gazerig.features.world.script import HEAD, Act, WorldScript
 from gazerig.gaze.types import Vec3
 
 HEAD_M: Vec3 = (0.05, 0.0, 0.125)
-"""Where people look who look at the robot: between the eyes of a head on its neck base."""
+"""Gaze target of people who look at the robot: between the eyes of a head on its neck base."""
 
 _ARMS = ("left arm", "right arm")
 TRACKS: Mapping[str, tuple[str, ...]] = {
@@ -32,7 +39,7 @@ TRACKS: Mapping[str, tuple[str, ...]] = {
     "open_guard": _ARMS,
     "gesture": _ARMS,
 }
-"""The tracks that an act is on; what is not here is on the arm of its side."""
+"""The tracks of an act; an act that is not listed is on the arm of its side."""
 LASTS_S: Mapping[str, float] = {
     "step": 0.9,
     "turn": 1.2,
@@ -53,13 +60,13 @@ LASTS_S: Mapping[str, float] = {
     "feint": 0.3,
     "open_guard": 1.4,
 }
-"""How long an act takes if the script does not say; a walk's length follows from its way."""
+"""Default durations of acts; the duration of a walk follows from its path."""
 NEEDS_TARGET = ("walk", "turn", "look_at", "point", "reach", "push", "pass", "punch")
 WALKS_TO_PLACES = ("walk", "step")
 
 
 class TimedAct(NamedTuple):
-    """An act with its beginning and end; ``target``: of a place or the robot, None of a person."""
+    """An act with its start and end; ``target``: a fixed point, None for a person."""
 
     act: Act
     start_s: float
@@ -68,7 +75,7 @@ class TimedAct(NamedTuple):
 
     @property
     def tracks(self) -> tuple[str, ...]:
-        """Return the tracks that it is on."""
+        """Return the tracks of the act."""
         return TRACKS.get(self.act.do, (f"{self.act.side} arm",))
 
 
@@ -77,8 +84,8 @@ def floor_m(script: WorldScript) -> float:
     return -script.neck_height_m
 
 
-def timed(script: WorldScript, name: str, seed: int) -> tuple[TimedAct, ...]:
-    """Return the acts of a person, in the script's order, moved by the seed where they may be."""
+def timed_acts(script: WorldScript, name: str, seed: int) -> tuple[TimedAct, ...]:
+    """Return the acts of a person, in the script's order, with random times from the seed."""
     person = script.people[name]
     rng = np.random.default_rng([seed, list(script.people).index(name)])
     places = places_for(script, name)
@@ -101,14 +108,14 @@ def _lasts_s(script: WorldScript, act: Act, at: Place, places: Mapping[str, Plac
         return act.for_s
     if act.do == "walk":
         via = [places[name] for name in act.via]
-        return walk_s(way_points(at, places[act.to], via, standing(at)), act.speed_m_s)
+        return walk_s(way_points(at, places[act.to], via, standing_point(at)), act.speed_m_s)
     if act.do == "guard":
         return script.round_s - act.at_s
     return LASTS_S[act.do]
 
 
 def _target(script: WorldScript, act: Act) -> Vec3 | None:
-    """Return where an act is directed, None for a person or nothing."""
+    """Return the fixed target of an act, None for a person."""
     if act.to in ("", HEAD):
         return HEAD_M
     if act.to in script.people:

@@ -1,4 +1,4 @@
-"""A world as a scene: who is where, for the score, the true gaze and detectors without pictures."""
+"""A world as a scene: its people, for the score, the true gaze and detectors without pictures."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -16,9 +16,9 @@ from gazerig.sim_mock.scenes.boxing import HALF_FIELD_RAD
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 GLOVE_M, HAND_M, THING_M = 0.078, 0.07, 0.05
-"""Radii of what can be looked at."""
+"""Radii of the gaze targets."""
 _RAISED_M = 0.50
-"""A hand is raised that is at most this far below the nose."""
+"""A raised hand is at most this far below the nose."""
 _GLOVE_MIDDLE_M = 0.09
 _SPIN_WITHIN_S = 0.01
 _RETURN_S = 1.3
@@ -44,11 +44,11 @@ class WorldScene:
         return type(self), (self.name, self.figures)
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return all people, in the script's order: the tip of the nose, its way, a raised hand."""
+        """Return all people in the script's order: tip of nose, face direction, raised hand."""
         return tuple(self._person(name, t_s) for name in self.figures.script.people)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return boxing gloves, second raised hands, and what people hold."""
+        """Return boxing gloves, second raised hands, and held things."""
         found = []
         script = self.figures.script
         for number, (name, person) in enumerate(script.people.items()):
@@ -72,7 +72,7 @@ class WorldScene:
         return tuple(found)
 
     def events(self) -> tuple[Event, ...]:
-        """Return what happens in a round and what a person's gaze does about it."""
+        """Return the events of a round and the expected response of a person's gaze."""
         return self._events
 
     @cached_property
@@ -88,7 +88,7 @@ class WorldScene:
         return tuple(sorted(found, key=lambda event: event.start_s))
 
     def _of_act(self, name: str, one: TimedAct) -> Iterator[Event]:
-        """Yield the events of an act that the robot sees before it."""
+        """Yield the events of an act that is visible to the robot."""
         do, start_s, end_s = one.act.do, one.start_s, one.end_s
         middle_s = 0.5 * (start_s + end_s)
         boxes = self.figures.script.people[name].gloves
@@ -112,7 +112,7 @@ class WorldScene:
             yield Event("speak", "look", "face", start_s, end_s, face, 0.5)
 
     def _reach(self, name: str, one: TimedAct) -> Iterator[Event]:
-        """Ask for a hand that reaches out while a camera that looks straight ahead sees it."""
+        """Expect a look at a reaching hand while it is in view of a camera that points ahead."""
         inside = [
             t_s
             for t_s in np.arange(one.start_s, one.end_s, 0.01).tolist()
@@ -123,12 +123,12 @@ class WorldScene:
             yield Event("reach", "look", "hand", inside[0], inside[-1], hand, 0.25)
 
     def _before_head(self, p_m: Vec3) -> bool:
-        """Return whether a place is within the field of a camera that looks straight ahead."""
+        """Return whether a point is in the field of view of a camera that points ahead."""
         x, y, z = np.subtract(p_m, HEAD_M).tolist()
         return bool(x > 0.0 and abs(atan2(y, x)) < HALF_FIELD_RAD and z > -0.35 * x)
 
     def _quiet(self, name: str, events: list[Event]) -> list[Event]:
-        """Ask for a boxer's face wherever nothing else happens for a while."""
+        """Expect a look at a boxer's face during longer times without other events."""
         quiet, free_s = [], 0.0
         busy = sorted((event.start_s, event.end_s) for event in events)
         for start_s, end_s in (*busy, (self.round_s, self.round_s)):
@@ -167,8 +167,8 @@ class WorldScene:
         return ScenePerson(nose, (atan2(y, x), atan2(z, hypot(x, y))), hand)
 
     def _spin(self, segment: str, middle: Vec3, t_s: float) -> float:
-        """Return the speed of turning about the line of sight, clockwise seen from the robot."""
-        from scipy.spatial.transform import Rotation  # 24 MB, where no hand is looked at
+        """Return the rotation rate about the line of sight, clockwise as seen from the robot."""
+        from scipy.spatial.transform import Rotation  # 24 MB, only needed for hands
 
         before, after = (self._R(segment, t_s + s) for s in (-_SPIN_WITHIN_S, _SPIN_WITHIN_S))
         turn = Rotation.from_matrix(after @ before.T).as_rotvec() / (2.0 * _SPIN_WITHIN_S)

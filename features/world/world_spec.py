@@ -1,4 +1,4 @@
-"""What a world is made of, as plain data that can be sent to another process."""
+"""The content of a world as plain data that can be sent to another process."""
 
 import pickle
 from pathlib import Path
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 
 _SPEC, _STATE, _PEOPLE = "world", "state", "people.npy"
-"""Files in the folder of a server: what it is made of, where all is, the people's motion."""
+"""Files in the folder of a server: content of the world, newest state, people's motion."""
 
 
 class WorldSpec(NamedTuple):
     """A room, its people and the rigs in it.
 
     Attributes:
-        figures: the people, and by their script the room; None for nobody on an empty floor.
-        rigs: the first is the one that the program leads.
+        figures: the people, and by their script the room; None for an empty floor.
+        rigs: the program controls the first one.
         mjcf_file: a user's own world instead of the room.
     """
 
@@ -30,38 +30,38 @@ class WorldSpec(NamedTuple):
     mjcf_file: Path | None = None
 
     def compiled(self) -> "WorldModel":
-        """Return it for MuJoCo; the same in every process.
+        """Compile the world for MuJoCo; the result is the same in every process.
 
         Raises:
-            SetupError: the user's file cannot be used; names the file and the remedy.
+            SetupError: the user's file cannot be used; the message names the file and the remedy.
         """
-        import_mujoco()  # whatever MUJOCO_GL says of pictures
+        import_mujoco()  # whatever MUJOCO_GL permits
         from gazerig.features.world.model import world_model
 
         return world_model(self.figures, self.rigs, self.mjcf_file)
 
     @property
     def make(self) -> str:
-        """Return how the server makes it, as of ``SentSurroundings.make``."""
+        """Return the server's factory, as of ``SentSurroundings.make``."""
         return "gazerig.features.world.serve:serve"
 
     def write(self, folder: Path) -> None:
-        """Write it for another process of this program, which has the people's motion in common."""
+        """Write it for another process of this program, which shares the people's motion."""
         (folder / _SPEC).write_bytes(pickle.dumps(self.sharing(folder)))
 
     @staticmethod
     def read(folder: Path) -> "WorldSpec":
-        """Read what ``write`` has written; never of a folder that another user can write."""
+        """Read a file of ``write``; never from a folder that another user can write."""
         found: WorldSpec = pickle.loads((folder / _SPEC).read_bytes())
         return found
 
     def sharing(self, folder: Path) -> "WorldSpec":
-        """Return the same world; its people's motion is in a file of the folder."""
+        """Return the same world with its people's motion in a file of the folder."""
         if self.figures is None:
             return self
         return self._replace(figures=self.figures.sharing(folder / _PEOPLE))
 
 
 def state_file(folder: Path) -> Path:
-    """Return the file with the newest state of a world, in the folder of its server."""
+    """Return the file of the newest state of a world, in the folder of its server."""
     return folder / _STATE

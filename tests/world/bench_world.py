@@ -151,13 +151,13 @@ def _one_person() -> "WorldPicture":
 def _played(script: WorldScript) -> "WorldPicture":
     """Return pictures of a script."""
     from gazerig.features.world.figure import Figures
-    from gazerig.features.world.figure_model import PlacedPeople
+    from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.model import world_model
     from gazerig.features.world.picture import WorldPicture
 
     figures = Figures(script, 0)
     model = world_model(figures, ()).mj
-    return WorldPicture(model, PlacedPeople(model, figures).place)
+    return WorldPicture(model, PeoplePlacer(model, figures).place)
 
 
 def faces(args: argparse.Namespace) -> None:

@@ -70,7 +70,7 @@ class PosedPeople:
     ) -> None:
         import_mujoco()
         from gazerig.features.world.figure import Figures
-        from gazerig.features.world.figure_model import PlacedPeople
+        from gazerig.features.world.figure_model import PeoplePlacer
         from gazerig.features.world.model import world_model
         from gazerig.features.world.picture import WorldPicture
 
@@ -79,7 +79,7 @@ class PosedPeople:
         light = LightParams(shadows=shadows)
         self.figures = Figures(WorldScript(people, round_s=_ROUND_S, light=light), 1)
         self.model = world_model(self.figures, ()).mj
-        self._people = PlacedPeople(self.model, self.figures)
+        self._people = PeoplePlacer(self.model, self.figures)
         self.size_px, self._noise = size_px, noise_grey
         self.lens = intrinsics_of_view(radians(69.0), *size_px)
         self._rng = np.random.default_rng(2)
@@ -281,14 +281,14 @@ def watch_motion(
         are elsewhere, and the number of pictures with a waving hand.
     """
     from gazerig.features.world.figure import Figures
-    from gazerig.features.world.figure_model import PlacedPeople
+    from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.model import world_model
     from gazerig.features.world.picture import WorldPicture
     from gazerig.features.world.world_scene import WorldScene
 
     scene = WorldScene("posed", Figures(script, 1))
     model = world_model(scene.figures, ()).mj
-    view = WorldPicture(model, PlacedPeople(model, scene.figures).place, params)
+    view = WorldPicture(model, PeoplePlacer(model, scene.figures).place, params)
 
     def head(t_s: float) -> tuple[Mat3, Vec3]:
         return rotation((turn * radians(20.0) * sin(pi * t_s), 0.0, 0.0)), (0.0, 0.0, 0.0)

@@ -13,9 +13,9 @@ pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.
 from command_line import invoked
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world.run.first_world import what_it_needs
-from gazerig.features.world.run.head_group import Following, compose_group, has_other_heads
-from gazerig.features.world.run.kept_time import fell_behind
+from gazerig.features.world.run.deadline_stats import overload_message
+from gazerig.features.world.run.first_world import missing_requirement
+from gazerig.features.world.run.head_group import LinkedInterrupts, compose_group, has_other_heads
 from gazerig.features.world.run.lockstep import Lockstep
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.options import RunOptions
@@ -49,7 +49,7 @@ def test_two_heads_look_at_each_other_and_the_same_seed_gives_the_same_bytes() -
 
 
 def test_each_finds_the_face_of_the_other_in_its_own_picture() -> None:
-    if needed := what_it_needs():
+    if needed := missing_requirement():
         pytest.skip(needed)
     once, again = (ran(no_pictures=False, seconds=0.37, bus="ideal") for _ in range(2))
     for head in (once, once["heads"]["other"]):
@@ -77,7 +77,7 @@ def test_the_command_runs_all_heads_once(tmp_path: Path) -> None:
 
 def test_a_second_request_to_end_reaches_all_heads() -> None:
     lead = Interrupts(signals=False)
-    other = Following(lead)
+    other = LinkedInterrupts(lead)
     assert other() is None and other.requests == 0
     lead.request("SIGINT")
     assert other() == "SIGINT" and other.requests == 1
@@ -91,13 +91,15 @@ def test_a_second_request_to_end_reaches_all_heads() -> None:
 def test_who_falls_behind_is_told(overruns: int, pictures: int, behind: bool) -> None:
     well = {"ticks": 2000, "overruns": 0, "seconds": 10.0, "pictures": 300}
     figures = {**well, "overruns": overruns, "pictures": pictures}
-    line = fell_behind([("first", well), ("other", figures), ("third", None)], 30.0, rendered=True)
+    line = overload_message(
+        [("first", well), ("other", figures), ("third", None)], 30.0, rendered=True
+    )
     assert line.startswith("the computer is too busy for these heads (other: ") is behind
-    assert line.endswith("; --no-pictures asks less of it") is behind
+    assert line.endswith("; --no-pictures reduces the load") is behind
     if overruns == 300:
         assert "(other: 13% of ticks late, 29 of 30 pictures a second)" in line
-        assert fell_behind([("other", figures)], 30.0, rendered=False).endswith("second)")
-    assert fell_behind([("other", {**figures, "seconds": 1.0})], 30.0, rendered=True) == ""
+        assert overload_message([("other", figures)], 30.0, rendered=False).endswith("second)")
+    assert overload_message([("other", {**figures, "seconds": 1.0})], 30.0, rendered=True) == ""
 
 
 def test_time_goes_on_when_all_wait_and_the_earliest_goes_first() -> None:

@@ -23,7 +23,7 @@ from gazerig.config.load import shipped
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.run.head_group import HeadGroup, compose_group
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.heads_together import HeadsTogether
+from gazerig.robot.control.heads_together import RobotGroup
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Resume, Stop
@@ -80,7 +80,7 @@ def test_a_fault_of_one_head_parks_the_other_and_both_let_go(group: HeadGroup) -
 @branched
 def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
     first, other = (member.composed.made.robot for member in group.members)
-    together = HeadsTogether(first, group.members[0].composed.made.others)
+    together = RobotGroup(first, group.members[0].composed.made.others)
     asked, lines = Interrupts(signals=False), list[str]()
     asked_s, seen = list[float](), list[tuple[bool, bool]]()
 

@@ -11,7 +11,7 @@ from world_scripts import WORLDS, shipped_world
 mujoco = mujoco_or_skip()
 
 from gazerig.features.world.figure import SEGMENTS, Figures  # noqa: E402
-from gazerig.features.world.figure_model import PlacedPeople, add_people  # noqa: E402
+from gazerig.features.world.figure_model import PeoplePlacer, add_people  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.room import ROOMS  # noqa: E402
 from gazerig.features.world.room_model import add_room  # noqa: E402
@@ -51,7 +51,7 @@ def test_a_room_is_made_of_few_pieces_and_a_person_of_few_triangles(name: str) -
 def test_people_stay_out_of_the_furniture_and_of_each_other(name: str) -> None:
     model, figures = built(name)
     data = mujoco.MjData(model)
-    people = PlacedPeople(model, figures)
+    people = PeoplePlacer(model, figures)
     owners = [owner(model, i) for i in range(model.ngeom)]
     solid = [i for i in range(model.ngeom) if model.geom_contype[i] and "/" in owners[i]]
     room = [i for i in range(model.ngeom) if owners[i] == "room"]
@@ -75,7 +75,7 @@ def test_people_stay_out_of_the_furniture_and_of_each_other(name: str) -> None:
 def test_a_hand_that_pushes_the_head_turns_the_neck() -> None:
     figures = Figures(shipped_world("crowd"), 1)
     model = world_model(figures, [rig_in_world(load_rig("desk"), looks=False)]).mj
-    data, people = mujoco.MjData(model), PlacedPeople(model, figures)
+    data, people = mujoco.MjData(model), PeoplePlacer(model, figures)
     pitch = int(model.jnt_qposadr[model.joint("rig_neck_pitch").id])
     # A neck that is held softly.
     for joint in range(model.njnt):

@@ -15,7 +15,7 @@ import mujoco
 
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
-from gazerig.features.world.figure_model import PlacedPeople
+from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.run.rig import rig_in_world
 from gazerig.features.world.run.run_world import world_scene
@@ -87,7 +87,7 @@ def test_everybody_is_where_mujoco_has_them() -> None:
     data = mujoco.MjData(model)
     assert [part.name for part in found.parts() if part.moves] == list(figures.names)
     for world_s in (0.0, 12.34, 100.0):
-        PlacedPeople(model, figures).place(data, world_s)
+        PeoplePlacer(model, figures).place(data, world_s)
         mujoco.mj_kinematics(model, data)
         poses = found.poses(world_s)
         assert tuple(poses) == figures.names
@@ -101,7 +101,7 @@ def test_limbs_collide_from_joint_to_joint() -> None:
     spec = shapes("conversation").spec
     figures, model = present(spec.figures), spec.compiled().mj
     data = mujoco.MjData(model)
-    PlacedPeople(model, figures).place(data, 0.0)
+    PeoplePlacer(model, figures).place(data, 0.0)
     mujoco.mj_kinematics(model, data)
     for who in figures.script.people:
         for upper, lower in (("upper_arm", "forearm"), ("forearm", "hand"), ("thigh", "shank"),

@@ -1,1 +1,1 @@
-"""Runs in a world with physics: who is in it, the rigs among them, and what their cameras see."""
+"""Runs in a world with physics: its people, its rigs, and the pictures of their cameras."""

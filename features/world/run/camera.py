@@ -1,4 +1,4 @@
-"""A camera in a world that another process computes; without a renderer, its computed stand-in."""
+"""A camera in a world of another process; without a renderer it computes detections."""
 
 from collections.abc import Callable
 
@@ -13,12 +13,12 @@ class WorldCamera:
     """A camera in a world in real time.
 
     Args:
-        process: renders and looks; None: nothing is rendered.
-        ideal: returns what computes detections of a scene that began at a time.
-        poses: where the head is, and when the script of the people began.
+        process: renders and detects; None: nothing is rendered.
+        ideal: returns a camera that computes detections of a scene that began at a time.
+        poses: the pose of the head, and the start time of the people's script.
 
     Attributes:
-        seeing: the process, or what computes detections; None before it is known which.
+        seeing: the process, or the camera that computes detections; None until one is chosen.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class WorldCamera:
         return self._poses.begin_s
 
     def open(self) -> None:
-        """Start the process; without a renderer go on without pictures.
+        """Start the process; without a renderer continue without pictures.
 
         Raises:
             SetupError: as the process does.
@@ -48,10 +48,10 @@ class WorldCamera:
                 self._process.open()
             except NoRenderer as error:
                 self.seeing = None
-                self._events.append(without_pictures(error))
+                self._events.append(no_pictures_message(error))
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return what the newest frame showed, None before the first."""
+        """Return the detections in the newest frame, None before the first."""
         if self.seeing is None:
             begin_s = self.start_s
             if begin_s is None:
@@ -61,7 +61,7 @@ class WorldCamera:
         return self.seeing.latest(now_s)
 
     def events(self) -> tuple[str, ...]:
-        """Return what has happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         events, self._events = (*self._events, *(self.seeing.events() if self.seeing else ())), []
         return events
 
@@ -71,6 +71,6 @@ class WorldCamera:
             self._process.close()
 
 
-def without_pictures(error: NoRenderer) -> str:
-    """Return what a person should know where nothing can render."""
+def no_pictures_message(error: NoRenderer) -> str:
+    """Return a message to the user if nothing can render."""
     return f"{error}; detections are computed instead, without pictures"

@@ -1,7 +1,8 @@
-"""What ``make run`` shows: the living room where it can be rendered, else the visitor of a scene.
+"""Choice of ``make run``: the living room if it can be rendered, else the visitor of a scene.
 
-``python -m gazerig.features.world.run.first_world`` prints the options of ``gazerig run`` that show
-the room, or nothing, and then says on standard error in one line what the room needs.
+``python -m gazerig.features.world.run.first_world`` prints the options of ``gazerig run`` for the
+room. If the room cannot be rendered, it prints nothing but one line on standard error with the
+reason.
 """
 
 import sys
@@ -14,8 +15,8 @@ from gazerig.features.world.gl_context import open_context
 ROOM = "--world living-room"
 
 
-def what_it_needs() -> str:
-    """Return what a rendered world lacks here, "" where nothing is missing."""
+def missing_requirement() -> str:
+    """Return the missing requirement of a rendered world, "" if nothing is missing."""
     if find_spec("mujoco") is None:
         return extra_hint("mujoco", "world", ModuleNotFoundError(name="mujoco"))
     try:
@@ -27,8 +28,8 @@ def what_it_needs() -> str:
 
 
 def main() -> None:
-    """Print the options, or what is missing."""
-    needs = what_it_needs()
+    """Print the options, or the missing requirement."""
+    needs = missing_requirement()
     if needs:
         sys.stderr.write(f"a visitor without a room; for the room ({ROOM}): {needs}\n")
     else:

@@ -1,6 +1,6 @@
-"""Several heads in one world, each led by a robot of its own that sees only its own picture.
+"""Several heads in one world, each controlled by its own robot that sees only its own picture.
 
-What ends one of them ends all: each parks and lets go.
+The end of one head ends all: each parks and releases its servos.
 """
 
 import threading
@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.features.world.heads_scene import HeadsScene, RigFrame
-from gazerig.features.world.run.kept_time import fell_behind
+from gazerig.features.world.run.deadline_stats import overload_message
 from gazerig.features.world.run.run_world import world_of, world_scene
 from gazerig.features.world.run.shared_world import (
-    FaceNow,
+    FacePoseSource,
     RealTimeWorld,
     SharedWorld,
     SimulatedWorld,
@@ -36,8 +36,8 @@ class _Member(NamedTuple):
 
     Attributes:
         name: in the script; the first one's is ``FIRST``.
-        composed: its robot, put together.
-        frame: where it stands.
+        composed: its assembled robot.
+        frame: pose of its neck base.
     """
 
     name: str
@@ -46,11 +46,11 @@ class _Member(NamedTuple):
 
 
 def has_other_heads(options: RunOptions) -> bool:
-    """Return whether other heads are in the world that was asked for.
+    """Return whether the requested world has other heads.
 
     Raises:
         gazerig.config.load.ConfigError: its file is at fault, or there is none of that name.
-        SetupError: they cannot be run as it was asked.
+        SetupError: they cannot be run with these options.
     """
     if options.world is None:
         return False
@@ -62,13 +62,13 @@ def compose_group(options: RunOptions) -> "HeadGroup":
 
     Raises:
         gazerig.config.load.ConfigError: the world or one of the rigs is at fault.
-        SetupError: they cannot be run as it was asked.
+        SetupError: they cannot be run with these options.
     """
     first = run_rig(options)
     found = world_of(first, options)
-    assert found.spec.figures is not None  # heads stand in a script
+    assert found.spec.figures is not None  # heads are part of a script
     heads = found.spec.figures.script.heads
-    others = [_other(options, name, n, heads[name].rig) for n, name in enumerate(heads, 1)]
+    others = [_other_options(options, name, n, heads[name].rig) for n, name in enumerate(heads, 1)]
     each = (options, *others)
     rigs = [(FIRST, first), *zip(heads, map(run_rig, others), strict=True)]
     world = SimulatedWorld(found) if options.fast else RealTimeWorld(found, rigs)
@@ -78,7 +78,7 @@ def compose_group(options: RunOptions) -> "HeadGroup":
         for number, ((name, rig), one) in enumerate(zip(rigs, each, strict=True)):
             frame = world.frames[number]
             faced = [face for n, face in enumerate(faces) if n != number]
-            room = world.room(number, rig, one, partial(_before, frame, faced, number == 0))
+            room = world.room(number, rig, one, partial(_head_scene, frame, faced, number == 0))
             members.append(_Member(name, compose(one, room=room), frame))
     except BaseException:
         for member in members:
@@ -86,47 +86,49 @@ def compose_group(options: RunOptions) -> "HeadGroup":
         world.close()
         raise
     pictures = None if options.fast else (found.camera.rate_hz, not options.no_pictures)
-    return HeadGroup(_together(members), world, pictures)
+    return HeadGroup(_link(members), world, pictures)
 
 
-def _together(members: Sequence[_Member]) -> list[_Member]:
-    """Return the heads so that who commands the first, from the page too, can stop all."""
+def _link(members: Sequence[_Member]) -> list[_Member]:
+    """Return the heads with the others attached to the first, so that its commands can stop all."""
     first, *others = members
     robots = tuple(NamedRobot(one.name, one.composed.made.robot) for one in others)
     made = first.composed.made._replace(others=robots)
-    # One parameter store and one remote control for the process: those of the first.
+    # The process has one parameter store and one remote control: those of the first head.
     alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in others]
     return [first._replace(composed=first.composed._replace(made=made)), *alone]
 
 
-def _before(frame: RigFrame, faces: Sequence[FaceNow], first: bool, people: Scene) -> HeadsScene:
-    """Return what a head has before itself: the people and the other heads, as from where it is."""
+def _head_scene(
+    frame: RigFrame, faces: Sequence[FacePoseSource], first: bool, people: Scene
+) -> HeadsScene:
+    """Return the scene before a head: the people and the other heads, in the head's frame."""
     return HeadsScene(people, frame, faces, first)
 
 
-def _other(options: RunOptions, name: str, number: int, rig: str) -> RunOptions:
-    """Return the options of another head than the first."""
+def _other_options(options: RunOptions, name: str, number: int, rig: str) -> RunOptions:
+    """Return the options of another head."""
     return replace(
         options,
         rig=rig or options.rig,
         seed=options.seed + number,
-        record=None if options.record is None else beside(options.record, name),
+        record=None if options.record is None else other_head_file(options.record, name),
         heatmap=None,
         summary=None,
         page=None,
     )
 
 
-def beside(path: Path, name: str) -> Path:
-    """Return the name of the file of another head: run.mcap, run-other.mcap."""
+def other_head_file(path: Path, name: str) -> Path:
+    """Return the path of the file of another head: run.mcap, run-other.mcap."""
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
 
 
-class Following(Interrupts):
+class LinkedInterrupts(Interrupts):
     """Requests to end a head that ends with another one: its own, and those to the other.
 
     Args:
-        lead: requests to end the other one.
+        lead: requests to end the other head.
     """
 
     def __init__(self, lead: Interrupts) -> None:
@@ -135,7 +137,7 @@ class Following(Interrupts):
 
     @property
     def requests(self) -> int:
-        """Return how often it was asked to end: the second time skips parking."""
+        """Return the number of requests to end; the second one skips parking."""
         return max(super().requests, self._lead.requests)
 
 
@@ -144,9 +146,9 @@ class HeadGroup:
 
     Args:
         members: the heads, the first one first.
-        world: in which they are.
-        pictures: in real time how many each camera has a second, and whether they are rendered;
-            None: time is simulated and waits for them.
+        world: the world of the heads.
+        pictures: in real time the rate of each camera in pictures a second, and whether they are
+            rendered; None: time is simulated and waits for them.
 
     Attributes:
         members: the heads.
@@ -163,7 +165,7 @@ class HeadGroup:
         self._figures: list[dict[str, object] | None] = [None] * len(members)
         self._failures: list[BaseException] = []
         self._ending: set[int] = set()
-        self._saying = threading.Lock()
+        self._print_lock = threading.Lock()
         places = [HeadPlace(member.frame.R, member.frame.p_m) for member in members]
         self._traces = [MutualGazeTrace(places[0], other) for other in places[1:]]
 
@@ -175,15 +177,15 @@ class HeadGroup:
         watch: Callable[[Tick], object] | None = None,
         browse: Callable[[str], object] | None = None,
     ) -> dict[str, object]:
-        """Run until one of them ends; return the first one's figures and those of the others.
+        """Run until one head ends; return the figures of the first and of the others.
 
         Args: as of ``gazerig.robot.app.session.run``; status, watch and browse are of the first.
 
         Raises:
-            SetupError: before anything moved.
+            SetupError: before any motion.
         """
         lead = stopped if isinstance(stopped, Interrupts) else Interrupts(also=stopped)
-        following = [Following(lead) for _ in self.members[1:]]
+        following = [LinkedInterrupts(lead) for _ in self.members[1:]]
         threads = [
             threading.Thread(target=self._follow, args=(number, lead, one, say), name=member.name)
             for number, (member, one) in enumerate(zip(self.members[1:], following, strict=True), 1)
@@ -191,12 +193,12 @@ class HeadGroup:
 
         def end_all(reason: str) -> None:
             for number, one in enumerate(following, 1):
-                # A further request would skip the parking of one that ends already.
+                # A second request would skip the parking of a head that already ends.
                 if one.requests == 0 and number not in self._ending:
                     one.request(f"the end of the first head{reason and f' ({reason})'}")
 
         def ended(reason: str) -> None:
-            if reason != SECONDS:  # that comes for all of them
+            if reason != SECONDS:  # all heads reach that end by themselves
                 end_all(reason)
 
         for thread in threads:
@@ -204,14 +206,14 @@ class HeadGroup:
         try:
             self._world.enter(0)
             self._figures[0] = run(
-                self.members[0].composed, lead, self._said(say), status,
+                self.members[0].composed, lead, self._printer(say), status,
                 lambda tick: self._watch_first(tick, watch), browse, ended,
             )  # fmt: skip
-        except KeyboardInterrupt:  # it was asked to end before it began, maybe by one that failed
+        except KeyboardInterrupt:  # an end was requested before the start, maybe by a failed head
             if not self._failures:
                 raise
         finally:
-            lead.never_raise()  # the others are still to park
+            lead.never_raise()  # the others have yet to park
             end_all("")
             self._world.leave(0)
             for thread in threads:
@@ -221,7 +223,7 @@ class HeadGroup:
             raise self._failures[0]
         names = [member.name for member in self.members]
         if self._pictures is not None and (
-            line := fell_behind(zip(names, self._figures, strict=True), *self._pictures)
+            line := overload_message(zip(names, self._figures, strict=True), *self._pictures)
         ):
             say(line)
         return self._joined()
@@ -229,7 +231,7 @@ class HeadGroup:
     def _follow(
         self, number: int, lead: Interrupts, own: Interrupts, say: Callable[[str], None]
     ) -> None:
-        """Run another head than the first, in its thread."""
+        """Run another head in its thread."""
         name = self.members[number].name
 
         def ended(reason: str) -> None:
@@ -240,10 +242,10 @@ class HeadGroup:
         try:
             self._world.enter(number)
             self._figures[number] = run(
-                self.members[number].composed, own, self._said(say, f"{name}: "),
+                self.members[number].composed, own, self._printer(say, f"{name}: "),
                 watch=lambda tick: self._traces[number - 1].update(1, tick), ends=ended,
             )  # fmt: skip
-        except KeyboardInterrupt:  # it was asked to end before it began
+        except KeyboardInterrupt:  # an end was requested before the start
             lead.request(f"the end of head {name} before it began")
         except BaseException as error:
             self._failures.append(error)
@@ -251,11 +253,11 @@ class HeadGroup:
         finally:
             self._world.leave(number)
 
-    def _said(self, say: Callable[[str], None], before: str = "") -> Callable[[str], None]:
-        """Return what says whole lines, whichever head's thread says them."""
+    def _printer(self, say: Callable[[str], None], before: str = "") -> Callable[[str], None]:
+        """Return a function that prints whole lines, from the thread of any head."""
 
         def one_by_one(line: str) -> None:
-            with self._saying:
+            with self._print_lock:
                 say(before + line)
 
         return one_by_one

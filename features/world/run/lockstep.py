@@ -1,7 +1,7 @@
-"""One simulated time for several robots, each of which runs in a thread of its own.
+"""One simulated time for several robots, each of which runs in its own thread.
 
-Only one of them runs at a time: the one whose next instant comes first, of equal ones the one with
-the lowest number. So a run of several is as reproducible as that of one.
+Only one of them runs at a time: the one with the earliest next instant, and of equal ones the one
+with the lowest number. So a run of several robots is as reproducible as a run of one.
 """
 
 import threading
@@ -10,10 +10,10 @@ from gazerig.robot.model.clock import Clock
 
 
 class Lockstep:
-    """Time that goes on when all who share it wait.
+    """A time that advances when all participants wait.
 
     Args:
-        count: so many share it; each calls ``enter`` first and ``leave`` at last.
+        count: number of participants; each calls ``enter`` first and ``leave`` last.
     """
 
     def __init__(self, count: int) -> None:
@@ -27,16 +27,16 @@ class Lockstep:
         return self._now_s
 
     def clock(self, number: int) -> Clock:
-        """Return the clock of one of them."""
-        return _Turns(self, number)
+        """Return the clock of a participant."""
+        return _ParticipantClock(self, number)
 
     def enter(self, number: int) -> None:
-        """Return when it is the first turn of this one."""
+        """Wait for the first turn of a participant."""
         with self._changed:
             self._await(number)
 
     def wait(self, number: int, t_s: float) -> None:
-        """Let the others go on, and return at ``t_s``; at once where that is past."""
+        """Let the other participants run until ``t_s``; return immediately if that is past."""
         with self._changed:
             if t_s <= self._now_s:
                 return
@@ -45,7 +45,7 @@ class Lockstep:
             self._await(number)
 
     def leave(self, number: int) -> None:
-        """Let the others go on without this one from now on; safe to call twice."""
+        """Let the other participants continue without this one; safe to call twice."""
         with self._changed:
             if self._due_s[number] is None:
                 return
@@ -67,8 +67,8 @@ class Lockstep:
         self._changed.notify_all()
 
 
-class _Turns:
-    """The clock of one who shares time."""
+class _ParticipantClock:
+    """The clock of one participant."""
 
     def __init__(self, shared: Lockstep, number: int) -> None:
         self._shared, self._number = shared, number
@@ -78,5 +78,5 @@ class _Turns:
         return self._shared.now_s()
 
     def sleep_until(self, t_s: float) -> None:
-        """Let the others go on; return at ``t_s``."""
+        """Let the other participants run; return at ``t_s``."""
         self._shared.wait(self._number, t_s)

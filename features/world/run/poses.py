@@ -1,4 +1,4 @@
-"""Where the head truly is in a world with physics: from the joints of the world's state."""
+"""True pose of the head in a world with physics, from the joints of the world's state."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,18 +17,18 @@ _ABSENT = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
 
 
 class RigInState(NamedTuple):
-    """Which numbers of a world's state are the joints of a rig; can be sent to another process.
+    """The joints of a rig in the state of a world; can be sent to another process.
 
     Attributes:
-        kinematics: of the rig as it is built, whatever is believed of it later.
-        joints: where each joint stands in the state.
+        kinematics: of the rig as built, independent of later changes.
+        joints: index of each joint in the state.
     """
 
     kinematics: Kinematics
     joints: Mapping[str, int]
 
     def head(self, state: HostState) -> tuple[Mat3, Vec3]:
-        """Return rotation and place of the head in the world."""
+        """Return rotation and position of the head in the world."""
         angles = _ABSENT.copy()
         for name in angles.keys() & self.joints.keys():
             angles[name] = float(state.qpos[self.joints[name]])
@@ -38,14 +38,14 @@ class RigInState(NamedTuple):
 
 
 class WorldPoses:
-    """The head of a rig in a world that another process computes, by the state that it writes.
+    """The head of a rig in a world of another process, from the state that this writes.
 
     Args:
         path: the file of the newest state.
-        rig: which of its numbers are the rig's joints.
+        rig: the joints of the rig in the state.
 
     Attributes:
-        state: what was read last, None before the first.
+        state: the state of the last read, None before the first.
     """
 
     def __init__(self, path: Path, rig: RigInState) -> None:
@@ -75,7 +75,7 @@ class WorldPoses:
         return PoseAt(newest.host_s, *self._rig.head(newest))
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Return where the head is now; upright before the first state."""
+        """Return the current pose of the head; upright before the first state."""
         newest = self._file().newest()
         if newest is None:
             return self._rig.kinematics.head_pose((0.0, 0.0, 0.0), (0.0, 0.0))
@@ -91,12 +91,12 @@ class SimulatedPoses:
     """The head of a rig in a world of this process, on the clock of the run.
 
     Args:
-        world: brought up to the time whenever it is looked at.
+        world: simulated up to the current time at each access.
         clock: of the run.
-        rig: which numbers of its state are the rig's joints.
+        rig: the joints of the rig in the state.
 
     Attributes:
-        begin_s: when the script of the people began.
+        begin_s: start time of the people's script.
     """
 
     def __init__(self, world: "World", clock: Clock, rig: RigInState) -> None:
@@ -105,10 +105,10 @@ class SimulatedPoses:
 
     @property
     def state(self) -> HostState:
-        """Return where everything is now."""
+        """Return the current state."""
         now_s = self._world.now_s()
         return HostState(now_s, *self._world.state())
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Return where the head is now."""
+        """Return the current pose of the head."""
         return self._rig.head(self.state)

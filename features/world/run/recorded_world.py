@@ -1,4 +1,4 @@
-"""The world of a recorded run: what is kept of it, and how it looked."""
+"""The world of a recorded run: its entry in the recording, and its shapes."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,11 +22,11 @@ from gazerig.robot.recording.world_info import WorldInfo
 
 
 def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
-    """Return what a recording keeps of the world of a run, but for its beginning; None without.
+    """Return the recording's entry for the world of a run, without its start time; None without.
 
     Args:
         options: of the run.
-        seed: of the world's people; that of the first head where there are several.
+        seed: of the world's people; that of the first head if there are several.
 
     Raises:
         gazerig.config.load.ConfigError: the script is at fault.
@@ -39,18 +39,18 @@ def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
 
 
 def recorded_shapes(info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
-    """Return how the world of a recorded run looked, as from its head's neck base.
+    """Return the shapes of the world of a recorded run, in the frame of its head's neck base.
 
     Args:
         info: of the world.
-        stands: where the head stood in it, as of ``RunInfo.stands``.
+        stands: pose of the head in it, as of ``RunInfo.stands``.
 
     Raises:
-        SetupError: it cannot be shown; says why.
+        SetupError: the world cannot be shown; the message gives the reason.
     """
     if not info.script_yaml:
         raise SetupError(
-            f"the room is not shown: {info.name} is in MuJoCo's own format, which a recording has not"
+            f"the room is not shown: {info.name} is in MuJoCo's own format, which is not recorded"
         )
     if find_spec("mujoco") is None:
         hint = extra_hint("mujoco", "world", ModuleNotFoundError(name="mujoco"))

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from gazerig.config.rig import Rig
 from gazerig.features.world.rig_in_world import (
-    Gearing,
-    JointGearing,
-    PairGearing,
+    JointTransmission,
+    PairTransmission,
     RigInWorld,
     ServoInWorld,
+    Transmission,
 )
 from gazerig.robot.app.bus_wiring import rig_setups
 from gazerig.robot.app.emulation import STOP_BEYOND_DEG, crooked_rad
@@ -29,14 +29,14 @@ def rig_in_world(
     yaw_rad: float = 0.0,
     looks: bool = True,
 ) -> RigInWorld:
-    """Return a rig as a world needs it.
+    """Return a rig for a world.
 
     Args:
         rig: the rig.
-        prefix: of its names, for a second one in the same world.
-        p_m: place of its neck base in the world.
-        yaw_rad: how far it is turned to the left there.
-        looks: with what can be seen of it; without, the same mechanism is made in a moment.
+        prefix: prefix of its names, for a second rig in the same world.
+        p_m: position of its neck base in the world.
+        yaw_rad: its turn to the left there.
+        looks: whether to include its visible parts; the bare mechanism is built quickly.
     """
     stops = {name: _stop_rad(rig, name) for name in rig.names}
     servos = tuple(_servo(rig, name) for name in rig.names)
@@ -46,8 +46,8 @@ def rig_in_world(
 
 
 def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
-    """Return the body of a rig as MJCF, and the files that this names."""
-    # Meshes and what writes their textures: 30 MB that a control loop does without.
+    """Return the body of a rig as MJCF, and the files that the MJCF names."""
+    # Meshes and the texture writer: 30 MB that a control loop does not need.
     from gazerig.robot.app.rig_description import description_of
     from gazerig.robot.description.mjcf import mjcf
 
@@ -60,10 +60,10 @@ def world_ideal_bus(rig: Rig, world: "World", number: int = 0) -> "WorldIdealBus
 
     Args:
         rig: the rig.
-        world: in which it is.
-        number: which one of the world's rigs it is.
+        world: the world of the rig.
+        number: number of the rig in the world.
     """
-    # Imports MuJoCo, which only a run in a world has.
+    # Imports MuJoCo, which only runs in a world need.
     from gazerig.features.world.ideal_bus import WorldIdealBus
 
     measured = [rig.joints[name].facts.measured for name in rig.names]
@@ -78,9 +78,9 @@ def _stop_rad(rig: Rig, name: str) -> tuple[float, float]:
 def _servo(rig: Rig, name: str) -> ServoInWorld:
     joint = rig.joints[name]
     joints: tuple[str, ...] = (name,)
-    gearing: Gearing = JointGearing(joint.made())
+    transmission: Transmission = JointTransmission(joint.made())
     for first, second, coupling in pairs_of(rig.couplings):
         if name in (first, second):
             joints = first, second
-            gearing = PairGearing(coupling, joints.index(name), joint.made())
-    return ServoInWorld(name, joint.bus, joint.id, joints, gearing, joint.facts.steps_per_turn)
+            transmission = PairTransmission(coupling, joints.index(name), joint.made())
+    return ServoInWorld(name, joint.bus, joint.id, joints, transmission, joint.facts.steps_per_turn)

@@ -1,4 +1,4 @@
-"""A rig in a world with physics: its bus, its camera, and how the world looks to it."""
+"""A rig in a world with physics: its bus, its camera, and the shapes of the world."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -44,9 +44,9 @@ class RigRoom:
         world: the world.
         clock: of the run.
         wires: the bus of the rig.
-        head: where its head is.
-        heads: the world's other heads, None where they are not shown.
-        info: what a recording keeps of it but for its beginning, None without a recording.
+        head: pose of its head.
+        heads: the world's other heads, None if they are not shown.
+        info: recording's entry for the world without its start time, None without a recording.
         stands: as of ``RunRoom.stands``.
     """
 
@@ -60,7 +60,7 @@ class RigRoom:
 
     @property
     def scene(self) -> Scene:
-        """Return the people in it, as the rig has them before itself."""
+        """Return the people in the world, in the frame of the rig."""
         return self.world.scene
 
     def camera(
@@ -73,7 +73,7 @@ class RigRoom:
         own: ProgramParts,
         say: Callable[[str], None],
     ) -> Camera:
-        """Return what the rig looks through; arguments as of ``RunRoom.camera``."""
+        """Return the rig's camera; arguments as of ``RunRoom.camera``."""
         world = self.world
         rendered = RenderedWorld(
             world.spec, world.scene, sight.mount, placed, rng, world.camera, world.number
@@ -87,20 +87,20 @@ class RigRoom:
         return self.head.begin_s
 
     def shapes(self) -> WorldShapes:
-        """Return how the world looks, with the other heads where another process has it."""
+        """Return the shapes of the world, with the other heads if another process computes it."""
         return shapes_of(self.world.spec, self.heads)
 
     def recorded(self) -> WorldInfo | None:
-        """Return what a recording keeps of it, None before the people have begun."""
+        """Return the recording's entry for the world, None before the people's script began."""
         start_s = self.start_s()
         return None if self.info is None or start_s is None else replace(self.info, start_s=start_s)
 
 
 def open_room(rig: Rig, options: RunOptions, clock: Clock, world: RunWorld) -> RigRoom:
-    """Return a world with one rig, which it has to itself; arguments as of ``Surroundings.open``.
+    """Return a world with one rig; arguments as of ``Surroundings.open``.
 
     Raises:
-        SetupError: it cannot be used; says why.
+        SetupError: the world cannot be used; the message gives the reason.
     """
     if options.fast:
         return simulated_room(rig, options, clock, world, world.computed(clock.now_s))
@@ -125,8 +125,8 @@ def simulated_room(
         rig: the rig.
         options: whether its servos are ideal, and whether the run is recorded.
         clock: of the run.
-        world: the world as the rig is in it.
-        computed: the same in this process.
+        world: the world of the rig.
+        computed: the same world in this process.
         stands: as of ``RunRoom.stands``.
     """
     if options.bus == "ideal":
@@ -154,7 +154,7 @@ def served_room(
         rig: the rig.
         options: whether the run is recorded.
         clock: the host's.
-        world: the world as the rig is in it.
+        world: the world of the rig.
         served: the terminals of the rig.
         stands: as of ``RunRoom.stands``.
     """
@@ -162,14 +162,14 @@ def served_room(
     wires = RunBus(guarded_rig_bus(rig, served.paths), close=served.close, fault=buses.command)
     state = state_file(buses.folder)
     head = WorldPoses(state, RigInState(kinematics_of(rig), buses.joints[number]))
-    # The page, which is the first head's, draws the others.
+    # Only the page draws other heads, and the page belongs to the first head.
     heads = map(HeadInState, world.others, buses.joints[1:])
     others = OtherHeads(state, tuple(heads)) if world.others and number == 0 else None
     return RigRoom(world, clock, wires, head, others, _info(options, world), stands)
 
 
 def _info(options: RunOptions, world: RunWorld) -> WorldInfo | None:
-    """Return what a recording keeps of a world, None if the run is not recorded."""
+    """Return the recording's entry for a world, None if the run is not recorded."""
     if options.record is None:
         return None
     people = world.spec.figures

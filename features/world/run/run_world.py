@@ -1,4 +1,4 @@
-"""The world with physics that a run is in: who is there, and the rig among them."""
+"""The world with physics of a run: its people and its rigs."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from gazerig.sim_mock.pty.client import PtyBuses
 
 MJCF = (".xml", ".mjcf")
-"""Endings of the files that are MuJoCo's own worlds."""
+"""Suffixes of MuJoCo's own world files."""
 
 
 class ServedRig(NamedTuple):
@@ -55,11 +55,11 @@ class RunWorld(NamedTuple):
     """The world of a run.
 
     Attributes:
-        spec: what it is made of, for the processes that compute and render it.
-        scene: the people in it, as a run and its score know them.
-        camera: how large, how fast and how true the pictures of cameras are.
-        number: which of its rigs is the run's.
-        others: the world's other rigs with all that can be seen of them.
+        spec: content of the world, for the processes that compute and render it.
+        scene: its people, for the run and its score.
+        camera: size, rate and fidelity of the pictures of cameras.
+        number: number of the run's rig in the world.
+        others: the world's other rigs with all of their visible parts.
     """
 
     spec: WorldSpec
@@ -74,13 +74,13 @@ class RunWorld(NamedTuple):
         Args:
             now_s: returns the time of the run.
         """
-        model = self.spec.compiled()  # imports MuJoCo, whatever may render here
+        model = self.spec.compiled()  # imports MuJoCo, whatever library can render here
         from gazerig.features.world.physics import World
 
         return World(model, now_s)
 
     def served(self, folder: Path) -> "RunWorld":
-        """Return the same world; it has the people's motion in common with its server.
+        """Return the same world, which shares the people's motion with its server.
 
         Args:
             folder: of the server.
@@ -91,11 +91,11 @@ class RunWorld(NamedTuple):
         return self._replace(spec=spec, scene=WorldScene(self.scene.name, spec.figures))
 
 
-def asked_world(options: RunOptions) -> str:
-    """Return the name or path of the world that was asked for.
+def requested_world(options: RunOptions) -> str:
+    """Return the name or path of the requested world.
 
     Raises:
-        ValueError: none was.
+        ValueError: no world was requested.
     """
     if options.world is None:
         raise ValueError("the run is in no world")
@@ -103,13 +103,13 @@ def asked_world(options: RunOptions) -> str:
 
 
 def world_of(rig: Rig, options: RunOptions) -> RunWorld:
-    """Return the world that was asked for.
+    """Return the requested world.
 
     Raises:
         gazerig.config.load.ConfigError: its file is at fault, or there is none of that name.
-        SetupError: MuJoCo is not installed, or the rig has no rule for what the world asks for.
+        SetupError: MuJoCo is not installed, or the rig has no rule for an event of the world.
     """
-    asked = asked_world(options)
+    asked = requested_world(options)
     if find_spec("mujoco") is None:
         error = ModuleNotFoundError(name="mujoco")
         raise SetupError(f"--world {asked}: {extra_hint('mujoco', 'world', error)}")
@@ -122,19 +122,19 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
     scene, mjcf_file = world_scene(asked, options.seed), mjcf_of(asked)
     refuse_unruled(rig.gaze.top_down, scene, f"--world {asked}")
     script = scene.figures.script
-    # Where nothing is rendered, nobody sees the rigs: the page draws them by itself.
+    # Without pictures the looks of the rigs are not needed: the page has its own shapes.
     looks = not options.no_pictures
     others = other_rigs(rig, script)
-    rigs = (rig_in_world(rig, looks=looks), *standing(others, script, looks))
+    rigs = (rig_in_world(rig, looks=looks), *placed_rigs(others, script, looks))
     spec = WorldSpec(None if mjcf_file else scene.figures, rigs, mjcf_file)
-    return RunWorld(spec, scene, script.camera, others=standing(others, script, looks=True))
+    return RunWorld(spec, scene, script.camera, others=placed_rigs(others, script, looks=True))
 
 
 def other_rigs(rig: Rig, script: WorldScript) -> dict[str, Rig]:
     """Return the rigs of the other heads of a script, by the heads' names.
 
     Args:
-        rig: of heads that name none.
+        rig: rig of heads that name none.
         script: with the heads.
 
     Raises:
@@ -146,13 +146,15 @@ def other_rigs(rig: Rig, script: WorldScript) -> dict[str, Rig]:
     }
 
 
-def standing(rigs: Mapping[str, Rig], script: WorldScript, looks: bool) -> tuple[RigInWorld, ...]:
-    """Return the rigs of a script's other heads where they stand.
+def placed_rigs(
+    rigs: Mapping[str, Rig], script: WorldScript, looks: bool
+) -> tuple[RigInWorld, ...]:
+    """Return the rigs of a script's other heads at their poses.
 
     Args:
-        rigs: by the heads' names.
-        script: with the heads.
-        looks: with what can be seen of them.
+        rigs: rigs by the heads' names.
+        script: script with the heads.
+        looks: whether to include their visible parts.
     """
     return tuple(
         rig_in_world(
@@ -176,7 +178,7 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
 
 
 def world_script(name_or_path: str) -> WorldScript:
-    """Return the script of a world; its heads' rigs as seen from the working folder.
+    """Return the script of a world; paths of its heads' rigs are relative to the working folder.
 
     Raises:
         gazerig.config.load.ConfigError: the file is at fault, or there is none of that name.
@@ -187,30 +189,30 @@ def world_script(name_or_path: str) -> WorldScript:
     try:
         facts = path.stat()
     except OSError:
-        return _read(path, None)  # says what is wrong
+        return _read(path, None)  # raises with the reason
     return _read(path, (facts.st_ino, facts.st_mtime_ns, facts.st_size))
 
 
 @lru_cache(maxsize=2)
 def _read(path: Path, version: tuple[int, int, int] | None) -> WorldScript:
-    """Return a script; a run asks for it several times, and reads it once."""
+    """Return a script; a run requests it several times, and reads it once."""
 
     def unknown_rigs(script: WorldScript) -> Iterator[Fault]:
         for name, head in script.heads.items():
             try:
-                _rig_beside(path, head.rig)
+                _resolve_rig(path, head.rig)
             except ConfigError as error:
                 yield f"heads.{name}.rig", error.faults[0].rule
 
     script = load(path, WorldScript, checks=(*CHECKS, unknown_rigs))
     heads = {
-        name: replace(head, rig=_rig_beside(path, head.rig)) for name, head in script.heads.items()
+        name: replace(head, rig=_resolve_rig(path, head.rig)) for name, head in script.heads.items()
     }
     return replace(script, heads=heads)
 
 
-def _rig_beside(world: Path, rig: str) -> str:
-    """Return a rig that a world's file names, a path as seen from the working folder.
+def _resolve_rig(world: Path, rig: str) -> str:
+    """Return a rig that a world's file names; a path is relative to the working folder.
 
     Raises:
         gazerig.config.load.ConfigError: there is no such rig.
@@ -228,7 +230,7 @@ def _rig_beside(world: Path, rig: str) -> str:
 
 
 def mjcf_of(name_or_path: str) -> Path | None:
-    """Return the user's own MJCF file, None where the world is a script.
+    """Return the user's own MJCF file, None if the world is a script.
 
     Raises:
         SetupError: there is no such file.

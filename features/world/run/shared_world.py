@@ -1,9 +1,9 @@
-"""A world that several heads are in: on one simulated clock, or in real time.
+"""A world with several heads: on one simulated clock, or in real time.
 
-In simulated time the world and all heads are in this process, each head in a thread, and one after
-the other (gazerig.features.world.run.lockstep): the same seed gives the same bytes on every bus. In
-real time the emulator's process has the world and the servos of all heads, as it has those of one;
-each head's control loop speaks to its own terminals, on the host's clock.
+In simulated time the world and all heads are in this process. Each head has a thread, and only one
+runs at a time (gazerig.features.world.run.lockstep): the same seed gives the same bytes on every
+bus. In real time the emulator's process has the world and the servos of all heads; each head's
+control loop uses its own terminals, on the host's clock.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,55 +29,55 @@ from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 from gazerig.sim_mock.scenes.scene import Scene
 
-Before = Callable[[Scene], Scene]
+SceneOfHead = Callable[[Scene], Scene]
 
 
-class TrueHeadPose(Protocol):
-    """Tells where a head truly is."""
+class HeadPoseSource(Protocol):
+    """True pose of a head."""
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Return rotation and place of the head now, as from its neck base."""
+        """Return current rotation and position of the head in the frame of its neck base."""
         ...
 
 
 @dataclass(frozen=True)
-class FaceNow:
-    """Tells where the face of a head of the world is now; can be sent to another process.
+class FacePoseSource:
+    """Source of the current pose of a face in the world; can be sent to another process.
 
     Attributes:
         poses: of the head.
-        frame: where its neck base stands.
+        frame: pose of its neck base.
         nose_m: tip of its nose in the head's own frame.
     """
 
-    poses: TrueHeadPose
+    poses: HeadPoseSource
     frame: RigFrame
     nose_m: Vec3
 
     def __call__(self) -> HeadFace:
-        """Return it."""
+        """Return the current pose of the face."""
         R, p_m = self.frame.in_world(*self.poses.head(0.0))
         return HeadFace(R, add(p_m, rotate(R, self.nose_m)))
 
 
 class SharedWorld(Protocol):
-    """The world of a group of heads; a head's number is that of its rig in the world."""
+    """The world of a group of heads; the number of a head is the number of its rig in the world."""
 
     frames: Sequence[RigFrame]
-    """Where the neck base of each stands."""
+    """Pose of the neck base of each head."""
 
-    def face(self, number: int, rig: Rig) -> FaceNow:
-        """Return what tells where a head's face is now."""
+    def face(self, number: int, rig: Rig) -> FacePoseSource:
+        """Return a source of the current pose of a head's face."""
         ...
 
-    def room(self, number: int, rig: Rig, options: RunOptions, before: Before) -> RigRoom:
-        """Return the world as one of the heads is in it.
+    def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
+        """Return the world from the view of one of the heads.
 
         Args:
             number: of the head.
             rig: of the head.
             options: of its run.
-            before: returns what it has before itself of the world's people.
+            before: returns the scene before the head, given the world's people.
         """
         ...
 
@@ -86,15 +86,15 @@ class SharedWorld(Protocol):
         ...
 
     def enter(self, number: int) -> None:
-        """Return when a head may begin, in its own thread."""
+        """Wait until a head may begin, in its own thread."""
         ...
 
     def leave(self, number: int) -> None:
-        """Let the others go on without a head from now on; safe to call twice."""
+        """Let the other heads continue without this one; safe to call twice."""
         ...
 
     def close(self) -> None:
-        """End it, once all heads have left; safe to call twice."""
+        """End the world after all heads have left; safe to call twice."""
         ...
 
 
@@ -113,16 +113,16 @@ class SimulatedWorld:
             RigFrame(rig.R_world_base, rig.p_world_base_m) for rig in self._world.model.rigs
         ]
 
-    def face(self, number: int, rig: Rig) -> FaceNow:
-        """Return what tells where a head's face is now."""
+    def face(self, number: int, rig: Rig) -> FacePoseSource:
+        """Return a source of the current pose of a head's face."""
         joints = RigInState(kinematics_of(rig), self._world.model.rigs[number].qpos)
         poses = SimulatedPoses(self._world, self.clock(number), joints)
-        return FaceNow(poses, self.frames[number], _nose_m(rig))
+        return FacePoseSource(poses, self.frames[number], _nose_m(rig))
 
-    def room(self, number: int, rig: Rig, options: RunOptions, before: Before) -> RigRoom:
-        """Return the world as one of the heads is in it."""
+    def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
+        """Return the world from the view of one of the heads."""
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands, clock = _stands(self.frames[number]), self.clock(number)
+        stands, clock = _pose_numbers(self.frames[number]), self.clock(number)
         return simulated_room(rig, options, clock, world, self._world, stands)
 
     def clock(self, number: int) -> Clock:
@@ -130,15 +130,15 @@ class SimulatedWorld:
         return self._lockstep.clock(number)
 
     def enter(self, number: int) -> None:
-        """Return when it is a head's first turn."""
+        """Wait for a head's first turn."""
         self._lockstep.enter(number)
 
     def leave(self, number: int) -> None:
-        """Let the others go on without a head."""
+        """Let the other heads continue without this one."""
         self._lockstep.leave(number)
 
     def close(self) -> None:
-        """Do nothing: it ends with this process."""
+        """Do nothing: the world ends with this process."""
 
 
 class RealTimeWorld:
@@ -146,10 +146,10 @@ class RealTimeWorld:
 
     Args:
         found: the world.
-        rigs: of all heads, the first one's first, each with the head's name.
+        rigs: rigs of all heads, the first head's first, each with the head's name.
 
     Raises:
-        SetupError: it cannot be used; says why.
+        SetupError: the world cannot be used; the message gives the reason.
     """
 
     def __init__(self, found: RunWorld, rigs: Sequence[tuple[str, Rig]]) -> None:
@@ -165,18 +165,18 @@ class RealTimeWorld:
         self._paths = self._buses.start_rigs(lines, found.spec)
         self._found = found.served(self._buses.folder)
 
-    def face(self, number: int, rig: Rig) -> FaceNow:
-        """Return what tells where a head's face is now."""
+    def face(self, number: int, rig: Rig) -> FacePoseSource:
+        """Return a source of the current pose of a head's face."""
         joints = RigInState(kinematics_of(rig), self._buses.joints[number])
-        return FaceNow(
+        return FacePoseSource(
             WorldPoses(state_file(self._buses.folder), joints), self.frames[number], _nose_m(rig)
         )
 
-    def room(self, number: int, rig: Rig, options: RunOptions, before: Before) -> RigRoom:
-        """Return the world as one of the heads is in it."""
-        served = ServedRig(self._buses, self._paths[number], _leave_it)
+    def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
+        """Return the world from the view of one of the heads."""
+        served = ServedRig(self._buses, self._paths[number], _keep_running)
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands, clock = _stands(self.frames[number]), self.clock(number)
+        stands, clock = _pose_numbers(self.frames[number]), self.clock(number)
         return served_room(rig, options, clock, world, served, stands)
 
     def clock(self, number: int) -> Clock:
@@ -184,22 +184,22 @@ class RealTimeWorld:
         return RealClock()
 
     def enter(self, number: int) -> None:
-        """Return at once: real time waits for nobody."""
+        """Return immediately: real time does not wait."""
 
     def leave(self, number: int) -> None:
-        """Do nothing: nobody waits."""
+        """Do nothing: no head waits for another."""
 
     def close(self) -> None:
         """End the emulator's process; safe to call twice."""
         self._buses.stop()
 
 
-def _stands(frame: RigFrame) -> tuple[float, ...]:
+def _pose_numbers(frame: RigFrame) -> tuple[float, ...]:
     return HeadPlace(frame.R, frame.p_m).numbers
 
 
-def _leave_it() -> None:
-    """Let the world run: the other heads are in it, and ``close`` ends it."""
+def _keep_running() -> None:
+    """Do nothing: other heads use the world until ``close`` ends it."""
 
 
 def _nose_m(rig: Rig) -> Vec3:

@@ -1,9 +1,8 @@
-"""What the rig's camera sees in a world with physics.
+"""The pictures of the rig's camera in a world with physics.
 
-In real time the world is another process's. The camera's process renders it from the newest state
-that there is and looks for faces and motion in the picture; the control loop sees neither MuJoCo
-nor a picture. Where nothing on this machine can render, detections are computed instead, as of a
-scene.
+In real time another process computes the world. The camera's process renders its newest state and
+detects faces and motion in the picture; the control loop gets neither MuJoCo nor a picture. If
+nothing on this machine can render, detections are computed instead, as those of a scene.
 """
 
 from collections.abc import Callable
@@ -23,7 +22,7 @@ from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.world.camera_params import WorldCameraParams
 from gazerig.features.world.gl_context import NoRenderer, render_in_calling_thread
-from gazerig.features.world.run.camera import WorldCamera, without_pictures
+from gazerig.features.world.run.camera import WorldCamera, no_pictures_message
 from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
 from gazerig.features.world.state_file import HostState
 from gazerig.features.world.world_spec import WorldSpec
@@ -53,16 +52,18 @@ _LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class RenderedWorld(NamedTuple):
-    """What a process needs to render what the rig's camera sees in a world; can be sent to it.
+    """Everything that a process needs to render the pictures of the rig's camera in a world.
+
+    It can be sent to the process.
 
     Attributes:
-        spec: what the world is made of.
-        scene: the people in it.
-        mount: where the camera sits on the head.
+        spec: content of the world.
+        scene: its people.
+        mount: pose of the camera on the head.
         camera: its field of view and lens.
-        rng: for the noise.
-        params: how large, how fast and how true its pictures are.
-        number: which of the world's rigs carries the camera.
+        rng: random numbers of the noise.
+        params: size, rate and fidelity of its pictures.
+        number: number of the rig with the camera in the world.
     """
 
     spec: WorldSpec
@@ -83,16 +84,16 @@ class RenderedWorld(NamedTuple):
         locate: Locate | None = None,
         begins_s: float | None = None,
     ) -> "PixelCamera":
-        """Return the camera; it has rendered one picture already.
+        """Return the camera after it has rendered one picture.
 
         Args:
             newest: returns the state of the world, None before the first.
-            head: where the head is in that state.
+            head: returns the pose of the head in that state.
             detector: finds the faces.
-            simulated: pictures are late on the run's own clock; else they take what they take.
-            find_motion: finds what moves, besides the faces.
-            locate: locates what is found in the camera's axes, None for none.
-            begins_s: when the script of the people begins; None: at the first look.
+            simulated: pictures are late on the run's own clock; else rendering takes real time.
+            find_motion: finds motion other than that of faces.
+            locate: converts detections to the camera's axes, None for none.
+            begins_s: start time of the people's script; None: at the first picture.
 
         Raises:
             NoRenderer: nothing on this machine can render.
@@ -120,7 +121,7 @@ class RenderedWorld(NamedTuple):
 
 
 def served_pixels(world: RenderedWorld, poses: WorldPoses, head: HeadPose) -> "PixelCamera":
-    """Return the camera that renders the world of another process, for a process of its own.
+    """Return the camera that renders the world of another process in its own process.
 
     Raises:
         NoRenderer: nothing on this machine can render.
@@ -135,20 +136,20 @@ def world_view(
     params: WorldCameraParams,
     number: int = 0,
 ) -> "SceneView":
-    """Return what renders a world.
+    """Return the renderer's view of a world.
 
     Args:
         spec: of the world.
         newest: returns its state, None before the first.
         params: of the camera.
-        number: which of its rigs carries the camera.
+        number: number of the rig with the camera.
     """
     model = spec.compiled()
-    from gazerig.features.world.figure_model import PlacedPeople
+    from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.picture import WorldPicture
     from gazerig.features.world.renderer import RendererParams
 
-    people = PlacedPeople(model.mj, spec.figures) if spec.figures is not None else None
+    people = PeoplePlacer(model.mj, spec.figures) if spec.figures is not None else None
 
     def place(data: Any, t_s: float) -> None:
         state = newest()
@@ -187,13 +188,13 @@ def world_camera(
     Args:
         rig: with the parameters of the detectors.
         options: whether pictures are rendered, and whether time is simulated.
-        world: what is to be rendered.
-        poses: where the head is.
-        locate: locates what is found in the camera's axes.
+        world: the world to render.
+        poses: pose of the head.
+        locate: converts detections to the camera's axes.
         clock: of the run.
-        turns: how the camera was turned when, in real time.
+        turns: rotation of the camera over time, in real time.
         own: camera and detector of a program.
-        say: gets what a person should know.
+        say: receives messages to the user.
     """
     scene_params = SceneCameraParams(horizontal_field_deg=world.camera.horizontal_field_deg)
 
@@ -217,7 +218,7 @@ def world_camera(
             MotionOfDrawn(rig.motion), locate, poses.begin_s,
         )  # fmt: skip
     except NoRenderer as error:
-        say(without_pictures(error))
+        say(no_pictures_message(error))
         return ideal(poses.begin_s)
 
 
@@ -229,7 +230,7 @@ def _process(
     clock: Clock,
     turns: PoseBuffer | None,
 ) -> CameraProcess:
-    """Return the process that renders the world of another process and looks."""
+    """Return the process that renders the world of another process and detects."""
     camera = world.camera
     field_rad = radians(camera.horizontal_field_deg)
     motion = partial(motion_finder, rig.motion, camera.lens, field_rad, turns)

@@ -12,19 +12,19 @@ from gazerig.sim_mock.scenes.scene import Scene
 
 
 class WorldSurroundings(Surroundings):
-    """A world with physics of a script's name or path, or of a user's own MJCF file.
+    """A world with physics, from a script's name or path or from a user's own MJCF file.
 
-    Modules are imported where they are used: MuJoCo's and the people's are heavy.
+    Modules are imported on use: those with MuJoCo and people are heavy.
     """
 
     def scene(self, options: RunOptions) -> Scene:
-        """Return the people of the world that was asked for."""
-        from gazerig.features.world.run.run_world import asked_world, world_scene
+        """Return the people of the requested world."""
+        from gazerig.features.world.run.run_world import requested_world, world_scene
 
-        return world_scene(asked_world(options), options.seed)
+        return world_scene(requested_world(options), options.seed)
 
     def open(self, rig: Rig, options: RunOptions, clock: Clock) -> RunRoom:
-        """Return the world that was asked for, with one rig in it."""
+        """Return the requested world with one rig in it."""
         from gazerig.features.world.run.rig_room import open_room
         from gazerig.features.world.run.run_world import world_of
 
@@ -35,13 +35,13 @@ class WorldSurroundings(Surroundings):
         return shipped_names("worlds", HOME)
 
     def group(self, options: RunOptions) -> GroupRun | None:
-        """Return the run of several heads, None in a world with one."""
+        """Return the run of several heads, None for a world with one."""
         from gazerig.features.world.run.head_group import compose_group, has_other_heads
 
         return compose_group(options) if has_other_heads(options) else None
 
     def replayed(self, info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
-        """Return how the world of a recorded run looked."""
+        """Return the shapes of the world of a recorded run."""
         from gazerig.features.world.run.recorded_world import recorded_shapes
 
         return recorded_shapes(info, stands)

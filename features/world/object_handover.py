@@ -1,18 +1,18 @@
-"""Things that go from hand to hand: who holds one when, and where it is."""
+"""Things that go from hand to hand: the holder and the pose of each over time."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gazerig.features.world.rotations import quaternions, turned, yaw_of, yaw_pitch_roll
+from gazerig.features.world.rotations import quaternions, rotate, yaw_of, yaw_pitch_roll
 from gazerig.features.world.script import Act, Fault, WorldScript
 from gazerig.features.world.time_profiles import rise
 from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
 
 GRIP_M = np.array((0.046, 0.0, -0.085))
-"""Middle of what a hand holds, in the hand's frame."""
+"""Middle of a held thing, in the hand's frame."""
 _CHANGES_S = 0.3
 Side = Literal["left", "right"]
 _OTHER: Mapping[Side, Side] = {"left": "right", "right": "left"}
@@ -21,7 +21,7 @@ Timelines = Mapping[str, tuple[TimedAct, ...]]
 
 
 class Holder(NamedTuple):
-    """From ``from_s`` on a thing is in this hand."""
+    """A thing is in this hand from ``from_s`` on."""
 
     from_s: float
     person: str
@@ -29,7 +29,7 @@ class Holder(NamedTuple):
 
 
 def holders(script: WorldScript, timelines: Timelines, thing: str) -> list[Holder]:
-    """Return who holds a thing one after the other; it changes hands in the middle of a pass."""
+    """Return the successive holders of a thing; it changes hands in the middle of a pass."""
     first = script.things[thing]
     found = [Holder(0.0, first.held_by, first.side)]
     passes = [
@@ -43,8 +43,8 @@ def holders(script: WorldScript, timelines: Timelines, thing: str) -> list[Holde
     return found
 
 
-def received(timelines: Timelines, name: str) -> list[TimedAct]:
-    """Return what a person does to take what others pass, with the hand on their side."""
+def receiving_acts(timelines: Timelines, name: str) -> list[TimedAct]:
+    """Return the acts of a person that take things from others, with the hand on the same side."""
     return [
         TimedAct(Act(one.act.at_s, "pass", giver, side=_taking(one.act)), one.start_s, one.end_s)
         for giver, acts in timelines.items()
@@ -57,8 +57,8 @@ def _taking(act: Act) -> Side:
     return _OTHER[act.side]
 
 
-def held_share(t_s: Floats, found: Sequence[Holder], person: str, side: str) -> Floats:
-    """Return how far a hand is one that holds a thing (n,), 0..1."""
+def holding_share(t_s: Floats, found: Sequence[Holder], person: str, side: str) -> Floats:
+    """Return the holding posture of a hand (n,): 0 free, 1 holding."""
     total = np.zeros_like(t_s)
     for i, one in enumerate(found):
         now = 1.0 if (one.person, one.side) == (person, side) else 0.0
@@ -77,22 +77,22 @@ def thing_poses(
 
     Args:
         t_s: times of the rows.
-        found: who holds it.
+        found: its holders.
         hands: places (n, 3) and rotations (n, 3, 3) of hands by person and side.
-        ahead: (n, 3) where each person is turned.
+        ahead: (n, 3) direction that each person faces.
     """
     place, yaw = np.zeros((len(t_s), 3)), np.zeros_like(t_s)
     for i, one in enumerate(found):
         p_m, R = hands[one.person, one.side]
         since = np.ones_like(t_s) if i == 0 else rise((t_s - one.from_s) / _CHANGES_S + 0.5)
-        place = place + since[:, None] * (p_m + turned(R, GRIP_M) - place)
+        place = place + since[:, None] * (p_m + rotate(R, GRIP_M) - place)
         turn = np.unwrap(yaw_of(ahead[one.person]))
         yaw = turn if i == 0 else yaw + since * (turn - yaw)
     return np.concatenate((place, quaternions(yaw_pitch_roll(yaw, 0.0 * yaw))), axis=1)
 
 
-def passing_faults(script: WorldScript, timelines: Timelines) -> Iterator[Fault]:
-    """Yield who passes what another holds, and what ends the round in another hand."""
+def handover_faults(script: WorldScript, timelines: Timelines) -> Iterator[Fault]:
+    """Yield passes by a person who does not hold the thing, and things that end in another hand."""
     for thing, first in script.things.items():
         holder = first.held_by
         passes = sorted(

@@ -1,58 +1,58 @@
-"""How well several heads kept their time together, from the figures of their runs."""
+"""Deadlines of several heads, from the figures of their runs."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from gazerig.robot.control.loop_timing import BUSY_SHARE
 
-_TELLING_S = 3.0
-"""A shorter run tells nothing."""
+_SHORTEST_S = 3.0
+"""A shorter run gives no statistics."""
 _ENOUGH = 0.7
 """With a smaller share of the pictures a head reacts visibly later."""
 
 
-class KeptTime(NamedTuple):
-    """How well a head kept its time.
+class DeadlineStats(NamedTuple):
+    """Missed deadlines of a head.
 
     Attributes:
         late: share of its ticks that came late.
-        pictures_hz: how many pictures it saw a second.
+        pictures_hz: processed pictures a second.
     """
 
     late: float
     pictures_hz: float
 
     @classmethod
-    def of(cls, figures: Mapping[str, Any]) -> "KeptTime | None":
-        """Return it of the figures of a run, None of one that was too short to tell."""
+    def of(cls, figures: Mapping[str, Any]) -> "DeadlineStats | None":
+        """Return the statistics from the figures of a run, None for a short run."""
         ticks, overruns, seconds = figures["ticks"], figures["overruns"], figures["seconds"]
-        if seconds < _TELLING_S:
+        if seconds < _SHORTEST_S:
             return None
         return cls(overruns / max(1, ticks + overruns), figures["pictures"] / seconds)
 
     def is_behind(self, pictures_hz: float) -> bool:
-        """Return whether ticks or pictures fell behind; pictures_hz: as many were asked for."""
+        """Return whether ticks or pictures fell behind; pictures_hz: requested rate."""
         return self.late >= BUSY_SHARE or self.pictures_hz < _ENOUGH * pictures_hz
 
     def text(self, pictures_hz: float) -> str:
-        """Return it in words."""
+        """Return a description."""
         return (
             f"{self.late:.0%} of ticks late, {self.pictures_hz:.0f} of {pictures_hz:.0f} pictures "
             "a second"
         )
 
 
-def fell_behind(
+def overload_message(
     runs: Iterable[tuple[str, Mapping[str, Any] | None]], pictures_hz: float, rendered: bool
 ) -> str:
-    """Return in one line which heads could not keep up in real time, "" where all did.
+    """Return a line with the heads that could not keep up in real time, "" if all did.
 
     Args:
-        runs: name of each head and the figures of its run, None where it did not begin.
-        pictures_hz: as many pictures a second were asked for.
-        rendered: pictures were, so that there is something to leave out.
+        runs: name of each head and the figures of its run, None if it did not begin.
+        pictures_hz: requested pictures a second.
+        rendered: whether pictures were rendered, so that the user can disable them.
     """
-    kept = [(name, KeptTime.of(figures)) for name, figures in runs if figures is not None]
+    kept = [(name, DeadlineStats.of(figures)) for name, figures in runs if figures is not None]
     slow = [
         f"{name}: {one.text(pictures_hz)}"
         for name, one in kept
@@ -60,5 +60,5 @@ def fell_behind(
     ]
     if not slow:
         return ""
-    less = "; --no-pictures asks less of it" if rendered else ""
+    less = "; --no-pictures reduces the load" if rendered else ""
     return f"the computer is too busy for these heads ({'; '.join(slow)}){less}"
