@@ -186,23 +186,23 @@ def answered(**changes: object) -> Feedback:
 def test_one_servo_of_a_pair_speaks_for_both_joints() -> None:
     pair = CoupledPair("neck_pitch", "neck_roll", Differential())
     servos = CoupledServos([pair], ("jaw", "neck_pitch", "neck_roll"))
-    servos.completed(answered(), released=False)
+    servos.share_feedback(answered(), released=False)
     later = answered(
         missing=(2,), at_s=(6.0, 6.0, 4.9), position_steps=(0.5, 9.0, 2.0),
         torque=(True, False, True), rearmed=(False, True, False), fault=("", "", "overheating"),
     )  # fmt: skip
-    found = servos.completed(later, released=False)
+    found = servos.share_feedback(later, released=False)
     assert found.missing == (1, 2) and found.at_s == (6.0, 4.9, 4.9)
     assert found.position_steps == (0.5, 1.0, 2.0)
     assert found.load == (0.0, -0.4, -0.4)
     assert found.torque == (True, False, False) and found.rearmed == (False, True, True)
     assert found.fault == ("", "overheating (of its coupled servo)", "overheating")
-    assert servos.completed(later, released=True).torque == (True, True, True)
+    assert servos.share_feedback(later, released=True).torque == (True, True, True)
 
 
 def test_beyond_the_mechanism_servos_keep_their_last_goals() -> None:
     servos = CoupledServos([CoupledPair("a", "b", RODS)], ("a", "b"))
-    servos.held((0.2, 0.1))
+    servos.set_goals((0.2, 0.1))
     assert servos.shafts((0.0, 1.4)) == [0.2, 0.1]
     assert servos.speeds((0.0, 1.4), (1.0, 1.0)) == [0.0, 0.0]
 

@@ -27,7 +27,7 @@ from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_files import FACE_LANDMARK, FOLDER_VARIABLE, IRIS_LANDMARK
 from gazerig.gaze.types import Face, Percept
-from gazerig.robot.control.tick_stream import _percept, decode_plain, encode
+from gazerig.robot.control.tick_stream import _percept_row, decode_plain, encode
 from gazerig.robot.dashboard.view.people import face_label
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.track_params import TrackParams
@@ -201,7 +201,7 @@ def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away()
 
 def test_recordings_hold_signs_and_those_of_before_are_read() -> None:
     (face,) = percept_of(1.0, face_with_signs()).faces
-    data = percept_as_json(decode_plain(encode(_percept(7, percept_of(1.0, face)))))
+    data = percept_as_json(decode_plain(encode(_percept_row(7, percept_of(1.0, face)))))
     _, back = percept_from_json(orjson.loads(orjson.dumps(data)))
     assert back.faces == (face,)
     for name in ("eye_opening", "mouth_opening_m", "speaks"):

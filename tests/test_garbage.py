@@ -10,7 +10,7 @@ import gazerig.robot.control.loop as loop
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.garbage import set_aside
+from gazerig.robot.control.garbage import freeze_objects
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -29,11 +29,11 @@ def test_what_an_earlier_robot_left_is_let_go_at_the_next_start(
     monkeypatch.setattr(gc, "unfreeze", unfreeze)  # of which tests are spared else
     head = Head()
     left = weakref.ref(head)
-    set_aside()
+    freeze_objects()
     del head
     gc.collect()
     assert left() is not None  # set aside: no pass looks at it
-    set_aside()
+    freeze_objects()
     assert left() is None
 
 
@@ -42,7 +42,7 @@ def test_only_a_robot_that_has_slots_to_miss_sets_garbage_aside(
     monkeypatch: pytest.MonkeyPatch, clock: Clock, times: int
 ) -> None:
     calls: list[None] = []
-    monkeypatch.setattr(loop, "set_aside", lambda: calls.append(None))
+    monkeypatch.setattr(loop, "freeze_objects", lambda: calls.append(None))
     made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
     made.robot.start(clock)
     made.robot.stop()

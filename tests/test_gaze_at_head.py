@@ -15,7 +15,7 @@ from gazerig.drivers.camera.recording_format import _face, decode_faces
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import PARTS, Angles2, Angles3, Bodies, Face, Mat3, Percept, Vec3
-from gazerig.robot.control.tick_stream import _percept, decode_plain, encode
+from gazerig.robot.control.tick_stream import _percept_row, decode_plain, encode
 from gazerig.robot.dashboard.view.people import face_label
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.track_params import TrackParams
@@ -186,7 +186,7 @@ def percept_of(t_s: float, *rows: Face) -> Percept:
 
 def test_recordings_hold_it_and_those_of_before_are_read() -> None:
     handed = percept_of(1.0, face_at(3, (1.0, 0.0, 0.2), True))
-    data = percept_as_json(decode_plain(encode(_percept(7, handed))))
+    data = percept_as_json(decode_plain(encode(_percept_row(7, handed))))
     number, back = percept_from_json(orjson.loads(orjson.dumps(data)))
     assert number == 7 and back.faces == handed.faces
     for face in data["faces"]:

@@ -4,7 +4,7 @@ from typing import cast
 
 import pytest
 
-from gazerig.robot.control.heads_together import HeadsTogether, NamedRobot
+from gazerig.robot.control.heads_together import NamedRobot, RobotGroup
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.model.commands import Command, Renew, Resume, Stop
 from gazerig.robot.model.reply import CommandReply, Ticket
@@ -30,9 +30,9 @@ class Head:
 DONE, HOLDS = CommandReply(), CommandReply("a stop holds at least 2 s: ask again in 0.1 s")
 
 
-def together(first: Head, *others: Head) -> HeadsTogether:
+def together(first: Head, *others: Head) -> RobotGroup:
     named = [NamedRobot(f"head{n}", cast("Robot", one)) for n, one in enumerate(others, 2)]
-    return HeadsTogether(cast("Robot", first), named)
+    return RobotGroup(cast("Robot", first), named)
 
 
 def reply(command: Command, first: Head, *others: Head) -> CommandReply | None:

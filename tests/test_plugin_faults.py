@@ -23,7 +23,7 @@ from gazerig.drivers.vision.face.detector import CheckedDetector
 from gazerig.gaze.types import Target
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.chooser import MOST_OVERRUNS, GuardedChooser, target_of
+from gazerig.robot.control.chooser import MOST_OVERRUNS, GuardedChooser, to_target
 
 LABEL = "attention 'odd' of odd 1.2"
 OWN: Any = Target((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), 0.0, "face", 3, 1.0, True, None, 1, "own")
@@ -66,7 +66,7 @@ NONSENSE = [
     (lambda *_: OWN._replace(salience=nan), "a target with salience nan"),
     (lambda *_: OWN._replace(v_world_m_s=(0.0, nan, 0.0)), "each must be a number"),
     (lambda *_: OWN._replace(centre_world_m=(0.0, nan, 0.0)), "each must be a number"),
-    (lambda *_: OWN._replace(id="x"), "whose id is no whole number"),
+    (lambda *_: OWN._replace(id="x"), "whose id is not a whole number"),
     (raising, "failed (KeyError: "),
 ]
 
@@ -108,7 +108,7 @@ def test_a_rule_that_blocks_costs_the_loop_its_patience_only_and_is_dropped():
 def answering(took_s):
     """Return a chooser whose rule answers a point after these times."""
     chooser, said = guarded(lambda *_: None)
-    point = target_of((1.0, 0.0, 0.5), 0.0)
+    point = to_target((1.0, 0.0, 0.5), 0.0)
     outcomes = iter(CallResult(point, None, one) for one in took_s)
     chooser._call = type("Call", (), {
         "__call__": lambda self, work: next(outcomes), "running_s": lambda self: 0.0,

@@ -27,7 +27,7 @@ from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.params import Bounds
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.command_choices import refuse_out_of_range
-from gazerig.robot.control.observers import left_out
+from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.power_down import Again
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Jog
@@ -238,7 +238,7 @@ class ManualControl:
                 self._watch(step)
             except Exception as error:
                 self._watch = None
-                self._said.append(left_out("who watches", error))
+                self._said.append(failure_text("who watches", error))
         return step
 
 

@@ -17,10 +17,10 @@ from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.control.heads_together import HeadsTogether
+from gazerig.robot.control.heads_together import RobotGroup
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
-from gazerig.robot.control.observers import Observers, left_out
+from gazerig.robot.control.observers import Observers, failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
@@ -89,7 +89,7 @@ class RunObservers:
         computed = options.no_pictures or (made.scene is not None and not options.pixels)
         self._detector = "" if computed else str(detector_status(made.live.rig.detector))
         self._tuning, self._recorder, self._world_recorded = tuning, recorder, False
-        self._commanded = HeadsTogether(made.robot, made.others)
+        self._commanded = RobotGroup(made.robot, made.others)
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
             LiveServer(
@@ -240,7 +240,7 @@ class RunObservers:
         try:
             yield
         except Exception as error:
-            self._say(left_out(name, error))
+            self._say(failure_text(name, error))
 
     def tell(self, text: str) -> None:
         """Show a message to all users of the page."""

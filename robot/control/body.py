@@ -1,4 +1,4 @@
-"""Joints to servos and back: the only place that knows what a step means at a joint."""
+"""Conversion between joints and servos; the only place that converts steps to joint angles."""
 
 import contextlib
 from collections.abc import Mapping, Sequence
@@ -21,12 +21,13 @@ def setups(
     gentle_deg_s: float = ENTRY_DEG_S,
     pairs: Sequence[CoupledPair] = (),
 ) -> tuple[ServoConfig, ...]:
-    """Return what a bus must know of all servos.
+    """Return the configuration of all servos for a bus.
 
-    park_rad: parking pose of joints, 0 where not given: where servos that do not tell their
-        place are taken to be
-    gentle_deg_s: joints are led into their ranges no faster
-    pairs: joints that two servos move together
+    Args:
+        joints: The joints by name.
+        park_rad: Parking pose by joint, default 0; the assumed start of servos without feedback.
+        gentle_deg_s: Highest speed at which joints outside their ranges move inside.
+        pairs: Joints that two servos move together.
     """
     coupled: dict[str, ServoConfig] = {}
     for pair in pairs:
@@ -38,16 +39,17 @@ def setups(
 
 
 class Body:
-    """All joints of one rig on its bus, or its buses as one.
+    """All joints of a rig on its bus, or on its buses as one.
 
-    names: of the joints, in the order of every sequence of them
+    Attributes:
+        names: Names of the joints, in the order of every sequence of joints.
 
     Args:
-        bus: made with ``setups`` of the same joints.
-        joints: the joints by name.
-        park_rad: as in ``setups``.
-        gentle_deg_s: as in ``setups``.
-        pairs: as in ``setups``.
+        bus: Bus with the configuration from ``setups``.
+        joints: The joints by name.
+        park_rad: As in ``setups``.
+        gentle_deg_s: As in ``setups``.
+        pairs: As in ``setups``.
     """
 
     def __init__(
@@ -66,21 +68,21 @@ class Body:
         self._torque_off = False
         self._gentle_deg_s = gentle_deg_s
         self._set_up = tuple(joints[name] for name in self.names)
-        self._take(self._set_up)
-        # Before the first answer: the centre, of an age that says so.
+        self._set_joints(self._set_up)
+        # Before the first answer: the centre, infinitely old.
         self._nothing = Feedback.of_none(len(self.names))
         self._last = self._nothing._replace(
             position_steps=tuple(self._steps((0.0,) * len(self.names))),
             velocity_steps_s=(0.0,) * len(self.names),
             load=(0.0,) * len(self.names),
-            torque=(True,) * len(self.names),  # it was switched on, and no servo says otherwise
+            torque=(True,) * len(self.names),  # it was switched on, and no servo denies it
             measured=tuple([joint.facts.measured for joint in self._joints]),
         )
 
-    def _take(self, joints: tuple[JointParams, ...]) -> None:
+    def _set_joints(self, joints: tuple[JointParams, ...]) -> None:
         self._joints = joints
         linkages = [joint.made() for joint in joints]
-        # All joints at once as if every linkage were straight; then those that are not.
+        # All joints are computed as if every linkage were straight; then the others are corrected.
         lines = [linkage.line or Line(0.0, 0.0, 0.0) for linkage in linkages]
         self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
         self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
@@ -88,13 +90,14 @@ class Body:
     def retune(
         self, joints: Mapping[str, JointParams], gentle_deg_s: float
     ) -> dict[int, tuple[float, float]]:
-        """Count angles otherwise from now on; the servos are set up again when torque comes on.
+        """Apply new joint parameters; the servos are set up again when the torque comes on.
 
-        Gives, for each joint whose angles are other ones now, (factor, offset in radians):
-        what was x is factor x + offset.
+        Returns:
+            (factor, offset in rad) by number of each joint whose angles change: x becomes
+            factor * x + offset.
         """
         before, self._gentle_deg_s = self._joints, gentle_deg_s
-        self._take(tuple(joints[name] for name in self.names))
+        self._set_joints(tuple(joints[name] for name in self.names))
         self.bus.retune(setups(joints, self._park_rad, self._gentle_deg_s, self._pairs))
         return {
             i: (
@@ -102,18 +105,18 @@ class Body:
                 now.angle_rad(old.steps(0.0)),
             )
             for i, (old, now) in enumerate(zip(before, self._joints, strict=True))
-            if not _counts_alike(old, now)
+            if not _same_conversion(old, now)
         }
 
     def reach(self) -> tuple[JointLimit, ...]:
-        """Return the ranges and speeds that servos were set up to keep, as angles of now."""
-        return tuple(map(_as_set_up, self._set_up, self._joints))
+        """Return the ranges and speeds of the servos' configuration, in present joint angles."""
+        return tuple(map(_configured_limit, self._set_up, self._joints))
 
     def start(self) -> JointAngles:
-        """Open the bus and switch torque on where the joints are; give the goals in force.
+        """Open the bus and switch the torque on at the present angles; return the goals.
 
         Raises:
-            SetupError: port or servos are not as configured.
+            SetupError: The port or the servos do not match the configuration.
         """
         self.bus.open()
         try:
@@ -123,11 +126,11 @@ class Body:
             raise
 
     def read(self, t_s: float) -> JointState:
-        """Read all joints; one that does not answer keeps its last value and its age.
+        """Read all joints; a joint that does not answer keeps its last value and its age.
 
         Raises:
-            BusLost: no servo has answered for too long, and torque was not let
-                go of; after that the bus may stay away for as long as it likes.
+            BusLost: No servo has answered for too long while the torque was on. With the torque
+                off, a lost bus is no error.
         """
         try:
             feedback = self.bus.read(t_s)
@@ -139,7 +142,7 @@ class Body:
             feedback = feedback.filled(self._last)
         self._last = feedback
         if self._coupled is not None:
-            feedback = self._coupled.completed(feedback, self._torque_off)
+            feedback = self._coupled.share_feedback(feedback, self._torque_off)
         steps, speeds, load, at_s, celsius, volts, torque, fault, measured, rearmed, gone = feedback
         rates = tuple(map(mul, speeds, self._rates))
         if self._bent or self._coupled is not None:
@@ -150,7 +153,7 @@ class Body:
         else:
             angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
         missing = tuple([self.names[i] for i in gone]) if gone else ()
-        # Without the call of a function written in Python that the class itself would cost.
+        # Avoids the call of the class's constructor, a Python function.
         return tuple.__new__(
             JointState,
             (
@@ -161,7 +164,7 @@ class Body:
     def _bent_rates(
         self, rates: tuple[float, ...], speeds: Sequence[float], steps: Sequence[float]
     ) -> tuple[float, ...]:
-        """Return the rates of all joints, right for linkages that are not straight, too."""
+        """Return the rates of all joints, corrected for linkages that are not straight."""
         right = list(rates)
         for i, linkage in self._bent:
             right[i] = speeds[i] * linkage.rate_rad(steps[i])
@@ -171,7 +174,7 @@ class Body:
         """Send one goal to every servo.
 
         Raises:
-            ValueError: an angle is not a number, or there are not as many as joints.
+            ValueError: An angle is not a number, or the number of angles is wrong.
         """
         if self._bent or self._coupled is not None or len(command_rad) != len(self._zeros):
             self.bus.write(self._steps(command_rad))
@@ -197,43 +200,43 @@ class Body:
         return tuple(shafts if self._coupled is None else self._coupled.joints(shafts))
 
     def _shafts(self, steps: Sequence[float]) -> list[float]:
-        """Return the angles of servo positions, those of coupled servos at their own shafts."""
+        """Return the angles of servo positions; for coupled servos those of their shafts."""
         angles = [*map(mul, map(sub, steps, self._zeros), self._rates)]
         for i, linkage in self._bent:
             angles[i] = linkage.angle_rad(steps[i])
         return angles
 
     def disable_torque(self) -> None:
-        """Torque off at once; the bus stays open and readings go on.
+        """Switch the torque off immediately; the bus stays open and reading continues.
 
         Raises:
-            BusLost: the port is gone; the torque is taken off when it is back.
+            BusLost: The port is gone; the torque is switched off when it is back.
         """
         self._torque_off = True
         self.bus.disable_torque()
 
     def enable_torque(self) -> JointAngles:
-        """Torque on again where the joints are; give the goals in force.
+        """Switch the torque on again at the present angles; return the goals.
 
         Raises:
-            SetupError: a servo does not answer, refuses or has latched a fault.
-            BusLost: the port is gone.
+            SetupError: A servo does not answer, refuses or has latched a fault.
+            BusLost: The port is gone.
         """
         goals = self.bus.enable_torque()
         self._torque_off = False
         if self._coupled is not None:
-            self._coupled.held(self._shafts(goals))
+            self._coupled.set_goals(self._shafts(goals))
         self._set_up = self._joints
         return self.angles(goals)
 
     def stop(self) -> tuple[str, ...]:
-        """Torque off and close the bus; return what the bus says of the torque that went off.
+        """Switch the torque off and close the bus; return the bus's messages about it.
 
-        e.g. "left_lid (servo 7): torque-off not confirmed: cut the servo power"
+        A message is, e.g., "left_lid (servo 7): torque-off not confirmed: cut the servo power".
         """
         try:
             with contextlib.suppress(Exception):  # nothing may keep the torque on
-                self.bus.events()  # what was before is no word about this
+                self.bus.events()  # discards earlier messages
             self._release()
             with contextlib.suppress(Exception):
                 return self.bus.events()
@@ -246,15 +249,15 @@ class Body:
             self.bus.disable_torque()
         except DriverError:
             raise
-        except Exception:  # no fault of the bus, such as no memory: it is tried once more
+        except Exception:  # not a fault of the bus, such as no memory: try once more
             self.bus.disable_torque()
         except BaseException:
             self.bus.disable_torque()
             raise
 
 
-def _counts_alike(one: JointParams, other: JointParams) -> bool:
-    """Return whether both make the same angle of the same step."""
+def _same_conversion(one: JointParams, other: JointParams) -> bool:
+    """Return whether both convert each step to the same angle."""
     return (one.sign, one.ratio, one.zero, one.transmission_points) == (
         other.sign,
         other.ratio,
@@ -263,10 +266,10 @@ def _counts_alike(one: JointParams, other: JointParams) -> bool:
     )
 
 
-def _as_set_up(set_up: JointParams, now: JointParams) -> JointLimit:
-    """Return the limits of a servo that was set up with other parameters than are in force."""
+def _configured_limit(set_up: JointParams, now: JointParams) -> JointLimit:
+    """Return a servo's configured limits in the joint angles of the present parameters."""
     limit = set_up.limit()
-    if _counts_alike(set_up, now):
+    if _same_conversion(set_up, now):
         return limit
     was, made = set_up.made(), now.made()
     ends = sorted(made.angle_rad(was.steps(end)) for end in (limit.low_rad, limit.high_rad))

@@ -1,7 +1,7 @@
-"""What chooses where to look: the rig's own attention, or a rule of another package.
+"""Choice of the gaze target by the rig's own attention or by a rule of another package.
 
-A rule is asked beside the rig's own attention, which goes on all the time, so that it can take
-over at once from a rule that fails or is too slow.
+A rule runs in addition to the rig's own attention. The rig's attention is always updated, so
+that it can immediately replace a rule that fails or is too slow.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,28 +13,29 @@ from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import GazeState, Percept, Target, Vec3
 
 LONGEST_S = 0.001
-"""A rule may take so long in a tick; after that the loop goes on without its answer."""
+"""Time for a rule in a tick; after that the loop continues without its answer."""
 
 MOST_OVERRUNS = 5
-"""A rule that ran for longer so often within ``FORGIVEN_S`` is dropped."""
+"""A rule with this number of overruns within ``FORGIVEN_S`` is dropped."""
 
 BLOCKED_S = 0.25
-"""A rule that has been running for so long is dropped."""
+"""A rule whose call has lasted this long is dropped."""
 
 FORGIVEN_S = 1.0
 """Overruns farther apart than this are forgotten."""
 
 FARTHEST_M = 1e6
-"""No target is farther away or faster."""
+"""Largest coordinate [m] and speed [m/s] of a target."""
 
 _JUMP_M = 0.1
-"""A bare point that moves farther from one answer to the next is another thing to look at."""
+"""A bare point that moves farther between two answers counts as a new target."""
 
 
 class TargetChooser(Protocol):
-    """Chooses what to look at, as gaze.attention.Attention does.
+    """A source of gaze targets, such as gaze.attention.Attention.
 
-    top_down: the behaviours there are to choose from
+    Attributes:
+        top_down: The available behaviours.
     """
 
     top_down: TopDown
@@ -44,36 +45,36 @@ class TargetChooser(Protocol):
         ...
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
-        """Return the target in force at ``t_s``."""
+        """Return the target at ``t_s``."""
         ...
 
 
 class Chooser(Protocol):
-    """A rule of who is looked at, as a package or a program brings it."""
+    """A rule for the gaze target from a package or a program."""
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target | Vec3 | None:
-        """Return what to look at; None: the rig's own attention chooses.
+        """Choose a target; None leaves the choice to the rig's own attention.
 
         Args:
-            percept: faces and things in the world in the newest frame; None before the first.
-            state: where head and eyes are.
-            t_s: time of the tick, seconds.
+            percept: Faces and things of the newest frame in the world, None before the first.
+            state: Poses of head and eyes.
+            t_s: Time of the tick in s.
 
         Returns:
-            A target, or a point x, y, z in the world, metres.
+            A target, or a point x, y, z in the world in m.
         """
         ...
 
 
 class GuardedChooser:
-    """A rule beside the rig's own attention; implements ``TargetChooser``.
+    """A rule with the rig's own attention as fallback; implements ``TargetChooser``.
 
     Args:
-        rule: what chooses first.
-        own: what chooses where the rule does not, and after it was dropped.
-        label: the rule as messages name it.
-        say: gets one line when the rule is dropped.
-        longest_s: the rule may take so long, real seconds; None: in simulated time, any time.
+        rule: The rule.
+        own: The rig's attention; it chooses if the rule does not, and after it was dropped.
+        label: Name of the rule in messages.
+        say: Receives one line when the rule is dropped.
+        longest_s: Real time for the rule in s; None in simulated time, without a limit.
     """
 
     def __init__(
@@ -101,7 +102,7 @@ class GuardedChooser:
         self._chosen, self._identity = None, None
         rule = self._rule
         if rule is not None:
-            outcome = self._call(lambda: _forget(rule, t_s))
+            outcome = self._call(lambda: _reset(rule, t_s))
             if outcome is not None and outcome.error is not None:
                 self._drop(f"failed ({outcome.why})")
 
@@ -109,7 +110,7 @@ class GuardedChooser:
         """Return the target of the rule, else that of the rig's own attention."""
         own, rule = self._own.choose(percept, state, t_s), self._rule
         if rule is not None:
-            self._ask(rule, percept, state, t_s)
+            self._call_rule(rule, percept, state, t_s)
         chosen = self._chosen or own
         identity = (chosen.kind, chosen.id)
         if identity != self._identity or own.shift != self._own_shift and chosen is own:
@@ -117,10 +118,12 @@ class GuardedChooser:
         self._identity, self._own_shift = identity, own.shift
         return chosen._replace(shift=self._shift)
 
-    def _ask(self, rule: Chooser, percept: Percept | None, state: GazeState, t_s: float) -> None:
-        """Ask the rule, and keep what it chose until it answers again."""
+    def _call_rule(
+        self, rule: Chooser, percept: Percept | None, state: GazeState, t_s: float
+    ) -> None:
+        """Call the rule, and keep its choice until its next answer."""
         outcome = self._call(lambda: _answer(rule, percept, state, t_s))
-        if outcome is None:  # the machine may have been busy: only the rule's own time is blamed
+        if outcome is None:  # the computer may be busy: only the rule's own time counts
             if self._call.running_s() > BLOCKED_S:
                 self._drop(f"has not answered for {BLOCKED_S:g} s")
             return
@@ -135,7 +138,7 @@ class GuardedChooser:
             self._chosen = chosen
 
     def _overrun(self, t_s: float) -> bool:
-        """Count an answer that came late; return whether the rule is dropped for it."""
+        """Count a late answer; return whether the rule is dropped for it."""
         self._overruns = [at_s for at_s in self._overruns if t_s - at_s < FORGIVEN_S]
         self._overruns.append(t_s)
         if len(self._overruns) < MOST_OVERRUNS:
@@ -144,7 +147,7 @@ class GuardedChooser:
         return True
 
     def close(self) -> None:
-        """Ask the rule no more, and end it where it is still at work."""
+        """Stop calling the rule, and end a running call."""
         self._rule, self._chosen = None, None
         self._call.close()
 
@@ -153,8 +156,8 @@ class GuardedChooser:
         self._say(f"{self._label} {why}: dropped, the rig's own attention chooses")
 
 
-def _forget(rule: Chooser, t_s: float) -> None:
-    """Have a rule forget everything seen, where it can."""
+def _reset(rule: Chooser, t_s: float) -> None:
+    """Reset a rule that can be reset."""
     forget = getattr(rule, "reset", None)
     if callable(forget):
         forget(t_s)
@@ -163,20 +166,20 @@ def _forget(rule: Chooser, t_s: float) -> None:
 def _answer(
     rule: Chooser, percept: Percept | None, state: GazeState, t_s: float
 ) -> Target | str | None:
-    """Return what a rule chooses, or what is wrong with it; the rule's code may block."""
+    """Return a rule's choice, or a description of its error; the rule's code may block."""
     answer = rule.choose(percept, state, t_s)
     try:
-        return target_of(answer, t_s)
+        return to_target(answer, t_s)
     except ValueError as error:
         return str(error)
 
 
-def target_of(answer: Any, t_s: float) -> Target | None:
-    """Return what a rule answered as a target; a bare point becomes one.
+def to_target(answer: Any, t_s: float) -> Target | None:
+    """Convert a rule's answer to a target.
 
     Raises:
-        ValueError: it is neither a target nor a point nor None, or holds what is not finite; the
-            message is what it is.
+        ValueError: It is neither a target nor a point nor None, or contains a number that is
+            not finite; the message describes it.
     """
     if answer is None:
         return None
@@ -186,7 +189,7 @@ def target_of(answer: Any, t_s: float) -> Target | None:
             point, (0.0, 0.0, 0.0), t_s, "point", -1, 1.0, True, None, 0, "a rule's point"
         )
     if not isinstance(answer.kind, str) or not isinstance(answer.id, int):
-        raise ValueError("a target whose kind is no text or whose id is no whole number")
+        raise ValueError("a target whose kind is not text or whose id is not a whole number")
     for number, name in ((answer.salience, "salience"), (answer.at_s, "at_s")):
         if not _finite(number):
             raise ValueError(f"a target with {name} {number!r}")
@@ -203,13 +206,13 @@ def _vec(value: Any, wanted: str) -> Vec3:
     """Return three finite numbers.
 
     Raises:
-        ValueError: it is something else.
+        ValueError: The value is something else.
     """
     listed = value.tolist() if hasattr(value, "tolist") else value
     if not isinstance(listed, Sequence) or isinstance(listed, str) or len(listed) != 3:
-        raise ValueError(f"{_shown(value)}, wanted {wanted}")
+        raise ValueError(f"{_describe(value)}, wanted {wanted}")
     if not all(_finite(one) and abs(one) <= FARTHEST_M for one in listed):
-        raise ValueError(f"{_shown(value)}: each must be a number within {FARTHEST_M:g}")
+        raise ValueError(f"{_describe(value)}: each must be a number within {FARTHEST_M:g}")
     x, y, z = (float(one) for one in listed)
     return (x, y, z)
 
@@ -221,5 +224,5 @@ def _finite(value: Any) -> bool:
         return False
 
 
-def _shown(value: Any) -> str:
+def _describe(value: Any) -> str:
     return f"{type(value).__name__} {str(value)[:60]!r}"

@@ -1,4 +1,4 @@
-"""What can be chosen from menus while the robot runs, and commands refused as they come in."""
+"""Menus of a running robot, and checks of incoming commands."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
@@ -21,11 +21,11 @@ LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
     "wink left": lambda lids, t_s: lids.wink("left", t_s),
     "wink right": lambda lids, t_s: lids.wink("right", t_s),
 }
-"""What can be asked of the lids."""
+"""Commands for the lids."""
 
 
 class Menus:
-    """What a person can choose from: behaviours, conversation, lids, expressions, gestures."""
+    """The menus of behaviours, conversation, lids, expressions and gestures."""
 
     def __init__(
         self, aversion: Aversion, lids: Lids, expressions: Expressions, gestures: GestureChoices
@@ -70,17 +70,17 @@ def refuse_impossible(
     animation: Animation,
     gestures: GestureChoices,
 ) -> None:
-    """Refuse a command that names what this robot does not have.
+    """Refuse a command that names something that this robot does not have.
 
     Args:
-        command: checked by itself already.
-        menus: returns what can be chosen.
-        joints: of the rig.
-        animation: its expressions and levels.
-        gestures: that can be played.
+        command: Command that has passed the general checks.
+        menus: Returns the menus.
+        joints: Joints of the rig.
+        animation: Expressions and levels of the rig.
+        gestures: Gestures of the rig.
 
     Raises:
-        ValueError: with what there is.
+        ValueError: The message lists the available choices.
     """
     if isinstance(command, Ask):
         refuse_unknown(command, menus())
@@ -95,10 +95,10 @@ def refuse_impossible(
 
 
 def refuse_unknown(command: Ask, menus: Mapping[str, Sequence[str]]) -> None:
-    """Refuse what is on no menu.
+    """Refuse a choice that is on no menu.
 
     Raises:
-        ValueError: with what there is.
+        ValueError: The message lists the available choices.
     """
     if command.menu not in menus:
         raise ValueError(f"nothing called {command.menu!r} to choose; there is {', '.join(menus)}")
@@ -111,7 +111,7 @@ def refuse_absent(command: Jog, joints: Sequence[str]) -> None:
     """Refuse joints that the rig does not have.
 
     Raises:
-        ValueError: with those there are.
+        ValueError: The message lists the rig's joints.
     """
     for name, _ in command.angles_rad:
         if name not in joints:
@@ -119,10 +119,10 @@ def refuse_absent(command: Jog, joints: Sequence[str]) -> None:
 
 
 def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:
-    """Refuse angles outside the joints' ranges in force.
+    """Refuse angles outside the joints' present ranges.
 
     Raises:
-        ValueError: with each such joint and its range.
+        ValueError: The message names each such joint and its range.
     """
     ranges = dict(zip(joints, limits, strict=True))
     outside = []
@@ -138,5 +138,5 @@ def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[Jo
 
 
 def _first(present: str, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the present choice before the others."""
+    """Return the names with the present choice first."""
     return (present, *(name for name in names if name != present))

@@ -1,4 +1,4 @@
-"""Carries out commands at the beginning of a tick, and replies to each what became of it."""
+"""Execution of commands at the beginning of a tick, with a reply to each."""
 
 from collections.abc import Callable
 
@@ -36,24 +36,25 @@ from gazerig.robot.safety.guard import Guard
 
 
 class CommandExecutor:
-    """Carries out commands on the components of one robot.
+    """The executor of commands on the components of one robot.
 
-    commanded_rad: joint angles last sent to the servos, where joints are held from
+    Attributes:
+        commanded_rad: Joint angles last sent to the servos; joints are held from there.
 
     Args:
-        body: the joints on their bus.
-        lead: who leads gaze or joints.
-        stop: switches the torque off and on.
-        menus: the choices of the models.
-        attention: its behaviours can be chosen.
-        oculomotor: computes how far eyes and head can follow.
-        animation: expressions and levels can be asked for.
-        gestures: those that can be played.
-        kinematics: gaze to joint angles.
-        guard: starts slowly where joints are taken over.
-        tune: changes parameters and returns what was done, as text.
-        messages: takes a line on whatever happens.
-        looks: finds what commands say to look at.
+        body: The joints on their bus.
+        lead: The client that controls gaze or joints.
+        stop: Switches the torque off and on.
+        menus: Menus of the models.
+        attention: Target chooser with the behaviours.
+        oculomotor: Computes how far eyes and head can follow.
+        animation: Expressions and levels.
+        gestures: Gestures that can be played.
+        kinematics: Gaze to joint angles.
+        guard: Guard, which moves slowly after a change of control.
+        tune: Changes parameters and returns messages about it.
+        messages: Receives a line about each event.
+        looks: Finds the points and faces in commands.
     """
 
     def __init__(
@@ -81,26 +82,26 @@ class CommandExecutor:
         self.commanded_rad: JointAngles = ()
 
     def reset(self) -> None:
-        """Forget what rules have played."""
+        """Forget the gestures that rules have played."""
         self._trigger.reset()
 
     def models_take_over(self) -> bool:
-        """Return once whether the gaze models lead again, from where head and eyes are."""
+        """Return once whether the gaze models take control again, from the present pose."""
         taken_over, self._taken_over = self._taken_over, False
         return taken_over
 
     def end_lapsed(self, t_s: float) -> None:
-        """End a lead that was not renewed or whose time is over, and levels not set any more."""
+        """End a client's control that was not renewed or has expired, and expired levels."""
         lead, levels = self._lead, self._animation.levels
         if lead.words and (why := lead.over(t_s)):
             self._messages.append(f"{lead.words}: {why}, so the gaze leads again")
-            self._let_lead(lambda: lead.end(why))
+            self._change_control(lambda: lead.end(why))
         if t_s >= levels.lapses_s:
             for name in levels.lapsed(t_s):
                 self._messages.append(f"level {name}: not set any more, so it falls to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
-        """Carry out one command; return its reply."""
+        """Execute a command; return its reply."""
         match command:
             case Ask("gesture", name):
                 return self.execute(Play("" if name == NO_GESTURE else name), t_s)
@@ -109,16 +110,16 @@ class CommandExecutor:
             case _ if isinstance(command, Leading):
                 if self._stop.why:
                     return CommandReply(f"stopped ({self._stop.why}): resume first")
-                reply = self._lead_by(command, t_s)
+                reply = self._take_control(command, t_s)
                 return reply._replace(lead=self._lead.state.number * self._lead.state.active)
             case Play():
                 if self._stop.why:
                     return CommandReply(f"stopped ({self._stop.why}): resume first")
                 return self._play(command, t_s)
             case Express(name, strength):
-                return _refused(lambda: self._animation.expressions.express(name, strength))
+                return _call_or_refuse(lambda: self._animation.expressions.express(name, strength))
             case SetLevel(name, value):
-                return _refused(lambda: self._animation.levels.set(name, value, t_s))
+                return _call_or_refuse(lambda: self._animation.levels.set(name, value, t_s))
             case Renew():
                 if not self._lead.renew(command, t_s):
                     return CommandReply(f"{command.who or 'you'} lead nothing now")
@@ -132,37 +133,37 @@ class CommandExecutor:
                 self._messages += self._tune(command, t_s)
         return CommandReply()
 
-    def _lead_by(self, command: Leading, t_s: float) -> CommandReply:
-        """Let a command lead gaze or joints."""
+    def _take_control(self, command: Leading, t_s: float) -> CommandReply:
+        """Give a client control of gaze or joints."""
         if isinstance(command, Jog):
             return self._jog(command, t_s)
         try:
             if isinstance(command, LookAtPerson):
                 face, captured_s = self._looks.face(command)
-                self._let_lead(lambda: self._lead.follow(command, face, captured_s, t_s))
+                self._change_control(lambda: self._lead.follow(command, face, captured_s, t_s))
             else:
                 point = self._looks.point(command)
-                self._let_lead(lambda: self._lead.look(command, point, t_s))
+                self._change_control(lambda: self._lead.look(command, point, t_s))
         except ValueError as error:
             return CommandReply(str(error))
         target = self._lead.chosen(None, t_s)
-        if target is None:  # freely again
+        if target is None:  # the gaze is free again
             return CommandReply()
         return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
 
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
-        """Hold all joints but those given; without any, return the joints to the gaze models."""
+        """Move the given joints and hold the others; without any, free the joints."""
         names = self._body.names
         if command.angles_rad and (name := self._gestures.drop()):
             self._messages.append(f"gesture {name} ends: the joints are led")
-        self._let_lead(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
+        self._change_control(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
         if command.angles_rad:
-            # A slider can be torn from end to end in no time.
+            # A slider may jump from end to end.
             self._guard.go_gently()
         return jog_reply(command, names, self._guard.limits)
 
     def _play(self, command: Play, t_s: float) -> CommandReply:
-        """Play a gesture over gaze; the joints must not be held by hand."""
+        """Play a gesture on top of the gaze, unless a client holds the joints."""
         if command.gesture and self._lead.pose_rad:
             return CommandReply(f"{self._lead.words}: the joints are held where they are")
         reply = self._gestures.play(command, t_s, self.commanded_rad, self._guard.limits)
@@ -172,11 +173,11 @@ class CommandExecutor:
         return reply
 
     def gesture_by_rule(self, target: Target, t_s: float) -> None:
-        """Play the gesture of the rule in force when the gaze comes to what it names.
+        """Play the gesture of the present rule when the gaze reaches the rule's target.
 
         Args:
-            target: what attracts the gaze.
-            t_s: now.
+            target: Target of the gaze.
+            t_s: Present time.
         """
         top_down = self._attention.top_down
         name = self._trigger.step(
@@ -187,8 +188,8 @@ class CommandExecutor:
             if reply.refused:
                 self._messages.append(f"gesture for rule {top_down.behaviour} {reply.text()}")
 
-    def _let_lead(self, change: Callable[[], None]) -> None:
-        """Change who leads; the models begin gently where they take joints over."""
+    def _change_control(self, change: Callable[[], None]) -> None:
+        """Change who is in control; the models start slowly if they take joints over."""
         held, text = bool(self._lead.pose_rad), self._lead.words
         change()
         if held and not self._lead.pose_rad:
@@ -198,7 +199,7 @@ class CommandExecutor:
             self._messages.append(f"led by {self._lead.words}")
 
     def _resume(self, command: Resume, t_s: float) -> CommandReply:
-        """Switch the torque on where the joints are; a servo that refuses leaves it off."""
+        """Switch the torque on at the present angles; it stays off if a servo refuses."""
         if not self._stop.why:
             return CommandReply()
         resumed = self._stop.resume(command, self._body, t_s)
@@ -209,8 +210,8 @@ class CommandExecutor:
         return CommandReply()
 
 
-def _refused(act: Callable[[], None]) -> CommandReply:
-    """Return the reply to something that a table retuned meanwhile may no longer hold."""
+def _call_or_refuse(act: Callable[[], None]) -> CommandReply:
+    """Call ``act`` and return its refusal: parameters may have changed since the first check."""
     try:
         act()
     except ValueError as error:

@@ -1,9 +1,9 @@
-"""What can be asked of a running rig, by whomever: one vocabulary, carried out in one place.
+"""Requests to a running rig: one vocabulary for all clients, handled in one place.
 
 The live page, other programs, the command line and Python all send a request {"do": verb, ...}.
 A verb is a command to the robot (``gazerig.robot.model.commands``: look_at, jog, ask, stop, resume,
-renew), a change of parameters (set, save, revert, character) or a question (``QUESTIONS``). Who
-answers the asker makes JSON or a line of text of what comes back.
+renew), a change of parameters (set, save, revert, character) or a question (``QUESTIONS``). The
+caller turns the result into JSON or a line of text.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,7 +19,7 @@ from gazerig.robot.model.reply import Ticket
 
 QUESTIONS = (
     "status",
-    'state, "after": number of the last event that is known',
+    'state, "after": number of the newest known event',
     "menus",
     "gestures",
     'parameters, "prefix"',
@@ -33,19 +33,19 @@ CHANGES = (
     'character, "name"', 'fault, "text": as of gazerig emulate',
 )  # fmt: skip
 REQUESTS = (*QUESTIONS, *CHANGES, *(name for name in COMMANDS if name != "tune"))
-"""All that can be asked for, in words."""
+"""Descriptions of all requests."""
 
-REAL = "these servos are real: only emulated ones have faults to order (gazerig run --mock)"
+REAL = "these servos are real: only emulated servos take fault commands (gazerig run --mock)"
 
 FIXED = "these parameters cannot be changed while the rig runs"
 
 
 class ParamAccess(Protocol):
-    """The parameters of a running rig, as ``gazerig.robot.app.param_store.ParamStore`` has them."""
+    """The parameters of a running rig, such as ``gazerig.robot.app.param_store.ParamStore``."""
 
     @property
     def version(self) -> int:
-        """Count the changes."""
+        """Return the number of changes."""
         ...
 
     @property
@@ -55,7 +55,7 @@ class ParamAccess(Protocol):
 
     @property
     def character_name(self) -> str:
-        """Return the character in force."""
+        """Return the present character."""
         ...
 
     def parameters(self) -> tuple[Parameter, ...]:
@@ -63,112 +63,112 @@ class ParamAccess(Protocol):
         ...
 
     def values(self) -> Mapping[str, Value]:
-        """Return all values in force."""
+        """Return all present values."""
         ...
 
     def get(self, prefix: str) -> Mapping[str, Value]:
-        """Return the values in force whose keys begin so."""
+        """Return the present values whose keys start with ``prefix``."""
         ...
 
     def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
-        """Apply values from the next tick on; return what the user should know."""
+        """Apply values from the next tick on; return notes for the user."""
         ...
 
     def unsaved(self) -> Sequence[ParamChange]:
-        """Return what is in force and not in the file."""
+        """Return the present values that are not in the file."""
         ...
 
     def differs(self) -> Sequence[ParamChange]:
-        """Return what differs from the defaults."""
+        """Return the values that differ from the defaults."""
         ...
 
     def save(self, path: Path | None = None) -> SavedFile:
-        """Write what is in force."""
+        """Write the present values to a file."""
         ...
 
     def revert(self) -> object:
-        """Apply the values of the file again."""
+        """Restore the values of the file."""
         ...
 
     def characters(self) -> Sequence[str]:
-        """Return the characters there are."""
+        """Return the available characters."""
         ...
 
     def character(self, name: str) -> object:
-        """Lay another character over the rig."""
+        """Apply another character to the rig."""
         ...
 
 
 class PathGuard(Protocol):
-    """Which files an asker may name (``gazerig.config.allowed_folder.AllowedFolder``)."""
+    """Rules for the files that a client may name (``config.allowed_folder.AllowedFolder``)."""
 
     def file(self, given: str, kind: str = "") -> str:
-        """Return a shipped name or a whole path; raise where it may not be named."""
+        """Return a shipped name or an absolute path; raise if it is not allowed."""
         ...
 
     def changes(self, changes: Mapping[str, object]) -> None:
-        """Raise where a value names a file that may not be named."""
+        """Raise if a value names a file that is not allowed."""
         ...
 
 
 class Commandable(Protocol):
-    """A robot that takes commands, as ``gazerig.robot.control.loop.Robot`` does."""
+    """A robot that takes commands, such as ``gazerig.robot.control.loop.Robot``."""
 
     def command(self, command: Command) -> Ticket | None:
-        """Queue a command for the next tick; raise ValueError with the rule that it breaks."""
+        """Queue a command for the next tick; raise ValueError if it breaks a rule."""
         ...
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return what there is to ask for."""
+        """Return the menus."""
         ...
 
     def gestures(self) -> Sequence[GestureInfo]:
-        """Return the gestures there are."""
+        """Return the available gestures."""
         ...
 
 
-class Answered(NamedTuple):
+class QuestionAnswer(NamedTuple):
     """The answer to a question, as plain JSON values."""
 
     value: object
 
 
 class ParamsChanged(NamedTuple):
-    """Values are in force from the next tick on; notes: what a person should know of it."""
+    """A change of values from the next tick on, with notes for the user."""
 
     notes: tuple[str, ...]
 
 
 class ParamsSaved(NamedTuple):
-    """The values in force were written."""
+    """A file with the present values."""
 
     saved: SavedFile
 
 
-class CommandGiven(NamedTuple):
-    """A command waits for the next tick; ticket: where its reply comes, None: nowhere."""
+class PendingCommand(NamedTuple):
+    """A command that waits for the next tick, and the ticket of its reply, None without one."""
 
     command: Command
     ticket: Ticket | None
 
 
-RequestResult = Answered | ParamsChanged | ParamsSaved | CommandGiven
+RequestResult = QuestionAnswer | ParamsChanged | ParamsSaved | PendingCommand
 
 
 class CommandHandler:
-    """Carries out requests; everything may be called from any thread.
+    """The handler of all requests. All methods are thread-safe.
 
     Args:
-        robot: executes commands.
-        params: the parameters; None if they cannot be seen or changed.
-        status: returns the state of the rig, as plain values.
-        refusals: what ``params`` raises if a value breaks a rule, besides ValueError; the
-            attribute holds all that ``do`` raises then.
-        saved: called with each file that was written.
-        paths: which files may be named; None: any.
-        fixed: why parameters cannot be changed, if they cannot.
-        state: returns the newest tick and the events above a number, as plain values.
-        fault: carries out a fault command of the emulated servos and returns what was done; None:
+        robot: Executes commands.
+        params: The parameters, None if they cannot be read or changed.
+        status: Returns the state of the rig as plain values.
+        refusals: Exceptions of ``params`` for a value that breaks a rule, besides ValueError;
+            the attribute contains all exceptions of ``do``.
+        saved: Called with each written file.
+        paths: Rules for file names, None if any file is allowed.
+        fixed: Reason why parameters cannot be changed.
+        state: Returns the newest tick and the events above a number as plain values.
+        fault: Executes a fault command of the emulated servos and returns the result; None if
             the servos are real.
     """
 
@@ -196,72 +196,74 @@ class CommandHandler:
     def do(
         self, request: object, sign: Callable[[Command], Command] = lambda command: command
     ) -> RequestResult:
-        """Carry out one request; the patterns are the vocabulary.
+        """Handle a request; the patterns are the vocabulary.
 
         Args:
             request: {"do": verb, ...}.
-            sign: writes into a command who asks.
+            sign: Writes the name of the client into a command.
 
         Raises:
-            Exception: one of ``refusals``, with every rule broken.
+            Exception: One of ``refusals``, with every broken rule.
         """
         match request:
             case {"do": "status", **rest} if not rest:
-                return Answered(self._status())
+                return QuestionAnswer(self._status())
             case {"do": "state", "after": int(after), **rest} if not rest:
-                return Answered(self._state(after))
+                return QuestionAnswer(self._state(after))
             case {"do": "menus", **rest} if not rest:
-                return Answered({menu: list(them) for menu, them in self._robot.menus().items()})
+                return QuestionAnswer(
+                    {menu: list(them) for menu, them in self._robot.menus().items()}
+                )
             case {"do": "gestures", **rest} if not rest:
-                return Answered([plain(one._asdict()) for one in self._robot.gestures()])
+                return QuestionAnswer([plain(one._asdict()) for one in self._robot.gestures()])
             case {"do": "fault", "text": str(text), **rest} if not rest:
                 if self._fault is None:
                     raise ValueError(REAL)
-                return Answered(self._fault(text))
+                return QuestionAnswer(self._fault(text))
             case {"do": str(name)} if name in COMMANDS:
                 return self.give(sign(from_json(request)))
-        return self._of_params(request)
+        return self._handle_params(request)
 
-    def give(self, command: Command) -> CommandGiven:
-        """Hand on a command; parameters go through ``set``, which knows their rules.
+    def give(self, command: Command) -> PendingCommand:
+        """Queue a command; parameters are changed by ``set``, which checks their rules.
 
         Raises:
-            ValueError: it cannot be done; the message says which, and what there is.
+            ValueError: The command is invalid; the message lists the available choices.
         """
         if isinstance(command, Tune):
             raise ValueError("parameters are changed by the request set, which checks them")
-        return CommandGiven(command, self._robot.command(command))
+        return PendingCommand(command, self._robot.command(command))
 
-    def _of_params(self, request: object) -> RequestResult:
+    def _handle_params(self, request: object) -> RequestResult:
         match request:
             case {"do": "parameters", "prefix": str(prefix), **rest} if not rest:
-                found = [text for key, text in self._all_described() if key.startswith(prefix)]
-                return Answered(found)
+                found = [text for key, text in self._describe_params() if key.startswith(prefix)]
+                return QuestionAnswer(found)
             case {"do": "get", "prefix": str(prefix), **rest} if not rest:
-                return Answered(plain(self._params.get(prefix)) if self._params else {})
+                return QuestionAnswer(plain(self._params.get(prefix)) if self._params else {})
             case {"do": "unsaved", **rest} if not rest:
-                return Answered(as_changes(self._params.unsaved()) if self._params else [])
+                return QuestionAnswer(as_changes(self._params.unsaved()) if self._params else [])
             case {"do": "characters", **rest} if not rest:
-                return Answered(list(self._params.characters()) if self._params else [])
+                return QuestionAnswer(list(self._params.characters()) if self._params else [])
             case {"do": "differs", **rest} if not rest:
-                return Answered(as_changes(self._changeable().differs()))
+                return QuestionAnswer(as_changes(self._require_params().differs()))
             case {"do": "set", "changes": dict(changes), **rest} if not rest:
                 return self._set(changes)
             case {"do": "save", "path": str() | None as path, **rest} if not rest:
                 return self._save(path)
             case {"do": "revert", **rest} if not rest:
-                return ParamsChanged(_notes(self._changeable().revert()))
+                return ParamsChanged(_notes(self._require_params().revert()))
             case {"do": "character", "name": str(name), **rest} if not rest:
                 return self._character(name)
         raise ValueError(f"not understood; there is {'; '.join(REQUESTS)}")
 
-    def _changeable(self) -> ParamAccess:
+    def _require_params(self) -> ParamAccess:
         if self._params is None:
             raise ValueError(self._fixed)
         return self._params
 
-    def _all_described(self) -> list[tuple[str, object]]:
-        """Return key and plain values of every parameter; writing them all takes 4 ms."""
+    def _describe_params(self) -> list[tuple[str, object]]:
+        """Return key and plain values of every parameter; building the list takes 4 ms."""
         if self._params is None:
             return []
         found = self._params.parameters()
@@ -270,33 +272,33 @@ class CommandHandler:
         return self._described[1]
 
     def _set(self, changes: Mapping[str, object]) -> RequestResult:
-        params = self._changeable()
+        params = self._require_params()
         if self._paths is not None:
             self._paths.changes(changes)
         notes = params.set({key: as_value(value) for key, value in changes.items()})
         return ParamsChanged(_notes(notes))
 
     def _save(self, path: str | None) -> RequestResult:
-        params = self._changeable()
+        params = self._require_params()
         if path and self._paths is not None:
             path = self._paths.file(path)
         file = Path(path).expanduser() if path else None
         if file is not None and not file.is_absolute():
-            raise ValueError(f"{path}: give the whole path; the rig has a folder of its own")
+            raise ValueError(f"{path}: give the absolute path; the rig has its own folder")
         saved = params.save(file)
         if self._saved is not None:
             self._saved(saved.path)
         return ParamsSaved(saved)
 
     def _character(self, name: str) -> RequestResult:
-        params = self._changeable()
+        params = self._require_params()
         if self._paths is not None and name not in params.characters():
             name = self._paths.file(name, "characters")
         return ParamsChanged(_notes(params.character(name)))
 
 
 def plain(value: object) -> object:
-    """Return lists and dicts made of tuples and mappings, as in JSON."""
+    """Convert tuples and mappings to lists and dicts, as in JSON."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, tuple | list):
@@ -310,7 +312,7 @@ def as_changes(changes: Sequence[ParamChange]) -> list[dict[str, object]]:
 
 
 def as_value(value: object) -> Value:
-    """Return JSON's lists as tuples, as the reader of files does."""
+    """Convert JSON's lists to tuples, as the reader of files does."""
     if isinstance(value, list):
         return tuple(as_value(item) for item in value)
     if isinstance(value, dict):
@@ -320,7 +322,7 @@ def as_value(value: object) -> Value:
 
 
 def _notes(notes: object) -> tuple[str, ...]:
-    """Return what a person should know, of what a change gave back."""
+    """Return the notes for the user in the result of a change."""
     if isinstance(notes, str) or not isinstance(notes, Iterable):
         return ()
     return tuple(map(str, notes))

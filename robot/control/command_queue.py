@@ -1,4 +1,4 @@
-"""Commands on their way from any thread to the tick: bounded, and a stop before all else."""
+"""Bounded queue of commands from any thread to the tick; stops come first."""
 
 from collections import deque
 from contextlib import suppress
@@ -9,19 +9,19 @@ from gazerig.robot.model.reply import CommandReply, Ticket
 
 MAX_WAITING = 64
 MAX_PER_TICK = 8
-"""Commands executed in one tick, stops not counted; among them one change of parameters at most,
-as that takes longest."""
+"""Commands executed in one tick, without stops. At most one of them changes parameters, as that
+takes longest."""
 
 
 class QueuedCommand(NamedTuple):
-    """A command, and where its reply goes."""
+    """A command and the ticket of its reply."""
 
     command: Command
     ticket: Ticket
 
 
 class CommandQueue:
-    """The commands that have come since the last tick."""
+    """The commands since the last tick."""
 
     def __init__(self) -> None:
         self._commands: deque[QueuedCommand] = deque()
@@ -32,19 +32,19 @@ class CommandQueue:
         return bool(self._commands or self._stops)
 
     def __len__(self) -> int:
-        """Return how many commands wait."""
+        """Return the number of waiting commands."""
         return len(self._commands) + len(self._stops)
 
     def add(self, command: Command) -> Ticket:
-        """Queue a command; may be called from any thread.
+        """Queue a command. Thread-safe.
 
         Raises:
-            ValueError: too many wait already. A stop is never refused.
+            ValueError: The queue is full. A stop is never refused.
         """
         waiting = QueuedCommand(command, Ticket())
         if isinstance(command, Stop):
             if len(self._stops) >= MAX_WAITING:
-                with suppress(IndexError):  # taken up in this moment
+                with suppress(IndexError):  # the loop has just taken it
                     return self._stops[-1].ticket  # as good as one more
             self._stops.append(waiting)
             return waiting.ticket
@@ -54,16 +54,16 @@ class CommandQueue:
         return waiting.ticket
 
     def stops(self) -> list[QueuedCommand]:
-        """Remove and return all stops, and refuse with them commands that would move the head."""
+        """Remove and return all stops; refuse waiting commands that would move the head."""
         taken: list[QueuedCommand] = []
         while self._stops:
             taken.append(self._stops.popleft())
         if taken:
-            self._drop_leads()
+            self._refuse_motions()
         return taken
 
     def take(self) -> list[QueuedCommand]:
-        """Return and remove the commands of this tick, stops first."""
+        """Remove and return the commands of this tick, stops first."""
         taken = self.stops()
         tunes, most = 0, len(taken) + MAX_PER_TICK
         while self._commands and len(taken) < most:
@@ -73,8 +73,8 @@ class CommandQueue:
             taken.append(self._commands.popleft())
         return _without_superseded(taken)
 
-    def _drop_leads(self) -> None:
-        """Refuse what was asked for before a stop and would move the head; keep the rest."""
+    def _refuse_motions(self) -> None:
+        """Refuse commands before a stop that would move the head; keep the others."""
         for _ in range(len(self._commands)):
             waiting = self._commands.popleft()
             if isinstance(waiting.command, Leading | Resume):
@@ -84,7 +84,7 @@ class CommandQueue:
 
 
 def _without_superseded(taken: list[QueuedCommand]) -> list[QueuedCommand]:
-    """Return the commands without levels that a later one of this tick sets again."""
+    """Return the commands without levels that a later command of this tick sets again."""
     kept: list[QueuedCommand] = []
     seen: set[str] = set()
     for waiting in reversed(taken):

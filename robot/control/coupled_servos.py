@@ -1,4 +1,4 @@
-"""Pairs of servos that move two joints together, between a bus and the joints' angles."""
+"""Conversion for pairs of servos that together move two joints."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeVar
@@ -9,7 +9,7 @@ from gazerig.robot.model.coupling_params import CoupledPair
 
 
 class _Pair(NamedTuple):
-    """A coupling between the joints at two places of every sequence."""
+    """A coupling of the joints at two positions of every sequence."""
 
     i: int
     j: int
@@ -20,8 +20,8 @@ class CoupledServos:
     """The coupled pairs of one body.
 
     Args:
-        pairs: by the names of their joints.
-        names: of all joints, in their order.
+        pairs: The pairs with the names of their joints.
+        names: Names of all joints in their order.
     """
 
     def __init__(self, pairs: Iterable[CoupledPair], names: Sequence[str]) -> None:
@@ -41,8 +41,8 @@ class CoupledServos:
     def shafts(self, joints_rad: Sequence[float]) -> list[float]:
         """Return the servo angles of joint angles.
 
-        Beyond what a mechanism can do, where joints can only be before they are led into
-        their range, its servos keep their last goals.
+        For unreachable joint angles, which occur only before joints are inside their range, the
+        servos keep their last goals.
         """
         angles = list(joints_rad)
         for i, j, coupling in self._pairs:
@@ -54,13 +54,13 @@ class CoupledServos:
             angles[i], angles[j] = self._goals[i]
         return angles
 
-    def held(self, shafts_rad: Sequence[float]) -> None:
-        """Record the servo angles that were held when the torque came on."""
+    def set_goals(self, shafts_rad: Sequence[float]) -> None:
+        """Record the servo angles at which the torque came on."""
         for i, j, _ in self._pairs:
             self._goals[i] = shafts_rad[i], shafts_rad[j]
 
     def speeds(self, joints_rad: Sequence[float], shaft_rates: Sequence[float]) -> list[float]:
-        """Return the joints' speeds of the servos' at joint angles."""
+        """Return the joint speeds of servo speeds at given joint angles."""
         rates = list(shaft_rates)
         for i, j, coupling in self._pairs:
             try:
@@ -71,12 +71,12 @@ class CoupledServos:
             rates[i], rates[j] = joint_rates(slopes, (shaft_rates[i], shaft_rates[j]))
         return rates
 
-    def completed(self, feedback: Feedback, released: bool) -> Feedback:
-        """Return feedback in which both servos of a pair share what concerns both joints.
+    def share_feedback(self, feedback: Feedback, released: bool) -> Feedback:
+        """Return feedback in which both servos of a pair share the values for both joints.
 
-        Where one did not answer both joints are stale, at their last common position. The
-        higher load, a fault, and torque that came on anew count for both, and torque is on
-        where both have it, once it is ``released`` where one has it.
+        If one servo did not answer, both joints are stale, at their last common position. The
+        higher load, a fault, and torque that came on again apply to both. The torque is on if
+        both servos have it; after a release (``released``), if one has it.
         """
         for i, j, _ in self._pairs:
             feedback = self._complete(feedback, i, j, released)
@@ -116,7 +116,7 @@ T = TypeVar("T")
 
 
 def _with(values: tuple[T, ...], i: int, at_i: T, j: int, at_j: T) -> tuple[T, ...]:
-    """Return values with others at two places; the same where they are no others."""
+    """Return values with two of them replaced; the same tuple if nothing changes."""
     if values[i] == at_i and values[j] == at_j:
         return values
     changed = list(values)

@@ -1,4 +1,4 @@
-"""What a bus has done, in short: the same done to several servos is one line."""
+"""Short texts of bus events: events of several servos are grouped into one line."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -8,9 +8,9 @@ _REGISTER = re.compile(r": .+ (-?\d+ -> -?\d+|set)$")
 
 
 def drawn_together(events: Iterable[str]) -> list[str]:
-    """Return "servos 1-9: Return Delay Time 250 -> 0" for nine events that differ in their servo.
+    """Group events that differ only in their servo, e.g. "servos 1-9: Return Delay Time 250 -> 0".
 
-    An event is "neck_yaw (servo 7): what" or "servo 7: what"; anything else stays as it is.
+    An event is "neck_yaw (servo 7): what" or "servo 7: what"; other texts stay unchanged.
     """
     whose: dict[str, list[str]] = {}
     for event in events:
@@ -26,12 +26,12 @@ def drawn_together(events: Iterable[str]) -> list[str]:
 
 
 def is_register_change(event: str) -> bool:
-    """Return whether an event says that a register of a servo was set, and nothing else."""
+    """Return whether an event only reports that a register of a servo was set."""
     return _REGISTER.search(event) is not None
 
 
 def runs(numbers: Sequence[int]) -> str:
-    """Write numbers with neighbours drawn together: 1-3, 7."""
+    """Format numbers with runs joined: 1-3, 7."""
     runs: list[list[int]] = []
     for number in sorted(numbers):
         if runs and number == runs[-1][-1] + 1:

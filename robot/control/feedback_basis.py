@@ -1,7 +1,7 @@
-"""What is measured and what is only estimated: joints whose servos tell nothing.
+"""Distinction between measured joints and estimated ones, whose servos have no feedback.
 
-A hobby servo takes a place and gives none back. What stands for its place is its goal, moved
-by the speed that it is known to have: no sensor sees it stick, slip or swing.
+A hobby servo takes a goal and reports no position. Its position is estimated as its goal, moved
+at its known speed: no sensor detects sticking, slipping or oscillation.
 """
 
 from collections.abc import Callable, Collection
@@ -16,7 +16,7 @@ PARTLY = "in part estimated from commands and known servo speeds, not measured"
 
 
 def estimated_joints(tick: Tick) -> tuple[str, ...]:
-    """Return the joints whose servos tell nothing."""
+    """Return the joints whose servos have no feedback."""
     has_feedback = tick.joints.measured
     if not has_feedback:
         return ()
@@ -28,9 +28,12 @@ def estimated_joints(tick: Tick) -> tuple[str, ...]:
 def basis_of(
     joints: Collection[str], estimated: Collection[str], counts: Callable[[str], bool]
 ) -> Basis:
-    """Return what a figure rests on.
+    """Return whether a figure is measured or estimated.
 
-    joints: the rig's; counts: whether the figure rests on a joint of this name
+    Args:
+        joints: Joints of the rig.
+        estimated: Joints without feedback.
+        counts: Returns whether the figure depends on a joint of this name.
     """
     hidden = [counts(name) for name in estimated]
     if not any(hidden):

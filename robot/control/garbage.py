@@ -1,14 +1,14 @@
-"""The garbage collector, kept from costing slots while the head moves."""
+"""Garbage collection outside of the control loop."""
 
 import gc
 
 
-def set_aside() -> None:
-    """Have later passes of the garbage collector look only at what is made from now on.
+def freeze_objects() -> None:
+    """Exclude all present objects from later passes of the garbage collector.
 
-    A full pass over all that start-up made takes 20 ms, four slots, so what is there now is set
-    aside. Before torque is on, as nothing may keep the servos waiting after. What was set aside for
-    a robot that ran before in this process is looked through again first, and so let go.
+    A full pass over the objects from start-up takes 20 ms, four slots. Call this before the
+    torque is on, as nothing may delay the servos afterwards. Objects that were excluded for an
+    earlier robot in this process are collected first.
     """
     gc.unfreeze()
     gc.collect()

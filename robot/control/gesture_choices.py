@@ -1,4 +1,4 @@
-"""The gestures of a robot: which there are, what this rig can do of them, and playing them."""
+"""Gestures of a robot: the available ones, their fit to this rig, and their start."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -21,14 +21,18 @@ from gazerig.robot.model.reply import CommandReply, GestureReply
 from gazerig.robot.model.types import JointAngles
 
 _MOST_KEPT = 64
-"""Curves of so many gestures with a count of their own are kept."""
+"""Number of gestures with a non-default count whose curves are cached."""
 
 
 class GestureInfo(NamedTuple):
-    """One gesture on this rig, played from the middle of all ranges.
+    """A gesture on this rig, played from the middle of all ranges.
 
-    duration_s: 0 where it is refused; slowed_by: factor by which it takes longer than written
-    refused: why this rig cannot do it, "" where it can
+    Attributes:
+        name: Name of the gesture.
+        description: Its description.
+        duration_s: Duration in s, 0 if it is refused.
+        slowed_by: Factor by which it takes longer than defined.
+        refused: Reason why this rig cannot do it, "" if it can.
     """
 
     name: str
@@ -39,14 +43,14 @@ class GestureInfo(NamedTuple):
 
 
 class GestureChoices:
-    """Prepares gestures for one rig and starts them.
+    """The gestures of one rig.
 
     Args:
-        gestures: all that are known, by name.
-        player: plays them.
-        params: how much of the joints' limits they may use.
-        joints: the rig's, in the order of all sequences of joints.
-        lid_spans_rad: way of each lid from shut to open, by joint.
+        gestures: All known gestures by name.
+        player: Plays them.
+        params: Share of the joints' limits that they may use.
+        joints: Joints of the rig, in the order of all sequences of joints.
+        lid_spans_rad: Range of each lid from shut to open, by joint.
     """
 
     def __init__(
@@ -59,13 +63,13 @@ class GestureChoices:
     ) -> None:
         self._gestures, self._player, self._joints = gestures, player, joints
         self._state = NO_GESTURE
-        self._made: dict[tuple[str, int], GestureMotions | GestureRefused] = {}
+        self._cache: dict[tuple[str, int], GestureMotions | GestureRefused] = {}
         self.retune(params, lid_spans_rad)
         for name in gestures:
             self._motions(name, 0)
 
     def retune(self, params: GestureParams, lid_spans_rad: Mapping[str, float]) -> None:
-        """Change the share of limits and the lids, for the next gesture."""
+        """Change the share of limits and the lids' ranges for the next gesture."""
         self._params = params
         self._fit = GestureFit(self._joints, lid_spans_rad)
 
@@ -78,21 +82,21 @@ class GestureChoices:
 
     @property
     def playing(self) -> str:
-        """Return the gesture under way, "" where there is none."""
+        """Return the present gesture, "" if there is none."""
         return self._player.playing
 
     @property
     def state(self) -> GestureState:
-        """Return the newest gesture, and whether it is under way."""
+        """Return the newest gesture and its state."""
         if self._state.name and not self._player.playing:
             self._state = self._state._replace(name="")
         return self._state
 
     def require(self, command: Play) -> None:
-        """See that there is such a gesture, and compute its curves; for any thread.
+        """Check that a gesture exists, and compute its curves. Thread-safe.
 
         Raises:
-            ValueError: there is none; the message lists those there are.
+            ValueError: There is no such gesture; the message lists the available ones.
         """
         if not command.gesture:
             return
@@ -104,17 +108,17 @@ class GestureChoices:
             raise ValueError(f"{command.gesture}: {made}")
 
     def offered(self, limits: Sequence[JointLimit]) -> tuple[GestureInfo, ...]:
-        """Return all gestures with what this rig can do of them.
+        """Return all gestures with their fit to this rig.
 
         Args:
-            limits: of the joints.
+            limits: Limits of the joints.
         """
         return tuple(self._info(name, gesture, limits) for name, gesture in self._gestures.items())
 
     def _info(self, name: str, gesture: Gesture, limits: Sequence[JointLimit]) -> GestureInfo:
         middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
         try:
-            fitted = self._fitted(name, 0, 1.0, middle, limits)
+            fitted = self._fit_gesture(name, 0, 1.0, middle, limits)
         except GestureRefused as refused:
             return GestureInfo(name, gesture.description, refused=str(refused))
         return GestureInfo(name, gesture.description, fitted.played.duration_s, fitted.slowed_by)
@@ -122,13 +126,13 @@ class GestureChoices:
     def play(
         self, command: Play, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
     ) -> CommandReply:
-        """Begin a gesture from where the joints are, or end the one under way.
+        """Start a gesture from the joints' present angles, or end the present one.
 
         Args:
-            command: which, how fast, how often.
-            t_s: now.
-            commanded_rad: joint angles last sent.
-            limits: of the joints, in force.
+            command: Gesture, speed and count.
+            t_s: Present time.
+            commanded_rad: Joint angles last sent.
+            limits: Present limits of the joints.
         """
         share, state = self._params.limit_share, self._player.state(t_s)
         fade_s = self._fit.fade_s(state, limits, share, self._params.blend_out_ms / 1e3)
@@ -140,14 +144,14 @@ class GestureChoices:
             return CommandReply(gesture=GestureReply("", fade_s))
         base = self._fit.without(commanded_rad, state)
         try:
-            fitted = self._fitted(command.gesture, command.times, command.speed, base, limits)
+            fitted = self._fit_gesture(command.gesture, command.times, command.speed, base, limits)
         except GestureRefused as refused:
             return CommandReply(f"{command.gesture}: {refused}")
         wait_s = self._fit.wait_s(state, fade_s, fitted.played, limits, share)
         self._player.play(fitted.played, t_s, fade_s, wait_s)
         number = self._state.number + 1
         self._state = GestureState(number, command.gesture, who=command.who, since_s=t_s)
-        left_out = self._made_of(command.gesture, command.times).left_out
+        left_out = self._require_motions(command.gesture, command.times).left_out
         return CommandReply(
             gesture=GestureReply(
                 command.gesture,
@@ -161,14 +165,14 @@ class GestureChoices:
         )
 
     def drop(self) -> str:
-        """Forget the gesture under way, as its joints are led or switched off; return its name."""
+        """Drop the present gesture, as its joints are controlled or off; return its name."""
         name = self._player.playing
         self._player.reset()
         if name:
             self._state = self._state._replace(name="", ended="its joints are led or switched off")
         return name
 
-    def _fitted(
+    def _fit_gesture(
         self,
         name: str,
         count: int,
@@ -176,23 +180,23 @@ class GestureChoices:
         base_rad: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
         limits: Sequence[JointLimit],
     ) -> FittedGesture:
-        made = self._made_of(name, count)
+        made = self._require_motions(name, count)
         return self._fit.fit(name, made, speed, base_rad, limits, self._params.limit_share)
 
-    def _made_of(self, name: str, count: int) -> GestureMotions:
+    def _require_motions(self, name: str, count: int) -> GestureMotions:
         made = self._motions(name, count)
         if isinstance(made, GestureRefused):
             raise made
         return made
 
     def _motions(self, name: str, count: int) -> GestureMotions | GestureRefused:
-        """Return the curves of a gesture, or why this rig has none of it."""
+        """Return the curves of a gesture, or the reason why this rig has none."""
         key = name, count if count != self._gestures[name].count else 0
-        if key not in self._made:
-            if len(self._made) >= len(self._gestures) + _MOST_KEPT:
-                self._made = {kept: made for kept, made in self._made.items() if kept[1] == 0}
+        if key not in self._cache:
+            if len(self._cache) >= len(self._gestures) + _MOST_KEPT:
+                self._cache = {kept: made for kept, made in self._cache.items() if kept[1] == 0}
             try:
-                self._made[key] = motions(self._gestures[name], self._joints, count)
+                self._cache[key] = motions(self._gestures[name], self._joints, count)
             except GestureRefused as refused:
-                self._made[key] = refused
-        return self._made[key]
+                self._cache[key] = refused
+        return self._cache[key]

@@ -1,7 +1,7 @@
-"""One moment of a head as programs are shown it: joints, gaze and people, typed and named.
+"""State of a head for programs: joints, gaze and people.
 
-World frame: at the neck base, x ahead, y left, z up. Angles in radians, yaw + left, pitch + up,
-roll + right ear down; metres; seconds of the rig's own clock.
+World frame: at the neck base, x ahead, y left, z up. Angles in rad, yaw + left, pitch + up,
+roll + right ear down; lengths in m; times in s of the rig's own clock.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,21 +19,22 @@ from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, L
 
 @dataclass(frozen=True, slots=True)
 class JointReading:
-    """One joint at one moment.
+    """A joint in one tick.
 
     Attributes:
-        name: as in the rig file.
-        desired_rad: what gaze, a gesture or a program asks for.
-        commanded_rad: what the guard let through to the servo.
-        measured_rad: what the servo says; see ``estimated``.
-        velocity_rad_s: as measured.
-        estimated: the servo tells nothing: ``measured_rad`` is its goal moved by its known speed.
-        limited: why ``commanded_rad`` is another angle than ``desired_rad``, "" where it is not.
-        torque: whether the torque is on; None where that is not known.
-        fault: latched hardware errors, "" for none.
-        load: share of the stall torque, signed, -1..1; None where that is not known.
-        temperature_c: None before the first reading.
-        voltage_v: None before the first reading.
+        name: Name in the rig file.
+        desired_rad: Angle requested by the gaze, a gesture or a program.
+        commanded_rad: Angle that the guard sent to the servo.
+        measured_rad: Angle reported by the servo; see ``estimated``.
+        velocity_rad_s: Measured speed.
+        estimated: Whether the servo has no feedback: ``measured_rad`` is then its goal, moved at
+            its known speed.
+        limited: Reason why ``commanded_rad`` differs from ``desired_rad``, "" if it does not.
+        torque: Whether the torque is on, None if unknown.
+        fault: Latched hardware errors, "" for none.
+        load: Share of the stall torque, signed, -1..1, None if unknown.
+        temperature_c: Temperature, None before the first reading.
+        voltage_v: Supply voltage, None before the first reading.
     """
 
     name: str
@@ -67,20 +68,20 @@ class JointReading:
 
 @dataclass(frozen=True, slots=True)
 class GazeReading:
-    """Where head and eyes are, as measured, and where they are going.
+    """The measured poses of head and eyes, and their target.
 
     Attributes:
-        target: what is looked at, e.g. "face 3: left eye"; while somebody leads, who.
-        reason: why.
-        point_m: where both eyes are meant to point now, world.
-        direction_rad: (yaw, pitch) of the mean line of sight, world, as measured.
-        head_m: the point midway between the eyes, world.
+        target: Gaze target, e.g. "face 3: left eye"; while a client is in control, its name.
+        reason: Reason for the target.
+        point_m: Desired gaze point of both eyes, world.
+        direction_rad: Measured (yaw, pitch) of the mean line of sight, world.
+        head_m: Point midway between the eyes, world.
         head_rad: (yaw, pitch, roll) of the head.
         left_eye_rad: (yaw, pitch) in the head.
         right_eye_rad: (yaw, pitch) in the head.
-        lids: opening of the left and the right upper lid, 0 shut .. 1 open.
+        lids: Opening of the left and the right upper lid, 0 shut .. 1 open.
         phase: "fixate", "saccade" or "pursue"; "held" while joints are held, "stopped", "parking".
-        blink: whether a blink is under way.
+        blink: Whether a blink is in progress.
     """
 
     target: str
@@ -104,20 +105,20 @@ class GazeReading:
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person who is seen, at the time of the frame.
+    """A visible person at the time of the frame.
 
     Attributes:
-        id: stays the same while the person is seen; for ``look_at_person``.
-        position_m: the middle of the face, the nose, world.
-        velocity_m_s: of it, world.
-        facing: unit vector out of the face, world.
-        parts_m: places of the parts of the face, world: "left eye", "mouth" and so on; left and
+        id: Number for ``look_at_person``; it is constant while the person is visible.
+        position_m: Middle of the face, the nose, world.
+        velocity_m_s: Its velocity, world.
+        facing: Unit vector out of the face, world.
+        parts_m: Positions of the parts of the face, world: "left eye", "mouth" and so on; left and
             right are the person's own.
-        confidence: of the detector, 0..1.
-        distance_from: what the distance rests on: "camera", "face size", or "" where unknown.
-        age_s: of the frame.
-        looks_at_head: whether the person looks at the head; None where that is too uncertain.
-        speaks: whether the mouth moves as of a speaking person; None where no mesh is made of it.
+        confidence: Confidence of the detector, 0..1.
+        distance_from: Source of the distance: "camera", "face size", or "" if unknown.
+        age_s: Age of the frame.
+        looks_at_head: Whether the person looks at the head, None if that is too uncertain.
+        speaks: Whether the mouth moves as in speech, None without a mesh of the mouth.
     """
 
     id: int
@@ -134,12 +135,12 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class HeadEvent:
-    """Something that happened: on the bus, to the camera, or because a program asked for it.
+    """An event of the bus, of the camera or from a program's request.
 
     Attributes:
-        number: counts the events from 1.
-        t_s: the rig's own time.
-        text: one line.
+        number: Number of the event, from 1.
+        t_s: The rig's own time.
+        text: Description in one line.
     """
 
     number: int
@@ -149,22 +150,22 @@ class HeadEvent:
 
 @dataclass(frozen=True, slots=True)
 class HeadState:
-    """One tick of the control loop.
+    """The state of a head in one tick of the control loop.
 
     Attributes:
-        t_s: seconds of the head's own clock: from 0 in simulated time, else as time.monotonic().
-        joints: by name.
-        gaze: where head and eyes are.
-        people: those who are seen.
-        level: of the guard: "ok", "limited", "hold" or "torque_off".
-        reasons: what the guard limited, "joint: reason".
-        stopped: why the head was stopped, "" while it moves.
-        led: who leads gaze or joints and with what, "" while the head chooses.
-        lead: the newest lead.
-        gesture: the newest gesture.
-        leader: who leads now: the gaze models, a client, a gesture, a stop.
-        headline: what the head does now, in one sentence.
-        frame_s: time of the newest camera frame; None before the first.
+        t_s: Time of the head's own clock: from 0 in simulated time, else as time.monotonic().
+        joints: Joints by name.
+        gaze: Poses of head and eyes.
+        people: Visible people.
+        level: Level of the guard: "ok", "limited", "hold" or "torque_off".
+        reasons: Limits applied by the guard, "joint: reason".
+        stopped: Reason for a stop, "" while the head moves.
+        led: Client that controls gaze or joints, and its command; "" while the head chooses.
+        lead: State of the newest client's control.
+        gesture: The newest gesture.
+        leader: The present source of control: gaze models, a client, a gesture, a stop.
+        headline: Present activity of the head in one sentence.
+        frame_s: Time of the newest camera frame, None before the first.
     """
 
     t_s: float
@@ -183,7 +184,7 @@ class HeadState:
 
 
 def head_state(tick: Tick) -> HeadState:
-    """Return a tick as programs are shown it."""
+    """Return the state of a head in a tick."""
     percept = tick.percept
     return HeadState(
         tick.t_s,
@@ -211,16 +212,17 @@ def as_json(state: HeadState) -> dict[str, Any]:
 
 
 def from_json(data: Mapping[str, Any]) -> HeadState:
-    """Return what ``as_json`` wrote; fields unknown to this version are left out.
+    """Return the state that ``as_json`` wrote; fields unknown to this version are left out.
 
     Raises:
-        KeyError, TypeError, ValueError: it is no state.
+        KeyError, TypeError, ValueError: The data is not a state.
     """
-    made = _known(HeadState, data)
+    made = _known_fields(HeadState, data)
     made["joints"] = {
-        name: JointReading(**_known(JointReading, one)) for name, one in data["joints"].items()
+        name: JointReading(**_known_fields(JointReading, one))
+        for name, one in data["joints"].items()
     }
-    made["gaze"] = GazeReading(**_known(GazeReading, data["gaze"]))
+    made["gaze"] = GazeReading(**_known_fields(GazeReading, data["gaze"]))
     made["people"] = tuple(_read_person(one) for one in data["people"])
     made["lead"] = _read(LeadState, data["lead"])
     made["gesture"] = _read(GestureState, data["gesture"])
@@ -230,18 +232,18 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
 
 
 def _read(kind: Any, values: Sequence[Any]) -> Any:
-    """Return a named tuple of JSON's values; those that this version has no field for are left."""
+    """Return a named tuple of JSON values; values unknown to this version are left out."""
     known = values[: len(kind._fields)]
     return kind(*[tuple(value) if isinstance(value, list) else value for value in known])
 
 
 def _read_person(data: Mapping[str, Any]) -> Person:
     parts = {name: tuple(point) for name, point in data["parts_m"].items()}
-    return Person(**{**_known(Person, data), "parts_m": parts})
+    return Person(**{**_known_fields(Person, data), "parts_m": parts})
 
 
-def _known(kind: Any, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a class, JSON's lists as tuples."""
+def _known_fields(kind: Any, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields that a class has, with JSON's lists as tuples."""
     names = {one.name for one in fields(kind)}
     return {
         name: tuple(value) if isinstance(value, list) else value
@@ -261,23 +263,23 @@ def _joints(tick: Tick) -> dict[str, JointReading]:
         state.velocity_rad_s,
         [not measured for measured in state.measured] or [False] * count,
         guard.why or [""] * count,
-        _or_none(state.torque, count),
+        _values_or_none(state.torque, count),
         state.fault or [""] * count,
-        _or_none(state.load, count),
-        _or_none(state.temperature_c, count),
-        _or_none(state.voltage_v, count),
+        _values_or_none(state.load, count),
+        _values_or_none(state.temperature_c, count),
+        _values_or_none(state.voltage_v, count),
         strict=True,
     )
     return {row[0]: JointReading(*row) for row in columns}
 
 
-def _or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
+def _values_or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
     return values or [None] * count
 
 
 def _gaze(tick: Tick) -> GazeReading:
     pose, gaze, does = tick.pose, tick.gaze, doing(tick)
-    # What a client has chosen to look at is looked at; while joints are held, nothing is.
+    # A client's target is a gaze target; held joints have none.
     target = target_name(tick.target) if tick.lead.by != "joint" and tick.led else does.target
     sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
     return GazeReading(

@@ -1,4 +1,4 @@
-"""Several heads of one world as those outside command them: what stops one stops all."""
+"""Group of heads in one world: a stop of one head stops all."""
 
 import contextlib
 from collections.abc import Sequence
@@ -13,49 +13,49 @@ from gazerig.robot.model.types import OtherHead
 
 
 class NamedRobot(NamedTuple):
-    """Another head of the same world: its name there, and the robot that leads it."""
+    """Another head of the same world: its name there and its robot."""
 
     name: str
     robot: Robot
 
     def seen(self) -> OtherHead:
-        """Return what it does now, in words."""
+        """Return a description of its present activity."""
         newest = self.robot.newest
         if newest is None:
             return OtherHead(self.name, "has not begun")
         return OtherHead(self.name, doing(newest).headline, newest.guard_result.level)
 
 
-class HeadsTogether:
-    """The first of several heads, with which all are stopped and resumed; all else it does alone.
+class RobotGroup:
+    """A group of heads: stops and resumes apply to all, other commands to the first.
 
     Args:
-        first: what commands are for.
-        others: the other heads.
+        first: Head that receives the commands.
+        others: The other heads.
     """
 
     def __init__(self, first: Robot, others: Sequence[NamedRobot]) -> None:
         self._first, self._others = first, tuple(others)
 
     def command(self, command: Command) -> Ticket | None:
-        """Queue a command for the next tick, a stop and its end for all heads.
+        """Queue a command for the next tick, a stop or a resume for all heads.
 
         Returns:
-            Where the first head's reply comes; of a stop or its end, what any of them refuses.
+            The ticket of the first head's reply; for a stop or a resume also of any refusal.
 
         Raises:
-            ValueError: it cannot be done.
+            ValueError: The command is invalid.
         """
         if not isinstance(command, Stop | Resume):
             return self._first.command(command)
         tickets: list[tuple[str, Ticket]] = []
         for name, robot in self._others:
-            with contextlib.suppress(ValueError):  # nothing may keep the others from stopping
+            with contextlib.suppress(ValueError):  # nothing may prevent the others from stopping
                 tickets.append((name, robot.command(command)))
         return _TicketOfAll(self._first.command(command), tickets)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return what the first head offers."""
+        """Return the first head's menus."""
         return self._first.menus()
 
     def gestures(self) -> tuple[GestureInfo, ...]:
@@ -64,18 +64,18 @@ class HeadsTogether:
 
 
 class _TicketOfAll(Ticket):
-    """The first head's reply, unless another head refuses what the first has done."""
+    """The ticket of the first head's reply, or of another head's refusal."""
 
     def __init__(self, first: Ticket, others: Sequence[tuple[str, Ticket]]) -> None:
         self._first, self._others = first, tuple(others)
 
     def wait(self, within_s: float) -> CommandReply | None:
-        """Wait so long for the reply of each; None where the first head's loop has given none."""
+        """Wait for each reply up to ``within_s``; return None if the first head has not replied."""
         reply = self._first.wait(within_s)
         if reply is None or reply.refused:
             return reply
         for name, ticket in self._others:
-            # Heads count a stop from ticks of their own: of two, one may still have to hold it.
+            # Each head counts a stop from its own ticks, so one may still refuse a resume.
             theirs = ticket.wait(within_s)
             if theirs is None:
                 return CommandReply(f"head {name} does not answer")

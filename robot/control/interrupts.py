@@ -1,4 +1,4 @@
-"""Signals that ask this program to end: noted, so that the head parks before it does."""
+"""Handling of signals that end this program: they are recorded, so that the head parks first."""
 
 import signal
 import threading
@@ -10,7 +10,7 @@ from gazerig.robot.model.clock import RealClock
 
 
 def signals_of(*names: str) -> tuple[signal.Signals, ...]:
-    """Return the signals of these names that this system has."""
+    """Return the signals of these names that the operating system has."""
     return tuple(one for name in names if (one := getattr(signal, name, None)) is not None)
 
 
@@ -18,26 +18,26 @@ ENDING = signals_of("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")
 """Ctrl-C, a request to end, a terminal that was closed, Ctrl-backslash, and Windows' Ctrl-Break."""
 _HANG_UP = signals_of("SIGHUP")
 _BACKGROUND = signals_of("SIGTTIN", "SIGTTOU")
-"""Would stop a program in the background for a look at its terminal, with the torque on."""
+"""They would stop a background program that accesses its terminal, with the torque on."""
 
 _NEVER = 1 << 30
-"""So many requests to end never come."""
+"""More requests than can occur."""
 
 SAME_REQUEST_S = 0.3
-"""Signals closer together are one request: a shell and the kernel each send their own."""
+"""Signals closer together count as one request: shell and kernel each send their own."""
 
 
 class Interrupts:
-    """Requests to end this program, noted while the block lasts.
+    """A recorder of requests to end this program, active inside its block.
+
+    The first request is only recorded: the work reads it by calling this object. A second one
+    raises KeyboardInterrupt, because the work may hang, except if ``spared`` forbids it. SIGHUP is
+    never a second one: one closed terminal sends it several times.
 
     Args:
-        now_s: gives the time; the host's where nothing is said.
-        also: gives another reason to end, None while there is none.
-        signals: note signals; else only ``request`` counts, and handlers stay as they are.
-
-    The first is only recorded: the work asks for it by calling this object. A second one
-    raises KeyboardInterrupt, because the work may hang, except where ``held_off`` says
-    otherwise. SIGHUP is never a second one: it comes several times from one closed terminal.
+        now_s: Returns the time; default: the host's.
+        also: Returns another reason to end, None while there is none.
+        signals: Record signals; if False, only ``request`` counts and handlers stay unchanged.
     """
 
     def __init__(
@@ -54,25 +54,25 @@ class Interrupts:
         self._before: dict[signal.Signals, Any] = {}
         self._depth = 0
         self.tolerated = 1
-        """So many requests are noted before one raises KeyboardInterrupt."""
+        """Number of requests that are recorded before one raises KeyboardInterrupt."""
         self.spared: Callable[[FrameType | None], bool] = lambda frame: False
-        """Tells whether the function at work must not be interrupted whatever comes."""
+        """Returns whether the function of a frame must never be interrupted."""
 
     @classmethod
     def of(cls, stopped: Callable[[], str | None]) -> "Interrupts":
-        """Return the interrupts behind a function that gives why to stop, new ones elsewhere."""
+        """Return ``stopped`` if it is an Interrupts, else a new one."""
         return stopped if isinstance(stopped, Interrupts) else cls()
 
     def __enter__(self) -> Self:
-        """Begin to note; in another thread than the main one nothing can be noted.
+        """Start recording; signals are recorded only in the main thread.
 
-        A block inside a block changes nothing.
+        A nested block changes nothing.
         """
         self._depth += 1
         main = threading.current_thread() is threading.main_thread()
         if main and self._signals and self._depth == 1:
             for number in ENDING:
-                # Who starts a program with nohup wants it to outlive the terminal.
+                # A program started with nohup must outlive the terminal.
                 if number in _HANG_UP and signal.getsignal(number) == signal.SIG_IGN:
                     continue
                 self._before[number] = signal.signal(number, self._note)
@@ -81,7 +81,7 @@ class Interrupts:
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """Restore the signal handlers of before."""
+        """Restore the previous signal handlers."""
         self._depth -= 1
         if self._depth:
             return
@@ -93,13 +93,13 @@ class Interrupts:
         """Return the name of the first signal or the other reason to end, None before any."""
         if self._first is None and self._also is not None:
             other = self._also()
-            # Meanwhile a signal or another thread may have asked: that is not to be forgotten.
+            # A signal or another thread may have made a request meanwhile; it has priority.
             if other is not None and self._first is None:
                 self._first = other
         return self._first
 
     def request(self, reason: str) -> None:
-        """Ask for the end from any thread; asked again, it skips what is left of parking."""
+        """Request the end from any thread; a second request skips the rest of parking."""
         if self._first is None:
             self._first = reason
         else:
@@ -107,18 +107,18 @@ class Interrupts:
 
     @property
     def requests(self) -> int:
-        """Return how often this program was asked to end."""
+        """Return the number of requests to end."""
         return self._more + (self._first is not None)
 
     def never_raise(self) -> None:
-        """Only record from now on: the work asks often enough."""
+        """Only record from now on: the work checks for requests often enough."""
         self.tolerated = _NEVER
 
     def refuse(self) -> None:
-        """End here what was asked to end before there was anything to park.
+        """Raise if the end was requested before there is anything to park.
 
         Raises:
-            KeyboardInterrupt: it was.
+            KeyboardInterrupt: The end was requested.
         """
         if self() is not None:
             raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Joints that the guard held for a fault: reported when that begins and ends, and counted."""
+"""Report and count of joints that the guard holds because of a fault."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -9,23 +9,27 @@ if TYPE_CHECKING:
 FAULTS = frozenset(
     {"not moving", "overloaded", "hot", "voltage", "stale joints", "torque off", "not finite"}
 )
-"""Reasons of the guard to hold a joint that something is wrong with; latched errors besides."""
+"""The guard's reasons to hold a faulty joint, in addition to latched errors."""
 
 _PASSING_S = {"stale joints": 0.5, "torque off": 0.5}
-"""A lost answer or a restart that is over sooner is no fault."""
+"""A shorter loss of answers or restart is no fault."""
 _BY_TIME = frozenset({"stale joints", "torque off", "not moving"})
-"""Reasons that a computer that is late makes by itself."""
+"""Reasons that a late computer can cause."""
 _OVER_S = 1.0
-"""A fault is over when the joint has not been held for so long; a retry alone does not end it."""
+"""A fault ends when the joint has not been held for this time; a retry alone does not end it."""
 
 
 _MOST_NAMED = 3
 
 
 class JointFault(NamedTuple):
-    """A fault of one joint in a run.
+    """A fault of a joint in a run.
 
-    times: how often it began; seconds: how long it lasted in all
+    Attributes:
+        joint: Name of the joint.
+        reason: Reason of the guard.
+        times: Number of times that it began.
+        seconds: Total duration in s.
     """
 
     joint: str
@@ -34,48 +38,56 @@ class JointFault(NamedTuple):
     seconds: float
 
     def __str__(self) -> str:
-        """Return it as text."""
+        """Return the fault as text."""
         often = "" if self.times == 1 else f", {self.times} times"
         return f"{self.joint} {self.reason} ({self.seconds:.1f} s{often})"
 
 
 class _OpenFault:
-    """A fault that lasts."""
+    """A fault that has not ended."""
 
     def __init__(self, t_s: float) -> None:
         self.from_s = self.last_s = t_s
-        self.said = False
+        self.reported = False
 
 
 class _Lines:
-    """What there is to say of joints in one tick: the same of several is one line."""
+    """The lines about joints of one tick; the same text for several joints is one line."""
 
     def __init__(self) -> None:
         self._joints: dict[tuple[float, str], list[str]] = {}
 
     def add(self, joint: str, t_s: float, what: str) -> None:
-        """Report something of a joint, as at a time."""
+        """Add a text about a joint at a time."""
         self._joints.setdefault((t_s, what), []).append(joint)
 
     def all(self, count: int) -> list[tuple[float, str]]:
-        """Return time and line of each; count: of the rig's joints."""
+        """Return time and text of each line.
+
+        Args:
+            count: Number of the rig's joints.
+        """
         return [(t_s, f"{named(of, count)}: {what}") for (t_s, what), of in self._joints.items()]
 
 
 def named(joints: Sequence[str], count: int = 0) -> str:
-    """Return joints as people are told of them: three at most by name; count: of the rig's."""
+    """Return joints as text, at most three by name.
+
+    Args:
+        joints: Names of the joints.
+        count: Number of the rig's joints.
+    """
     if len(joints) == count and count > 1:
         return f"all {count} joints"
     return ", ".join(joints) if len(joints) <= _MOST_NAMED else f"{len(joints)} joints"
 
 
 class JointFaults:
-    """Observes ticks for joints that are held by a fault.
+    """An observer of ticks that counts faults of joints.
 
     Args:
-        say: gets a line, with the time since the first tick, when a fault begins and ends.
-        busy: returns that the computer is too busy, "" where it is not; joints are old then
-            because of it.
+        say: Receives a line, with the time since the first tick, when a fault begins and ends.
+        busy: Returns a text if the computer is too busy, which makes joints stale, else "".
     """
 
     def __init__(self, say: Callable[[str], None], busy: Callable[[], str] = lambda: "") -> None:
@@ -93,11 +105,11 @@ class JointFaults:
         if not held and not self._running:
             return
         lines = _Lines()
-        for joint, reason in _held(tick) if held else ():
+        for joint, reason in _fault_holds(tick) if held else ():
             running = self._running.setdefault((joint, reason), _OpenFault(tick.t_s))
             running.last_s = tick.t_s
-            if not running.said and tick.t_s - running.from_s >= _PASSING_S.get(reason, 0.0):
-                running.said = True
+            if not running.reported and tick.t_s - running.from_s >= _PASSING_S.get(reason, 0.0):
+                running.reported = True
                 busy = self._busy() if reason in _BY_TIME else ""
                 lines.add(joint, running.from_s, f"{reason}: held" + (f", as {busy}" * bool(busy)))
         for key, running in tuple(self._running.items()):
@@ -107,17 +119,17 @@ class JointFaults:
             self._say(f"{t_s - self._first_s:.2f} s: {line}")
 
     def close(self) -> None:
-        """Count what still lasts, at the end of a run."""
+        """Count faults that have not ended, at the end of a run."""
         for key, running in tuple(self._running.items()):
             self._end(key, running, None)
 
     def counted(self) -> tuple[JointFault, ...]:
-        """Return all faults that are over, by joint and reason."""
+        """Return all faults that have ended, sorted by joint and reason."""
         found = sorted(self._counted.items())
         return tuple(JointFault(*key, times, seconds) for key, (times, seconds) in found)
 
     def figures(self) -> dict[str, dict[str, dict[str, float]]]:
-        """Return the same as plain values: joint -> reason -> times and seconds."""
+        """Return these faults as plain values: joint -> reason -> times and seconds."""
         figures: dict[str, dict[str, dict[str, float]]] = {}
         for fault in self.counted():
             entry = {"times": fault.times, "seconds": round(fault.seconds, 3)}
@@ -125,9 +137,15 @@ class JointFaults:
         return figures
 
     def _end(self, key: tuple[str, str], running: _OpenFault, lines: "_Lines | None") -> None:
-        """Count a fault; lines: takes what there is to say, None for one that lasts."""
+        """Count a fault.
+
+        Args:
+            key: Joint and reason.
+            running: The fault.
+            lines: Receives the line about its end; None at the end of a run.
+        """
         del self._running[key]
-        if not running.said:
+        if not running.reported:
             return
         seconds = running.last_s - running.from_s
         times, before_s = self._counted.get(key, (0, 0.0))
@@ -137,8 +155,8 @@ class JointFaults:
             lines.add(joint, running.last_s, f"{reason}: over after {seconds:.1f} s")
 
 
-def _held(tick: "Tick") -> list[tuple[str, str]]:
-    """Return joint and reason of all joints that a fault holds in this tick."""
+def _fault_holds(tick: "Tick") -> list[tuple[str, str]]:
+    """Return joint and reason of all joints that are held because of a fault in this tick."""
     found = []
     faults = tick.joints.fault
     grave = set(tick.guard_result.critical_reasons)

@@ -1,4 +1,4 @@
-"""Lines for people, handed on by a thread: who takes none, or only slowly, delays no caller."""
+"""Queue of lines for people, delivered by a thread: a slow receiver delays no caller."""
 
 import contextlib
 import sys
@@ -11,23 +11,24 @@ from gazerig.drivers.plugins import describe_error
 from gazerig.drivers.process.bounded_call import OVERDUE_SOURCES, BoundedCall
 
 _MOST = 500
-"""So many lines wait; more are dropped."""
+"""Number of waiting lines; further ones are dropped."""
 _END_S = 1.0
-"""The last lines have so long to be delivered."""
+"""Time to deliver the last lines."""
 
 
 class LineQueue:
-    """Hands lines to a function that may block or fail, in the order of the calls.
+    """A queue of lines for a function that may block or fail, in the order of the calls.
 
     While its block lasts, a function that does not return is in ``OVERDUE_SOURCES``. The end of the
-    block waits for a second at most, and tells standard error of lines that were not delivered.
+    block waits for at most a second and reports undelivered lines on standard error.
 
     Args:
-        deliver: takes one line after another, in one thread.
-        name: of what takes them, for messages.
-        most: so many lines wait; more are dropped.
+        deliver: Called with one line after another, in one thread.
+        name: Name of the receiver in messages.
+        most: Number of waiting lines; further ones are dropped.
 
-    dropped: lines that were not delivered
+    Attributes:
+        dropped: Number of lines that were not delivered.
     """
 
     def __init__(self, deliver: Callable[[str], object], name: str, most: int = _MOST) -> None:
@@ -38,19 +39,19 @@ class LineQueue:
         self.dropped = 0
 
     def line(self, text: str) -> None:
-        """Deliver this; returns at once."""
+        """Queue a line without waiting."""
         if self._call.waiting() >= self._most:
             self.dropped += 1
             self._missing += 1
         else:
-            self._call.begin(partial(self._hand_on, text))
+            self._call.begin(partial(self._deliver_line, text))
 
     def flush(self, timeout_s: float) -> bool:
-        """Wait until everything is delivered, no longer than this; return whether it is."""
+        """Wait until everything is delivered or the time is over; return whether it is."""
         return self._call.idle(timeout_s)
 
     def lasts(self) -> tuple[float, str] | None:
-        """Return for how long [s] a line has not been taken, None where all are."""
+        """Return the duration [s] of a blocked delivery and a text, None if none is blocked."""
         for_s = self._call.running_s()
         if for_s == 0.0:
             return None
@@ -58,7 +59,7 @@ class LineQueue:
         return for_s, f"{self._name} has not returned for {for_s:.0f} s: {waiting}"
 
     def __enter__(self) -> Self:
-        """Begin to watch what takes the lines."""
+        """Start watching the receiver."""
         OVERDUE_SOURCES.add(self)
         return self
 
@@ -68,7 +69,7 @@ class LineQueue:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Wait for what is under way, and end it where it lasts."""
+        """Wait for the running delivery, and abandon it after a second."""
         blocked = not self.flush(_END_S)
         OVERDUE_SOURCES.discard(self)
         lost = self.dropped + self._call.waiting() * blocked
@@ -79,8 +80,8 @@ class LineQueue:
             last.line(f"gazerig: {lost} lines were not delivered: {why}\n")
             last.flush(_END_S)
 
-    def _hand_on(self, text: str) -> None:
-        """Deliver a line, and before it how many are missing."""
+    def _deliver_line(self, text: str) -> None:
+        """Deliver a line, and before it a note of missing ones."""
         missing, self._missing = self._missing, 0
         try:
             if missing:

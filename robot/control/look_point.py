@@ -1,4 +1,4 @@
-"""Where in the world the thing is that a command says to look at."""
+"""World position of the target in a look command."""
 
 from typing import NamedTuple
 
@@ -18,8 +18,8 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 
 
-class Known(NamedTuple):
-    """What is known before the first tick; after that the newest tick stands in its place."""
+class LastObservation(NamedTuple):
+    """The observations before the first tick; afterwards the newest tick replaces them."""
 
     pose: GazeState | None = None
     detections: Detections | None = None
@@ -27,35 +27,36 @@ class Known(NamedTuple):
 
 
 class LookPoints:
-    """Finds what commands name.
+    """A finder of the points and faces in commands.
 
-    known: pose, detections and percept of the newest tick, by which commands are understood
+    Attributes:
+        newest: Pose, detections and percept of the newest tick, which commands refer to.
 
     Args:
-        pixels: places pixels in the world.
+        pixels: Converts pixels to points in the world.
     """
 
     def __init__(self, pixels: PixelToWorld) -> None:
         self._pixels = pixels
-        self.known: Known | Tick = Known()
+        self.newest: LastObservation | Tick = LastObservation()
 
-    def resolved(self, command: Command) -> Command:
-        """Return a command with the point of its pixel, as a recording needs it."""
-        found = self.known.detections
+    def resolve_pixel(self, command: Command) -> Command:
+        """Return a command with the world point of its pixel, which a recording needs."""
+        found = self.newest.detections
         if not isinstance(command, LookAtPixel) or command.p_world_m is not None or found is None:
             return command
         point = self._pixels.point(
-            command.pixel_px, found, self.known.percept, command.distance_m, command.captured_s
+            command.pixel_px, found, self.newest.percept, command.distance_m, command.captured_s
         )
         return command._replace(p_world_m=point)
 
     def point(self, command: Look) -> Vec3 | None:
-        """Return the point of the world to look at; None: look freely.
+        """Return the point in the world to look at, None to free the gaze.
 
         Raises:
-            ValueError: it cannot be found now; the message says why.
+            ValueError: The point cannot be found now; the message gives the reason.
         """
-        pose = self.known.pose
+        pose = self.newest.pose
         match command:
             case LookAt(p):
                 return p
@@ -73,12 +74,12 @@ class LookPoints:
         raise ValueError("the head has not been measured yet")
 
     def face(self, command: LookAtPerson) -> tuple[Face, float]:
-        """Return the face of a person and when it was seen.
+        """Return the face of a person and the time of its frame.
 
         Raises:
-            ValueError: no person of that id is seen; the message says who is.
+            ValueError: No visible person has that id; the message lists the visible people.
         """
-        percept = self.known.percept
+        percept = self.newest.percept
         faces = percept.faces if percept is not None else ()
         for face in faces:
             if face.id == command.id and percept is not None:

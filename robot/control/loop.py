@@ -1,4 +1,4 @@
-"""The tick, and the loop that keeps its time."""
+"""The tick of a robot, and the loop that keeps its time."""
 
 import contextlib
 from collections.abc import Callable
@@ -22,12 +22,12 @@ from gazerig.robot.control.command_choices import (
 )
 from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
-from gazerig.robot.control.garbage import set_aside
+from gazerig.robot.control.garbage import freeze_objects
 from gazerig.robot.control.gesture_choices import GestureChoices, GestureInfo
-from gazerig.robot.control.look_point import Known, LookPoints
+from gazerig.robot.control.look_point import LastObservation, LookPoints
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
-from gazerig.robot.control.tick import at_rest
+from gazerig.robot.control.tick import stopped_result
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.commands import Ask, Command, Jog, Tune
@@ -43,7 +43,7 @@ from gazerig.robot.safety.guard import Guard
 
 
 class LoopCount(NamedTuple):
-    """How the loop kept its time."""
+    """The counts of a loop: ticks, overrun slots, reason for the end."""
 
     ticks: int
     overruns: int
@@ -51,25 +51,25 @@ class LoopCount(NamedTuple):
 
 
 class Robot:
-    """One head: what it reads, decides and writes in a tick.
+    """One head, which reads, decides and writes in each tick.
 
     Args:
-        body: the joints on their bus.
-        kinematics: joint angles to head pose and gaze, and back.
-        camera: what is looked through.
-        perception: detections to people and things in the world.
-        poses: where the head was when.
-        attention: chooses the target.
-        scanpath: which part of a face.
-        aversion: looking away in a conversation.
-        oculomotor: target to eyes, head and lids; says whether the gaze has arrived.
-        lids: their blinks can be asked for.
-        animation: gestures and expressions laid over gaze.
-        gestures: those that can be played.
-        guard: between what is desired and the bus.
-        tune: puts changed parameters in force and says what was done.
-        pixels: places pixels of a camera frame in the world.
-        messages: lines for the events of the next tick, to which other parts add theirs.
+        body: The joints on their bus.
+        kinematics: Joint angles to head pose and gaze, and back.
+        camera: Source of detections.
+        perception: Detections to people and things in the world.
+        poses: History of the head's pose.
+        attention: Chooses the target.
+        scanpath: Chooses the part of a face.
+        aversion: Looks away in a conversation.
+        oculomotor: Target to eyes, head and lids; reports whether the gaze has arrived.
+        lids: Lids, for winks and sleepiness.
+        animation: Gestures and expressions on top of the gaze.
+        gestures: Gestures that can be played.
+        guard: Guard between desired angles and the bus.
+        tune: Applies changed parameters and returns messages about it.
+        pixels: Converts pixels of a camera frame to points in the world.
+        messages: Lines for the events of the next tick; other components add theirs.
     """
 
     def __init__(
@@ -117,24 +117,24 @@ class Robot:
 
     @property
     def stopped(self) -> str:
-        """Return why the robot was stopped, "" while it moves."""
+        """Return the reason for a stop, "" while the robot moves."""
         return self._stop.why
 
     @property
     def newest(self) -> Tick | None:
         """Return the last tick, None before the first."""
-        known = self._looks.known
+        known = self._looks.newest
         return known if isinstance(known, Tick) else None
 
     def command(self, command: Command) -> Ticket:
-        """Queue a command for the next tick; may be called from any thread.
+        """Queue a command for the next tick. Thread-safe.
 
         Returns:
-            Where the reply comes, once the loop has taken the command up.
+            The ticket of the reply, which the loop gives when it executes the command.
 
         Raises:
-            ValueError: it cannot be done, or too many commands wait; the message says which,
-                and what there is.
+            ValueError: The command is invalid, or the queue is full; the message lists the
+                available choices.
         """
         check(command)
         if isinstance(command, Jog):
@@ -142,47 +142,49 @@ class Robot:
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
-        """Queue a command that was accepted in a recorded run, whatever the ranges are now.
+        """Queue a command that a recorded run accepted, without a check of the present ranges.
 
         Raises:
-            ValueError: as ``command``.
+            ValueError: As ``command``.
         """
         check(command)
         refuse_impossible(command, self.menus, self.body.names, self._animation, self._gestures)
         return self._commands.add(command)
 
     def report(self, line: str) -> None:
-        """Add a line to the events of the next tick; for the loop's thread."""
+        """Add a line to the events of the next tick; only for the loop's thread."""
         self._messages.append(line)
 
     def ask(self, menu: str, choice: str) -> None:
-        """Choose a behaviour, a mode of conversation or a wink, from the next tick on.
+        """Choose a behaviour, a mode of conversation or a wink from the next tick on.
 
-        May be called from any thread.
+        Thread-safe.
 
         Raises:
-            ValueError: there is no such menu or choice; the message lists what there is.
+            ValueError: There is no such menu or choice; the message lists the available ones.
         """
         self.command(Ask(menu, choice))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return what ``ask`` takes: menu -> choices, the present one first."""
+        """Return the choices of ``ask``: menu -> choices, the present one first."""
         return self._menus.offered(self.attention.top_down)
 
     def gestures(self) -> tuple[GestureInfo, ...]:
-        """Return the gestures there are, with what this rig can do of them."""
+        """Return all gestures with their fit to this rig."""
         return self._gestures.offered(self._guard.limits)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
-        """Open camera and bus, switch torque on where the joints are, begin from there.
+        """Open camera and bus, switch the torque on and start from the present angles.
 
-        ready: called last before the torque comes on; what it raises ends the start
+        Args:
+            clock: Clock of the loop.
+            ready: Called just before the torque comes on; its exception ends the start.
 
         Raises:
-            SetupError: something is absent or not as configured.
+            SetupError: A device is missing or does not match the configuration.
         """
         if isinstance(clock, RealClock):
-            set_aside()
+            freeze_objects()
         self.camera.open()
         try:
             if ready is not None:
@@ -192,19 +194,19 @@ class Robot:
             self.camera.close()
             raise
         try:
-            self._begin(clock.now_s(), goals)
+            self._initialize(clock.now_s(), goals)
         except BaseException:
             with contextlib.suppress(DriverError):
                 self.stop()
             raise
 
-    def _begin(self, t_s: float, goals: JointAngles) -> None:
-        """Initialise every component with the present angles of the joints."""
+    def _initialize(self, t_s: float, goals: JointAngles) -> None:
+        """Initialize every component with the present angles of the joints."""
         self._guard.reset(t_s, goals)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
-        self._looks.known = Known(pose)
+        self._looks.newest = LastObservation(pose)
         self.attention.reset(t_s)
         self._aversion.reset(t_s)
         self._scanpath.reset(t_s)
@@ -215,12 +217,12 @@ class Robot:
         self._executor.commanded_rad = goals
 
     def tick(self, t_s: float, dt_s: float) -> Tick:
-        """Read, see, choose, plan, guard, write.
+        """Read, perceive, choose, plan, guard, write.
 
         Raises:
-            DriverError: bus or camera are gone.
+            DriverError: Bus or camera are gone.
         """
-        commands = self._obey(t_s)
+        commands = self._execute_commands(t_s)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
@@ -242,7 +244,7 @@ class Robot:
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
         if stopped := self._stop.why:
             self._stop.keep_released(self.body, joints, t_s)
-            guard_result = at_rest(joints, desired, stopped, self.body.names)
+            guard_result = stopped_result(joints, desired, stopped, self.body.names)
         else:
             guard_result = self._guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
             self.body.write(guard_result.command_rad)
@@ -255,7 +257,7 @@ class Robot:
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
             stopped, self._lead.words, lead, self._gestures.state, False,
         ))  # fmt: skip
-        self._looks.known = tick
+        self._looks.newest = tick
         return tick
 
     def park(
@@ -268,27 +270,31 @@ class Robot:
     ) -> bool:
         """Move slowly to the parking pose; return whether it was reached in time.
 
-        A user's stop ends it: the torque is off then. Other commands wait for nothing any more.
+        A user's stop ends parking with the torque off. Other commands get no reply any more.
 
-        again: asked at every step, returns whether the rest is to be skipped
-        watch: gets the last tick at every step, with what has changed since
+        Args:
+            pose_rad: Joint angles of the parking pose.
+            clock: Clock of the loop.
+            params: Rate and time for parking.
+            again: Returns whether to skip the rest; called at every step.
+            watch: Called at every step with the last tick and the changes since.
         """
         self._guard.go_gently()
-        newest = self._looks.known
+        newest = self._looks.newest
         rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
         end_s = start_s + params.park_s + 0.5 / rate_hz
         last = int(params.park_s * rate_hz)
         while (slot := max(slot, int((clock.now_s() - start_s) * rate_hz + 1e-6)) + 1) <= last:
             clock.sleep_until(start_s + slot / rate_hz)
             t_s = clock.now_s()
-            # A bus that is slow to answer must not make it longer; missed slots are skipped.
+            # A slow bus must not prolong parking; missed slots are skipped.
             if t_s > end_s or (again is not None and again()):
                 return False
             if stops := self._commands.stops():
                 for stop in stops:
                     stop.ticket.answer(self._executor.execute(stop.command, t_s))
                 return False
-            joints = self.body.read(t_s)  # it goes home whatever the camera shows
+            joints = self.body.read(t_s)
             guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)
             self.body.write(guard_result.command_rad)
             if watch is not None and isinstance(newest, Tick):
@@ -300,26 +306,26 @@ class Robot:
         return False
 
     def stop(self) -> tuple[str, ...]:
-        """Torque off, close the bus and the camera; return what the bus says of the torque."""
+        """Switch the torque off, close bus and camera; return the bus's messages."""
         try:
             return self.body.stop()
         finally:
             self.camera.close()
 
-    def _obey(self, t_s: float) -> tuple[Command, ...]:
-        """Execute and return the commands that wait, and end a lead that is not renewed."""
+    def _execute_commands(self, t_s: float) -> tuple[Command, ...]:
+        """Execute and return the waiting commands, and end a control that was not renewed."""
         taken = []
         for waiting in self._commands.take() if self._commands else ():
-            command = self._looks.resolved(waiting.command)
+            command = self._looks.resolve_pixel(waiting.command)
             taken.append(command)
             waiting.ticket.answer(self._executor.execute(command, t_s))
         self._executor.end_lapsed(t_s)
         return tuple(taken)
 
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
-        """Return the age of the frame that the gaze rests on.
+        """Return the age of the frame that the gaze depends on.
 
-        What a person chose to look at is there whatever the camera shows.
+        A target chosen by a client does not depend on the camera.
         """
         if not self._lead.needs_camera:
             return 0.0
@@ -327,18 +333,17 @@ class Robot:
 
 
 class TickLoop:
-    """Ticks at absolute slots, one at each call of ``step``.
+    """A loop of ticks at absolute slots, one per call of ``step``.
 
-    A tick that takes too long costs the slots it overran: they are counted and
-    skipped, never caught up in a burst.
+    Slots that a long tick overruns are counted and skipped, never caught up in a burst.
 
     Args:
-        robot: reads, decides and writes once a tick.
-        clock: the host's, or a simulated one.
-        params: rate and slots; a function where the rate may change while running. Slots of another
-            rate begin at the last tick's.
-        stop: is given the seconds since the start, and returns why to stop, or None.
-        watch: gets every tick.
+        robot: Reads, decides and writes once per tick.
+        clock: The host's clock or a simulated one.
+        params: Rate and slots, or a function that returns them if the rate may change. Slots of a
+            new rate start at the last tick's slot.
+        stop: Takes the seconds since the start; returns the reason to stop, or None.
+        watch: Called with every tick.
     """
 
     def __init__(
@@ -356,7 +361,7 @@ class TickLoop:
         self._slot = self._ticks = self._overruns = 0
 
     def step(self) -> str | None:
-        """Wait for the next slot and tick; return why the loop ends, None while it goes on."""
+        """Wait for the next slot and tick; return the reason for the end, else None."""
         clock, rate_hz = self._clock, self._params().rate_hz
         if rate_hz != self._rate_hz:
             self._slots_s += self._slot * (1.0 / self._rate_hz)
@@ -384,7 +389,7 @@ class TickLoop:
         return None
 
     def count(self, stopped_by: str) -> LoopCount:
-        """Return ticks done, slots missed and why it ended."""
+        """Return the counts of the loop."""
         return LoopCount(self._ticks, self._overruns, stopped_by)
 
 
@@ -395,7 +400,7 @@ def run(
     stop: Callable[[float], str | None],
     watch: Callable[[Tick], None],
 ) -> LoopCount:
-    """Tick until ``stop(seconds)`` returns a reason or something fails; as ``TickLoop``."""
+    """Tick until ``stop(seconds)`` returns a reason or a driver fails; see ``TickLoop``."""
     loop = TickLoop(robot, clock, params, stop, watch)
     while (reason := loop.step()) is None:
         pass

@@ -1,4 +1,4 @@
-"""How well the control loop keeps its time, measured by the times of its ticks alone."""
+"""Timing figures of the control loop, computed from the times of its ticks."""
 
 from collections import deque
 
@@ -7,18 +7,18 @@ import numpy as np
 from gazerig.robot.model.types import LoopFigures
 
 OVER_S = 5.0
-"""How far back the figures reach."""
+"""Time that the figures cover."""
 BUSY_SHARE = 0.05
 """A computer that misses this share of the slots is too busy."""
-_TELLING_S = 1.0
-"""Less time than this tells nothing."""
+_SHORTEST_S = 1.0
+"""Shortest time for a conclusion."""
 
 
 class LoopTiming:
-    """Figures of the last seconds.
+    """The timing figures of the last seconds.
 
-    A tick that comes late shows twice, as a long wait and a short one; slots that were
-    skipped are counted as overruns and taken out of the wait.
+    A late tick counts twice, as a long wait and a short one. Skipped slots count as overruns and
+    are subtracted from the wait.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -27,7 +27,7 @@ class LoopTiming:
         self.retune(rate_hz)
 
     def retune(self, rate_hz: float) -> None:
-        """Go on with slots of another rate; what came before tells nothing of them."""
+        """Set another rate and discard the record."""
         self._rate_hz, self._period_s = rate_hz, 1.0 / rate_hz
         self._last_s: float | None = None
         self._rows.clear()
@@ -47,7 +47,7 @@ class LoopTiming:
             self._rows.popleft()
 
     def figures(self) -> LoopFigures | None:
-        """Return the figures, None before the second tick; for any thread."""
+        """Return the figures, None before the second tick. Thread-safe."""
         rows = list(self._rows)
         if not rows:
             return None
@@ -69,12 +69,12 @@ class LoopTiming:
 
 
 def busy_text(figures: LoopFigures | None) -> str:
-    """Return that the computer is too busy, and how it shows; "" where it is not.
+    """Return a text if the computer is too busy, else "".
 
     Args:
-        figures: of the last seconds; None where nothing is known.
+        figures: Figures of the last seconds, None if unknown.
     """
-    if figures is None or figures.over_s < _TELLING_S or figures.late_share < BUSY_SHARE:
+    if figures is None or figures.over_s < _SHORTEST_S or figures.late_share < BUSY_SHARE:
         return ""
     return (
         f"the computer is too busy: {figures.late_share:.0%} of ticks came late "

@@ -1,4 +1,4 @@
-"""Observers of every tick, none of which can end the run."""
+"""Observers of every tick; a failing observer does not end the run."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -12,10 +12,10 @@ class _Observer(NamedTuple):
 
 
 class Observers:
-    """Functions called with every tick; one that raises is left out from then on.
+    """The functions called with every tick; a function that raises is removed.
 
     Args:
-        say: gets one line about each that is left out.
+        say: Receives one line about each removed function.
     """
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -23,7 +23,7 @@ class Observers:
         self._observers: tuple[_Observer, ...] = ()
 
     def add(self, name: str, update: Callable[[Tick], object]) -> None:
-        """Call one more with every tick, under a name that people know it by."""
+        """Add a function under a name for messages."""
         self._observers = (*self._observers, _Observer(name, update))
 
     def update(self, tick: Tick) -> None:
@@ -33,11 +33,11 @@ class Observers:
                 observer.update(tick)
             except Exception as error:
                 self._observers = tuple([one for one in self._observers if one is not observer])
-                self._say(left_out(observer.name, error))
+                self._say(failure_text(observer.name, error))
 
 
-def left_out(name: str, error: Exception) -> str:
-    """Return a message that the run goes on without a failed observer."""
+def failure_text(name: str, error: Exception) -> str:
+    """Return a message that the run continues without a failed observer."""
     what = " ".join(str(error).split())
     kind = type(error).__name__
     return (

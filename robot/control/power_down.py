@@ -1,12 +1,12 @@
-"""The one way out of everything that switches torque on: park, torque off, one line.
+"""Shutdown of everything that switches torque on: park, torque off, one line.
 
-    with PowerDown(park, control.stop, say, interrupts) as way_out:
-        way_out.switch_on(control.start)
+    with PowerDown(park, control.stop, say, interrupts) as power:
+        power.switch_on(control.start)
         ...
 
-Whatever ends the block, a signal, an exception, the end of the memory or the work itself, the
-head parks in bounded time and the torque goes off. Nothing is written to a terminal before
-that, and what is written cannot keep it from happening.
+Whatever ends the block (a signal, an exception, lack of memory or the end of the work), the head
+parks in bounded time and the torque goes off. Nothing is written to a terminal before that, and
+writing cannot prevent it.
 """
 
 import contextlib
@@ -21,26 +21,27 @@ from gazerig.robot.control.interrupts import Interrupts
 T = TypeVar("T")
 
 Again = Callable[[], bool]
-"""Returns whether the end was requested again: the rest of parking is skipped then."""
+"""Returns whether the end was requested again, which skips the rest of parking."""
 
 
 class PowerDown:
-    """Switches on what it also switches off.
+    """A block that switches the torque off at its end.
 
     Args:
-        park: moves to the parking pose in bounded time; returns what to say of it, such as
-            "parked". None: torque goes off where the joints are.
-        torque_off: switches torque off on all servos and closes the bus; returns what the bus
-            says of servos that do not confirm it.
-        say: gets the line that tells how it went.
-        interrupts: requests to end this program.
-        off: what to say of torque that is off.
-        left: what to say of servos that could not be reached, after the reason.
-        quiet: says nothing where the torque went off as it should.
+        park: Moves to the parking pose in bounded time; returns a text such as "parked". None
+            to switch the torque off at the present angles.
+        torque_off: Switches the torque of all servos off and closes the bus; returns the bus's
+            messages about servos that do not confirm it.
+        say: Receives one line about the result.
+        interrupts: Requests to end this program.
+        off: Text for torque that is off.
+        left: Text for unreachable servos, after the reason.
+        quiet: Say nothing if the torque went off properly.
 
-    cause: why it ended, for the line; "" says nothing of it
-    how: what became of it, "" before the end
-    unreleased: what is said of servos whose torque may still be on
+    Attributes:
+        cause: Reason for the end in the line, "" for none.
+        how: Text of the result, "" before the end.
+        unreleased: Messages about servos whose torque may still be on.
     """
 
     def __init__(
@@ -62,9 +63,10 @@ class PowerDown:
         self.unreleased: tuple[str, ...] = ()
 
     def switch_on(self, start: Callable[[], T]) -> T:
-        """Call what switches torque on; return what it returns.
+        """Call ``start``, which switches the torque on, and return its result.
 
-        start: where it raises a DriverError, it has switched everything off again
+        Args:
+            start: If it raises a DriverError, it has switched everything off again.
         """
         self._starting = True
         try:
@@ -76,44 +78,44 @@ class PowerDown:
         return result
 
     def __enter__(self) -> Self:
-        """Guard the block."""
-        self._interrupts.spared = _at_work_here
+        """Start the block."""
+        self._interrupts.spared = _is_this_file
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        """Leave with the torque off."""
+        """End the block with the torque off."""
         if isinstance(error, KeyboardInterrupt):
             self.cause = self.cause or self._interrupts() or "an interrupt"
         elif isinstance(error, Exception) and not isinstance(error, DriverError):
-            self.cause = self.cause or f"fault: unexpected {_words(error)}"
+            self.cause = self.cause or f"fault: unexpected {_error_text(error)}"
         if self._on:
             self.leave()
-        elif self._starting:  # what broke off the start may have left something on
+        elif self._starting:  # an interrupted start may have left torque on
             self._interrupts.never_raise()
             with contextlib.suppress(BaseException):
                 self._torque_off()
             self._interrupts.tolerated = max(1, self._interrupts.requests)
 
     def leave(self) -> None:
-        """Park, torque off, close, and say what of it worked; never raises."""
+        """Park, switch the torque off, close, and report the result; never raise."""
         interrupts = self._interrupts
         asked = interrupts.requests
-        # The next request skips the rest of parking, one more breaks it off should it hang.
+        # The next request skips the rest of parking; a further one interrupts parking that hangs.
         interrupts.tolerated = asked + 1
         how = ""
         try:
             if self._park is not None:
                 how = f"{self._park(lambda: interrupts.requests > asked)}, "
         except BaseException as error:
-            how = f"not parked ({_words(error)}), "
+            how = f"not parked ({_error_text(error)}), "
         interrupts.never_raise()
         failed = True
         try:
             self.unreleased = tuple(drawn_together(self._torque_off() or ()))
             how, failed = how + "; ".join((self._off, *self.unreleased)), bool(self.unreleased)
         except BaseException as error:
-            how += f"torque-off could not be sent ({_words(error)}){self._left}"
-            self.unreleased = (_words(error),)
+            how += f"torque-off could not be sent ({_error_text(error)}){self._left}"
+            self.unreleased = (_error_text(error),)
         self._on = self._starting = False
         self.how = how
         with contextlib.suppress(Exception):
@@ -122,13 +124,13 @@ class PowerDown:
         interrupts.tolerated = max(1, interrupts.requests)
 
 
-def _at_work_here(frame: FrameType | None) -> bool:
-    """Return whether this very file is at work: it can be interrupted only in what it calls."""
+def _is_this_file(frame: FrameType | None) -> bool:
+    """Return whether a frame is in this file, which may be interrupted only in its callees."""
     return frame is not None and frame.f_code.co_filename == __file__
 
 
-def _words(error: BaseException) -> str:
-    """Return an exception in one line; of those that are no wonder, the message alone."""
+def _error_text(error: BaseException) -> str:
+    """Return an exception in one line; for expected ones only the message."""
     if isinstance(error, KeyboardInterrupt):
         return "interrupted"
     what = " ".join(str(error).split())

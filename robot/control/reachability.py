@@ -1,4 +1,4 @@
-"""What a rig can do of what a person asks: joint by joint, before it has moved."""
+"""Reachability of a commanded gaze or pose, joint by joint, before the rig moves."""
 
 from collections.abc import Sequence
 from math import pi, radians
@@ -15,8 +15,8 @@ from gazerig.robot.model.reply import CommandReply, JointReply
 from gazerig.robot.model.types import JointAngles, JointState
 
 _SAME_RAD = radians(0.1)
-_BESIDE_RAD = radians(0.5)
-"""A gaze that rests nearer to its point is on it: eyes that converge differ by rounding."""
+_OFF_POINT_RAD = radians(0.5)
+"""A gaze within this distance is on its point: converging eyes differ by rounding."""
 _AT_END = "at the end of its range"
 _TOO_NEAR = "the eyes converge on no nearer point"
 _ABSENT = "this rig has none"
@@ -25,7 +25,7 @@ _ABSENT = "this rig has none"
 def reached_joints(
     reach: ReachableGaze, kinematics: Kinematics, limits: Sequence[JointLimit]
 ) -> JointAngles:
-    """Return the joint angles at which head and eyes come to rest, lids open."""
+    """Return the joint angles at which head and eyes come to rest, with open lids."""
     further_rad = kinematics.further_rad(reach.base_rad)
     return _within(
         kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad), further_rad), limits
@@ -35,17 +35,21 @@ def reached_joints(
 def look_reply(
     target: Target, oculomotor: Oculomotor, kinematics: Kinematics, limits: Sequence[JointLimit]
 ) -> CommandReply:
-    """Return how well eyes and head will meet a point that stands still.
+    """Return how well eyes and head will reach a stationary point.
 
-    limits: of the joints, in the order of ``kinematics.names``
+    Args:
+        target: The point.
+        oculomotor: Oculomotor model.
+        kinematics: Kinematics of the rig.
+        limits: Limits of the joints, in the order of ``kinematics.names``.
     """
     reach = oculomotor.reach(target)
     done = reached_joints(reach, kinematics, limits)
     at_rest = (0.0,) * len(done)
     pose = kinematics.forward(JointState(done, at_rest, at_rest, ()))
     error = gaze_error(target.p_world_m, pose, not kinematics.one_pan)
-    # A head that stops short because the eyes do the rest is not kept from anything.
-    head = reach.facing_rad if error.whole > _BESIDE_RAD else reach.head_rad
+    # A head that stops short because the eyes do the rest is not limited.
+    head = reach.facing_rad if error.whole > _OFF_POINT_RAD else reach.head_rad
     further_rad = kinematics.further_rad(reach.base_rad)
     asked = kinematics.inverse(_command(head, *reach.asked_eyes_rad), further_rad)
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
@@ -69,7 +73,7 @@ def look_reply(
 
 
 def jog_reply(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> CommandReply:
-    """Return how far joints that are put at angles will go."""
+    """Return the angles that commanded joints will reach."""
     spans = {name: limit[:2] for name, limit in zip(joints, limits, strict=True)}
     found = []
     for name, asked in command.angles_rad:

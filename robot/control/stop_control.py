@@ -1,4 +1,4 @@
-"""Carries out stops and their ends on the body; a stop that a lost bus refuses is remembered."""
+"""Execution of stops and resumes on the body; a stop during a lost bus is applied later."""
 
 from gazerig.drivers.errors import BusLost, DriverError, ServoFault, SetupError
 from gazerig.robot.control.body import Body
@@ -8,14 +8,14 @@ from gazerig.robot.model.stop_latch import StopLatch
 from gazerig.robot.model.types import JointAngles, JointState
 
 _RELEASE_AGAIN_S = 0.5
-"""After a stop, servos that still report torque are sent torque off again so often."""
+"""Interval at which servos that still report torque after a stop are switched off again."""
 
 
 class StopControl:
-    """Switches the torque off and on again.
+    """The control of torque for stops and resumes.
 
     Args:
-        messages: takes a line on whatever happens.
+        messages: Receives a line about each event.
     """
 
     def __init__(self, messages: list[str]) -> None:
@@ -26,11 +26,11 @@ class StopControl:
 
     @property
     def why(self) -> str:
-        """Return why the robot was stopped, "" while it moves."""
+        """Return the reason for a stop, "" while the robot moves."""
         return self._latch.why
 
     def halt(self, command: Stop, body: Body, t_s: float) -> None:
-        """Switch the torque off at once."""
+        """Switch the torque off immediately."""
         if self._latch.stop(command, t_s):
             by = f" by {command.who}" if command.who else ""
             self._messages.append(f"stopped{by}: {command.why}; torque off")
@@ -47,10 +47,10 @@ class StopControl:
             self._release(body, t_s)
 
     def resume(self, command: Resume, body: Body, t_s: float) -> JointAngles | CommandReply:
-        """Switch the torque on where the joints are; return the goals in force, or the refusal."""
+        """Switch the torque on at the present angles; return the goals, or the refusal."""
         by = f" by {command.who}" if command.who else ""
         if refusal := self._latch.refusal(command, t_s):
-            if refusal != self._refused:  # a flood of them is one line
+            if refusal != self._refused:  # repeated refusals give one line
                 self._messages.append(f"resume{by} refused: {refusal}")
             self._refused = refusal
             return CommandReply(refusal)
@@ -65,7 +65,7 @@ class StopControl:
         return goals
 
     def _release(self, body: Body, t_s: float) -> None:
-        """Switch the torque off; a bus that is lost does so itself when it is back."""
+        """Switch the torque off; a lost bus does so when it is back."""
         self._released_s = t_s
         try:
             body.disable_torque()

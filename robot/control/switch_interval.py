@@ -1,17 +1,17 @@
-"""How often threads take turns while control loops run in real time."""
+"""Thread switch interval while control loops run in real time."""
 
 import sys
 import threading
 
 _SHORT_S = 0.0003
-"""Who computes in another thread gives the interpreter back after so long, not the usual 5 ms,
-which is a whole slot of the loop."""
+"""Another thread releases the interpreter after this time instead of the usual 5 ms, which is a
+whole slot of the loop."""
 
 
 class SwitchInterval:
-    """Shortens the turns of threads while at least one loop runs, and restores them after the last.
+    """A short thread switch interval while at least one loop runs.
 
-    To be entered once for each loop, from any thread.
+    Enter it once for each loop, from any thread.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Everything one tick knew and decided."""
+"""Inputs and decisions of one tick."""
 
 from typing import NamedTuple
 
@@ -10,15 +10,17 @@ from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
 class Tick(NamedTuple):
-    """Everything one tick knew and decided; desired, commanded and measured side by side.
+    """The inputs and decisions of one tick: desired, commanded and measured values.
 
-    events: what has happened on the bus and to the camera, in words
-    commands: what people asked for, obeyed at the beginning of this tick
-    stopped: why the robot was stopped, "" while it moves
-    led: who leads gaze or joints and with what, "" while no client leads
-    lead: the newest lead, and whether the head is where it was to be
-    gesture: the newest gesture, and whether it is under way
-    parking: the run is over, and the head moves to its parking pose; such ticks are only shown
+    Attributes:
+        events: Texts of events on the bus and of the camera.
+        commands: Commands executed at the beginning of this tick.
+        stopped: Reason for a stop, "" while the robot moves.
+        led: Client that controls gaze or joints, and its command; "" without one.
+        lead: State of the newest client's control, with arrival at its target.
+        gesture: The newest gesture and its state.
+        parking: The run is over and the head moves to its parking pose; such ticks are only
+            displayed.
     """
 
     t_s: float
@@ -47,17 +49,17 @@ class Tick(NamedTuple):
         guard_result: GuardResult,
         events: tuple[str, ...],
     ) -> "Tick":
-        """Return a later tick of parking: what was seen is as here, and nobody leads."""
+        """Return a later tick of parking, with this tick's percept and without a client."""
         return Tick(
             t_s, joints, pose, self.detections, self.percept, self.target, self.gaze,
             desired_rad, guard_result, events, parking=True,
         )  # fmt: skip
 
 
-def at_rest(
+def stopped_result(
     joints: JointState, desired_rad: JointAngles, why: str, names: tuple[str, ...]
 ) -> GuardResult:
-    """Record that nothing is sent, as a user stopped the robot."""
+    """Return the guard's result of a stopped robot, to which nothing is sent."""
     reason = f"all: stopped ({why})"
     each = ("stopped",) * len(names)
     return GuardResult(

@@ -1,4 +1,4 @@
-"""The newest tick and the last events, left by the loop for other threads to read."""
+"""The newest tick and the last events for other threads."""
 
 from collections import deque
 from collections.abc import Callable
@@ -12,10 +12,11 @@ _MOST_EVENTS = 1000
 
 
 class Progress(NamedTuple):
-    """How far what was asked for is.
+    """The progress of a client's command and of a gesture.
 
-    lead, gesture: the newest ones
-    led: who leads gaze or joints and with what, "" while no client leads
+    Attributes:
+        lead, gesture: The newest ones.
+        led: Client that controls gaze or joints, and its command; "" without one.
     """
 
     lead: LeadState = NOBODY_LEADS
@@ -24,10 +25,11 @@ class Progress(NamedTuple):
 
 
 class TickFeed:
-    """One slot and one ring: the loop rebinds a name and appends, and waits for nobody.
+    """One slot for the newest tick and a ring of events; the loop never waits for readers.
 
-    newest: the newest tick, None before the first
-    ticks: counts them
+    Attributes:
+        newest: The newest tick, None before the first.
+        ticks: Number of ticks.
     """
 
     def __init__(self) -> None:
@@ -39,7 +41,7 @@ class TickFeed:
         self._followers: list[Callable[[Progress], bool]] = []
 
     def update(self, tick: Tick) -> None:
-        """Leave the newest tick; called by the loop."""
+        """Store the newest tick; called by the loop."""
         self.newest = tick
         self.ticks += 1
         for event in tick.events:
@@ -61,5 +63,5 @@ class TickFeed:
         return Progress(tick.lead, tick.gesture, tick.led) if tick is not None else Progress()
 
     def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
-        """Return the events kept whose numbers are above ``after``, oldest first."""
+        """Return the stored events with numbers above ``after``, the oldest first."""
         return tuple([one for one in list(self._events) if one.number > after])

@@ -1,7 +1,8 @@
-"""Ticks for other processes: some are encoded together, once for all who are sent them.
+"""Stream of ticks to other processes, encoded in batches, once for all receivers.
 
-Encoding a tick when it is over finds neither code nor encoder in the processor's cache; a
-batch of them some times a second costs a third of that. MessagePack holds every number bit for bit.
+If each tick is encoded at its end, neither code nor encoder are in the processor's cache; a
+batch several times per second takes a third of that time. MessagePack keeps every number bit for
+bit.
 """
 
 import re
@@ -14,7 +15,7 @@ import msgspec
 import numpy as np
 
 from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Mat3, Percept, Target, Vec3
-from gazerig.robot.control.observers import left_out
+from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_json import as_recorded
 from gazerig.robot.model.leader import GestureState, LeadState
@@ -23,10 +24,10 @@ from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 LIVE_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
 """Time between two batches of a run in real time."""
 SIMULATED_S = 0.2
-"""The same in simulated time, where no user looks on."""
+"""Time between two batches in simulated time, without viewers."""
 
 Before = Sequence[tuple[str, Any]]
-"""What entered the run beside a tick's own fields: kind and plain values of each."""
+"""Further inputs of a run besides a tick's own fields: kind and plain values of each."""
 
 
 _FaceRow = tuple[
@@ -49,12 +50,14 @@ _FaceRow = tuple[
 
 
 class TickRow(NamedTuple):
-    """A tick as the receiver reads it: fields as in ``Tick``.
+    """A tick as the receiver reads it; fields as in ``Tick``.
 
-    dt_s: time since the tick before; percept: its number, None without one
-    as_desired: ``guard_result.desired_rad`` equals ``desired_rad``
-    commands: as ``command_json.as_recorded`` writes them
-    before: what else entered the run, for a recording
+    Attributes:
+        dt_s: Time since the previous tick.
+        percept: Number of the percept, None without one.
+        as_desired: Whether ``guard_result.desired_rad`` equals ``desired_rad``.
+        commands: JSON from ``command_json.as_recorded``.
+        before: Further inputs of the run, for a recording.
     """
 
     t_s: float
@@ -88,11 +91,13 @@ class _PerceptRow(NamedTuple):
 
 
 class TickBatch(NamedTuple):
-    """Ticks in the order of time.
+    """A batch of ticks in the order of time.
 
-    data: [percepts, rows]; the percepts that come into force with these ticks, each as
-        [number, captured_s, bodies, faces], and the fields of ``TickRow`` of each tick
-    ticks: how many; newest: the last of them
+    Attributes:
+        data: [percepts, rows]: the new percepts of these ticks, each as
+            [number, captured_s, bodies, faces], and the fields of ``TickRow`` of each tick.
+        ticks: Number of ticks.
+        newest: The last tick.
     """
 
     data: bytes
@@ -106,11 +111,11 @@ class _Sink(NamedTuple):
 
 
 class TickStream:
-    """Collects ticks and hands them to its sinks in batches; belongs to the loop's thread.
+    """A stream of ticks to sinks in batches; used only in the loop's thread.
 
     Args:
-        say: gets one line about each sink that fails and is left out.
-        every_s: time between two batches.
+        say: Receives one line about each sink that fails and is removed.
+        every_s: Time between two batches.
     """
 
     def __init__(self, say: Callable[[str], None], every_s: float = LIVE_S) -> None:
@@ -123,7 +128,7 @@ class TickStream:
         self._again = False
 
     def add(self, name: str, take: Callable[[TickBatch], bool]) -> None:
-        """Hand every batch to one more; it returns False where the batch is lost to it."""
+        """Add a sink, which returns False if it loses a batch."""
         self._sinks = (*self._sinks, _Sink(name, take))
 
     def update(self, tick: Tick) -> None:
@@ -131,39 +136,39 @@ class TickStream:
         self.append(tick, 0.0, ())
 
     def append(self, tick: Tick, dt_s: float, before: Before) -> None:
-        """Add a tick with what a recording holds beside it; now and then, hand over a batch."""
+        """Add a tick with its further inputs, and send a batch when it is due."""
         self._ticks.append((tick, dt_s, before))
         if not 0.0 <= self._due_s - tick.t_s <= self._every_s:
             self.flush()
             self._due_s = tick.t_s + self._every_s
 
     def flush(self) -> None:
-        """Hand over what was added since the last batch."""
+        """Send the ticks since the last batch."""
         ticks = self._ticks
         if not ticks or not self._sinks:
             ticks.clear()
             return
-        batch = TickBatch(self._encoded(), len(ticks), ticks[-1][0])
+        batch = TickBatch(self._encode_batch(), len(ticks), ticks[-1][0])
         ticks.clear()
         for sink in self._sinks:
             try:
                 self._again |= not sink.take(batch)
             except Exception as error:
                 self._sinks = tuple([one for one in self._sinks if one is not sink])
-                self._say(left_out(sink.name, error))
+                self._say(failure_text(sink.name, error))
 
-    def _encoded(self) -> bytes:
+    def _encode_batch(self) -> bytes:
         percepts, rows = [], []
-        if self._again:  # whoever lost a batch may have lost the percept in force
+        if self._again:  # a sink that lost a batch may have lost the present percept
             self._again = False
             if self._percept is not None:
-                percepts.append(_percept(self._number, self._percept))
+                percepts.append(_percept_row(self._number, self._percept))
         for tick, dt_s, before in self._ticks:
             percept, guard = tick.percept, tick.guard_result
             if percept is not None and percept is not self._percept:
                 self._percept = percept
                 self._number += 1
-                percepts.append(_percept(self._number, percept))
+                percepts.append(_percept_row(self._number, percept))
             rows.append((
                 tick.t_s, dt_s, None if percept is None else self._number, tick.joints, tick.pose,
                 tick.target, tick.gaze, tick.desired_rad, guard,
@@ -178,40 +183,40 @@ def encode(value: object) -> bytes:
     """Return plain values, named tuples and arrays as MessagePack.
 
     Raises:
-        TypeError: a value is none of these.
+        TypeError: A value has another type.
     """
     try:
         return _encoder.encode(value)
-    except UnicodeEncodeError:  # a name of a file or a device that is no text
-        return _encoder.encode(_writable(value))
+    except UnicodeEncodeError:  # a file or device name that is not text
+        return _encoder.encode(_to_utf8(value))
 
 
 def decode_rows(data: bytes) -> tuple[dict[int, Percept], list[TickRow]]:
     """Return the percepts of ``TickBatch.data`` by number, and its ticks.
 
     Raises:
-        msgspec.MsgspecError: it is none.
+        msgspec.MsgspecError: The data is not a batch.
     """
     percepts, rows = _rows.decode(data)
-    return {row.number: _percept_of(row) for row in percepts}, rows
+    return {row.number: _read_percept(row) for row in percepts}, rows
 
 
 def decode_plain(data: bytes) -> Any:
-    """Return the same as plain lists, every number of the type it had.
+    """Return the values of MessagePack as plain lists, with the types of numbers unchanged.
 
     Raises:
-        msgspec.MsgspecError: it is no MessagePack.
+        msgspec.MsgspecError: The data is not MessagePack.
     """
     return _plain.decode(data)
 
 
 def all_finite(data: bytes) -> bool:
-    """Return whether all numbers in MessagePack are finite; False: there may be one that is not."""
+    """Return True if all numbers in MessagePack are finite, False if one may not be."""
     return _NOT_FINITE.search(data) is None
 
 
-def _percept_of(row: _PerceptRow) -> Percept:
-    """Return a percept from what ``_percept`` wrote."""
+def _read_percept(row: _PerceptRow) -> Percept:
+    """Return a percept from what ``_percept_row`` wrote."""
     ids, kinds, p_m, v_m_s, w_rad_s, radius_m, cov = row.bodies
     p, v, w = (np.array(rows, float).reshape(-1, 3) for rows in (p_m, v_m_s, w_rad_s))
     pv_cov = None if cov is None else np.array(cov, float).reshape(-1, 6, 6)
@@ -219,34 +224,34 @@ def _percept_of(row: _PerceptRow) -> Percept:
     return Percept(row.captured_s, bodies, tuple([Face(*face) for face in row.faces]), row.scene)
 
 
-def _percept(number: int, percept: Percept) -> tuple[Any, ...]:
+def _percept_row(number: int, percept: Percept) -> tuple[Any, ...]:
     faces = [_face_values(face) for face in percept.faces]
     return (number, percept.captured_s, _body_values(percept.bodies), faces, percept.scene)
 
 
-def _array(value: Any) -> Any:
-    """Return an array or a number of NumPy's as Python's own."""
+def _to_plain(value: Any) -> Any:
+    """Return a NumPy array or number as a list or a Python number."""
     if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is no part of a tick")
 
 
-def _writable(value: Any) -> Any:
-    """Return values with texts that can be written as UTF-8."""
+def _to_utf8(value: Any) -> Any:
+    """Replace texts that cannot be written as UTF-8."""
     if isinstance(value, str):
         return value.encode(errors="replace").decode()
     if isinstance(value, tuple | list):
-        return [_writable(item) for item in value]
+        return [_to_utf8(item) for item in value]
     if isinstance(value, dict):
-        return {_writable(key): _writable(item) for key, item in value.items()}
+        return {_to_utf8(key): _to_utf8(item) for key, item in value.items()}
     return value
 
 
 _NOT_FINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
-"""A double whose exponent has all bits set: nan, inf or, by chance, other bytes like it."""
-# A frozen dataclass would be written with the names of its fields.
+"""A double whose exponent has all bits set: nan, inf or, by chance, other equal bytes."""
+# msgspec would encode a frozen dataclass with the names of its fields.
 _body_values = attrgetter(*Bodies.__slots__)
 _face_values = attrgetter(*Face.__slots__)
-_encoder = msgspec.msgpack.Encoder(enc_hook=_array)
+_encoder = msgspec.msgpack.Encoder(enc_hook=_to_plain)
 _plain = msgspec.msgpack.Decoder()
 _rows = msgspec.msgpack.Decoder(tuple[list[_PerceptRow], list[TickRow]])

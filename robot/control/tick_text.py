@@ -1,4 +1,4 @@
-"""One tick in words: what is looked at, who leads, what the guard did, what is seen."""
+"""Texts about one tick: target, control, guard, percept."""
 
 from math import degrees
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 
 def perception_text(tick: Tick, residual: ResidualFigures) -> str:
-    """Return age of the frame, distance of faces, how the camera sees, and the ego-motion residual.
+    """Return age of the frame, camera conditions, distances of faces and the ego-motion residual.
 
     e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
     0.3 deg/s while the head turns"
@@ -40,23 +40,25 @@ def perception_text(tick: Tick, residual: ResidualFigures) -> str:
 
 
 def camera_conditions(tick: Tick) -> tuple[str, ...]:
-    """Return why the camera sees badly, each with its remedy."""
+    """Return the conditions that impair the camera, each with its remedy."""
     return tick.detections.conditions if tick.detections is not None else ()
 
 
 def target_name(target: Target) -> str:
-    """Return a target's name for people, e.g. "face 3: left eye"."""
+    """Return a target's name for users, e.g. "face 3: left eye"."""
     kind = "motion" if target.kind == "thing" else target.kind
     name = kind if target.id < 0 else f"{kind} {target.id}"
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 
 
 class Doing(NamedTuple):
-    """What the head does, and why, in words.
+    """The head's present activity in words.
 
-    headline: in one sentence
-    target: what is looked at, or in its place who leads; reason: why
-    phase: of the eyes; "held" where joints are held, "stopped", "parking"
+    Attributes:
+        headline: One sentence.
+        target: Gaze target, or the source of control.
+        reason: Reason for it.
+        phase: Phase of the eyes; "held" while joints are held, "stopped", "parking".
     """
 
     headline: str
@@ -66,12 +68,12 @@ class Doing(NamedTuple):
 
 
 def leader(tick: Tick) -> Leader:
-    """Return who leads the head."""
+    """Return the source of control of the head."""
     return leader_of(tick.stopped, tick.parking, tick.lead, tick.gesture)
 
 
 def doing(tick: Tick) -> Doing:
-    """Return what the head does; while somebody leads, that and nothing else."""
+    """Return the head's activity; while a client is in control, only that."""
     leads = leader(tick)
     phase: str = "blink" if tick.gaze.blink else tick.gaze.phase
     said = sentence(leads, tick.t_s)
@@ -81,15 +83,15 @@ def doing(tick: Tick) -> Doing:
         return Doing(limp, target_name(tick.target), limp, phase)
     if leads.led:
         phase = {"joint": "held", "stopped": "stopped", "parking": "parking"}.get(leads.kind, phase)
-        beside = _beside(tick) if leads.kind in ("person", "pointer") else ""
-        return Doing(said + beside, title(leads), said + beside, phase)
-    looks = _looks(tick.target)
+        distance = _distance_text(tick) if leads.kind in ("person", "pointer") else ""
+        return Doing(said + distance, title(leads), said + distance, phase)
+    looks = _gaze_text(tick.target)
     headline = f"{said}, and {looks}" if leads.kind == "gesture" else looks
     return Doing(headline, target_name(tick.target), tick.target.why, phase)
 
 
-def _looks(target: Target) -> str:
-    """Return what the gaze does, as a sentence about the head."""
+def _gaze_text(target: Target) -> str:
+    """Return the gaze's activity as the predicate of a sentence about the head."""
     match target.kind:
         case "rest":
             return "looks ahead: nobody is there"
@@ -109,17 +111,17 @@ def _looks(target: Target) -> str:
 
 
 def lead_text(tick: Tick) -> str:
-    """Return who leads and how far the gaze is from the point, "" if no client leads.
+    """Return the client's command and the gaze's distance from its point, "" without one.
 
     e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
     """
     if not tick.led:
         return ""
-    return tick.led if tick.lead.by == "joint" else tick.led + _beside(tick)
+    return tick.led if tick.lead.by == "joint" else tick.led + _distance_text(tick)
 
 
-def _beside(tick: Tick) -> str:
-    """Return how far the gaze stays from the point that was chosen, "" where it reaches it."""
+def _distance_text(tick: Tick) -> str:
+    """Return the gaze's distance from the chosen point, "" if it reaches the point."""
     limited = tick.gaze.limited
     if tick.target.kind != ORDERED or not limited:
         return ""
@@ -131,7 +133,7 @@ def _beside(tick: Tick) -> str:
     return f"; {error:.0f} deg beside it: {', '.join(ends)}"
 
 
-_IN_WORDS = {
+_FAULT_TEXTS = {
     "timeout": "no answer",
     "damaged": "answer damaged",
     "corrupt": "answer damaged on the way",
@@ -143,11 +145,11 @@ _IN_WORDS = {
     "restarted": "servo restarted",
     "alert": "servo reported a fault",
 }
-"""What people are told of kinds of faults on a bus; others speak for themselves."""
+"""Texts for kinds of bus faults; other kinds are clear by name."""
 
 
 def guard_text(guard_result: GuardResult) -> str:
-    """Return what the guard did to the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
+    """Return the guard's effect on the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not guard_result.reasons:
         return guard_result.level.replace("_", " ")
     more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""
@@ -155,9 +157,9 @@ def guard_text(guard_result: GuardResult) -> str:
 
 
 def health_text(health: BusHealth) -> str:
-    """Return the state of the bus, e.g. "bus: no answer 3 times"; a late computer is no fault."""
+    """Return the state of the bus, e.g. "bus: no answer 3 times"; lateness is not counted."""
     errors = [
-        f"{_IN_WORDS.get(kind, kind)} {n} time{'s' if n > 1 else ''}"
+        f"{_FAULT_TEXTS.get(kind, kind)} {n} time{'s' if n > 1 else ''}"
         for kind, n in sorted(health.errors.items())
         if n and kind != LATE_COMPUTER
     ]

@@ -439,7 +439,7 @@ CLAIMS = (
     Mutant("robot/control/power_down.py", "interrupts.tolerated = asked + 1", "interrupts.tolerated = asked + 100",
            "parking that hangs is never broken off",
            ("ways_out::test_parking_that_hangs_is_broken_off_by_one_more",), ("B6",)),
-    Mutant("robot/control/joint_faults.py", "                running.said = True\n", "",
+    Mutant("robot/control/joint_faults.py", "                running.reported = True\n", "",
            "a joint that is jammed is not counted",
            ("ways_out::test_a_joint_that_does_not_move_is_said_counted_and_in_the_exit_code",), ("B7",)),
     Mutant("robot/cli/entry_point.py", 'os.write(2, b"interrupted\\n")', "pass",

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 
 from gazerig.robot.control.command_handler import ParamAccess, plain
-from gazerig.robot.control.observers import left_out
+from gazerig.robot.control.observers import failure_text
 from gazerig.robot.dashboard.feed.page_process import PARAMS, VALUES
 from gazerig.robot.model.commands import Value
 
@@ -124,4 +124,4 @@ class ParamThread:
             except Exception as error:
                 if not self._failed:
                     self._failed = True
-                    self._tell(left_out("the page's parameters", error))
+                    self._tell(failure_text("the page's parameters", error))

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.command_handler import (
-    Answered,
-    CommandGiven,
     CommandHandler,
     ParamAccess,
     ParamsChanged,
     ParamsSaved,
     PathGuard,
+    PendingCommand,
+    QuestionAnswer,
     RequestResult,
 )
 from gazerig.robot.control.gesture_choices import GestureInfo
@@ -95,7 +95,7 @@ class PageRequestHandler:
     def _told(self, verb: str, outcome: RequestResult, data: Mapping[str, object]) -> str | None:
         """Return an outcome in words, None where nothing needs to be said."""
         match outcome:
-            case CommandGiven():
+            case PendingCommand():
                 return self._replied(outcome)
             case ParamsSaved(saved):
                 backup = saved.backup
@@ -109,12 +109,12 @@ class PageRequestHandler:
                     "character": f"the character is {data.get('name')}",
                 }
                 return "\n".join(notes) or quiet.get(verb)
-            case Answered(list(found)) if verb == "differs":
+            case QuestionAnswer(list(found)) if verb == "differs":
                 lines = [f"{c['key']}: {c['new']} (default {c['old']})" for c in found]
                 return "\n".join(lines) or "all is as by default"
         return None  # the page has its own ways to know
 
-    def _replied(self, given: CommandGiven) -> str | None:
+    def _replied(self, given: PendingCommand) -> str | None:
         """Return what a command cannot do, None if it does all or no client waits."""
         if given.ticket is None or not isinstance(given.command, Leading | Resume):
             return None
