@@ -112,7 +112,7 @@ class StudyAnalysis:
         return self.questionnaires[row.questionnaire].items[row.item].kind == "text"
 
 
-def analysed(
+def analyse_study(
     name: str,
     design: StudyDesign,
     questionnaires: Mapping[str, Questionnaire],
@@ -134,11 +134,11 @@ def analysed(
     known = [one for one in measures(design, questionnaires).values() if not one.once]
     keys = tuple(design.conditions)
     summaries = [
-        _summary(one, people, keys, questionnaires)
+        _summarise_measure(one, people, keys, questionnaires)
         for one in known
         if one.kind != "choice" and not (design.task == "pairwise" and one.kind != "objective")
     ]
-    choices = [_choices(one, people, keys) for one in known if one.kind == "choice"]
+    choices = [_summarise_choices(one, people, keys) for one in known if one.kind == "choice"]
     return StudyAnalysis(
         name, design, questionnaires, design_sha256, tuple(people),
         decisions(design, questionnaires, people), tuple(summaries), tuple(choices), deleted,
@@ -155,7 +155,7 @@ def without_simulated(people: Sequence[Participation]) -> tuple[Participation, .
     )
 
 
-def _summary(
+def _summarise_measure(
     measure: Measure,
     people: Sequence[Participation],
     conditions: tuple[str, ...],
@@ -168,11 +168,11 @@ def _summary(
     alpha = None
     if measure.kind == "scale":
         alpha = cronbachs_alpha(item_answers(measure, people, questionnaires))
-    return MeasureSummary(measure, found, _conditions(found), counts, alpha)
+    return MeasureSummary(measure, found, _summarise_conditions(found), counts, alpha)
 
 
-def _conditions(found: Scores) -> tuple[ConditionSummary, ...]:
-    halves = within_halves(found.means)
+def _summarise_conditions(found: Scores) -> tuple[ConditionSummary, ...]:
+    halves = within_participant_half_widths(found.means)
     out = []
     for k, condition in enumerate(found.conditions):
         column = found.means[:, k]
@@ -187,7 +187,7 @@ def _conditions(found: Scores) -> tuple[ConditionSummary, ...]:
     return tuple(out)
 
 
-def within_halves(means: Floats) -> Floats:
+def within_participant_half_widths(means: Floats) -> Floats:
     """Return half the 95 % intervals of means within participants, (conditions,).
 
     Each participant's own level is subtracted (Cousineau 2005); the factor k / (k - 1) of Morey
@@ -205,7 +205,7 @@ def within_halves(means: Floats) -> Floats:
     return np.asarray(float(stats.t.ppf(0.975, n - 1)) * spread / sqrt(n), np.float64)
 
 
-def _choices(
+def _summarise_choices(
     measure: Measure, people: Sequence[Participation], conditions: tuple[str, ...]
 ) -> ChoiceSummary:
     table = wins(measure, people, conditions)

@@ -12,7 +12,7 @@ class WrongAnswer(ValueError):
     """A browser sent an answer that does not fit the present page."""
 
 
-def checked(number: int, item: Item, value: object, may_skip: bool) -> AnswerValue:
+def check_answer(number: int, item: Item, value: object, may_skip: bool) -> AnswerValue:
     """Return an answer in its stored form.
 
     Args:

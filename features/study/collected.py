@@ -13,7 +13,7 @@ from gazerig.drivers.files.file_input import read_limited
 from gazerig.features.study import journal
 from gazerig.features.study.data_folder import StudyData
 from gazerig.features.study.design import Condition, StudyDesign
-from gazerig.features.study.participation import Participation, participation, require_fit
+from gazerig.features.study.participation import Participation, check_records, participation
 from gazerig.features.study.questionnaire import Questionnaire
 from gazerig.features.study.records import Opened, Record
 
@@ -43,7 +43,7 @@ class CollectedStudy:
     deleted: tuple[str, ...]
 
 
-def collected(folder: Path) -> CollectedStudy:
+def collect_study(folder: Path) -> CollectedStudy:
     """Return all data of a study.
 
     Raises:
@@ -54,14 +54,14 @@ def collected(folder: Path) -> CollectedStudy:
     sha256 = data.sha256()
     path = folder / "design.json"
     text = json.loads(read_limited(path, _MOST_BYTES))
-    design, questionnaires = stated(text["design"], path)
+    design, questionnaires = design_from_text(text["design"], path)
     people, folders = [], []
     for number in data.numbers():
         each = data.participant(number)
         records = journal.read(each)
         _require_design(records, sha256, each, path)
         if records:  # else it has no data
-            require_fit(records, design, questionnaires, each)
+            check_records(records, design, questionnaires, each)
             people.append(participation(records, design, questionnaires))
             folders.append(each)
     if not people:
@@ -75,7 +75,9 @@ def collected(folder: Path) -> CollectedStudy:
     )  # fmt: skip
 
 
-def stated(text: Mapping[str, Any], path: Path) -> tuple[StudyDesign, dict[str, Questionnaire]]:
+def design_from_text(
+    text: Mapping[str, Any], path: Path
+) -> tuple[StudyDesign, dict[str, Questionnaire]]:
     """Return design and questionnaires from a study's canonical text.
 
     Entries that the text replaces by values, such as the names of rigs and films, keep their

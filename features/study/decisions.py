@@ -71,7 +71,7 @@ def decisions(
     """
     known = measures(design, questionnaires)
     found = [
-        _tested(design, one, known[one.measure], questionnaires, people)
+        _decide_rating(design, one, known[one.measure], questionnaires, people)
         for one in design.hypotheses
     ]
     chances = {
@@ -93,7 +93,7 @@ def _verdict(one: Decision, alpha: float) -> Verdict:
     return "supported" if one.test.effect.value > 0.0 else "against"
 
 
-def _tested(
+def _decide_rating(
     design: StudyDesign,
     one: Hypothesis,
     measure: Measure,
@@ -102,7 +102,7 @@ def _tested(
 ) -> Decision:
     conditions = tuple(design.conditions)
     if measure.kind == "choice":
-        return _chosen(design, one, measure, people)
+        return _decide_choice(design, one, measure, people)
     found = scores(measure, people, conditions, questionnaires)
     sides = _Sides(found, design.side(one.better), design.side(one.than))
     better, than = sides.means
@@ -116,7 +116,7 @@ def _tested(
         one, measure, tests[0], tuple(tests[1:]), nan, "not supported", n,
         (float(np.median(better)), float(np.median(than))), (float(better.mean()),
         float(than.mean())), cohens_dz(better - than), _checks(measure, sides),
-        _too_few(tests[0], design.plan.alpha),
+        _too_few_reason(tests[0], design.plan.alpha),
     )  # fmt: skip
 
 
@@ -172,7 +172,7 @@ def _checks(measure: Measure, sides: _Sides) -> tuple[AssumptionCheck, ...]:
     return tuple(checks)
 
 
-def _chosen(
+def _decide_choice(
     design: StudyDesign, one: Hypothesis, measure: Measure, people: Sequence[Participation]
 ) -> Decision:
     """Decide on a hypothesis about choices between two conditions."""
@@ -191,11 +191,11 @@ def _chosen(
     share = float(table[better, than]) / direct
     return Decision(
         one, measure, test, (), nan, "not supported", len(leans), (nan, nan), (share, 1.0 - share),
-        None, (), _too_few(test, design.plan.alpha),
+        None, (), _too_few_reason(test, design.plan.alpha),
     )  # fmt: skip
 
 
-def _too_few(test: StatisticalTest, alpha: float) -> str:
+def _too_few_reason(test: StatisticalTest, alpha: float) -> str:
     """Return why no result could have reached alpha, "" if one could."""
     if test.least_p <= alpha:
         return ""

@@ -149,7 +149,7 @@ class StudyDesign:
         factor, _, level = name.partition("=")
         return tuple([key for key, one in self.conditions.items() if one.factors.get(factor) == level])
 
-    def matched(self, one: Hypothesis) -> tuple[tuple[str, str], ...]:
+    def condition_pairs(self, one: Hypothesis) -> tuple[tuple[str, str], ...]:
         """Return the pairs (better, than) of conditions that a hypothesis compares.
 
         Pairs of two levels of a factor agree in all other factors.
@@ -158,11 +158,11 @@ class StudyDesign:
         if one.better in self.conditions:
             return tuple([(one.better, other) for other in than])
         factor = one.better.partition("=")[0]
-        cells = {self._beside(factor, key): key for key in than}
-        beside = [(key, cells.get(self._beside(factor, key))) for key in better]
+        cells = {self._other_levels(factor, key): key for key in than}
+        beside = [(key, cells.get(self._other_levels(factor, key))) for key in better]
         return tuple([(key, other) for key, other in beside if other is not None])
 
-    def _beside(self, factor: str, key: str) -> tuple[tuple[str, str], ...]:
+    def _other_levels(self, factor: str, key: str) -> tuple[tuple[str, str], ...]:
         """Return a condition's levels of all factors but one."""
         levels = self.conditions[key].factors.items()
         return tuple(sorted([pair for pair in levels if pair[0] != factor]))

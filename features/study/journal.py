@@ -37,7 +37,7 @@ _KINDS: Mapping[str, type[Record]] = {
 }
 
 
-class NotKept(SetupError):
+class WriteFailed(SetupError):
     """Records could not be written; the journal has not changed."""
 
 
@@ -58,13 +58,13 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         make_folder(folder)
         self._folder = folder
-        self._lock = _locked(folder)
+        self._lock = _acquire_lock(folder)
         try:
             path = folder / FILE
             data = path.read_bytes() if path.exists() else b""
             whole = data.rfind(b"\n") + 1
-            self.records = decoded(data[:whole], path)
-            self.torn = self._set_aside(data[whole:]) if whole < len(data) else None
+            self.records = decode_records(data[:whole], path)
+            self.torn = self._move_aside(data[whole:]) if whole < len(data) else None
             self._fd = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
             os.ftruncate(self._fd, whole)
             self._size = os.lseek(self._fd, whole, os.SEEK_SET)
@@ -94,11 +94,11 @@ class Journal:
         """Add the records of one step; on return they are on disk.
 
         Raises:
-            NotKept: nothing was written; the call may be repeated.
+            WriteFailed: nothing was written; the call may be repeated.
         """
         if not records:
             return
-        line = encoded(records)
+        line = encode_records(records)
         try:
             written = 0
             while written < len(line):
@@ -108,7 +108,7 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._fd, self._size)
                 os.lseek(self._fd, self._size, os.SEEK_SET)
-            raise NotKept(f"{self._folder / FILE}: not kept: {error.strerror}") from error
+            raise WriteFailed(f"{self._folder / FILE}: not kept: {error.strerror}") from error
         self._size += len(line)
         self.records = (*self.records, *records)
 
@@ -117,7 +117,7 @@ class Journal:
         os.close(self._fd)
         os.close(self._lock)
 
-    def _set_aside(self, torn: bytes) -> Path:
+    def _move_aside(self, torn: bytes) -> Path:
         """Move an incomplete last line to its own file; return its path."""
         number = 1
         while (path := self._folder / f"journal-torn-{number}.txt").exists():
@@ -137,16 +137,16 @@ def read(folder: Path) -> tuple[Record, ...]:
         data = path.read_bytes()
     except OSError as error:
         raise SetupError(f"{path}: {error.strerror}") from error
-    return decoded(data[: data.rfind(b"\n") + 1], path)
+    return decode_records(data[: data.rfind(b"\n") + 1], path)
 
 
-def encoded(records: Sequence[Record]) -> bytes:
+def encode_records(records: Sequence[Record]) -> bytes:
     """Return records as one line; a value that is not a number is null."""
     said = [{"kind": type(one).__name__, **asdict(one)} for one in records]
     return msgspec.json.encode(said) + b"\n"
 
 
-def decoded(data: bytes, path: Path) -> tuple[Record, ...]:
+def decode_records(data: bytes, path: Path) -> tuple[Record, ...]:
     """Return the records of complete lines.
 
     Raises:
@@ -156,7 +156,8 @@ def decoded(data: bytes, path: Path) -> tuple[Record, ...]:
     for number, line in enumerate(data.splitlines(), start=1):
         try:
             records += [
-                _record(said) for said in msgspec.json.decode(line, type=list[dict[str, Any]])
+                _decode_record(said)
+                for said in msgspec.json.decode(line, type=list[dict[str, Any]])
             ]
         except (msgspec.MsgspecError, LookupError, TypeError, AttributeError, ValueError,
                 RecursionError) as error:  # fmt: skip
@@ -174,14 +175,14 @@ def session_lock(folder: Path) -> Iterator[None]:
     Raises:
         SetupError: a session holds it.
     """
-    lock = _locked(folder)
+    lock = _acquire_lock(folder)
     try:
         yield
     finally:
         os.close(lock)
 
 
-def _record(said: dict[str, Any]) -> Record:
+def _decode_record(said: dict[str, Any]) -> Record:
     kind = _KINDS[said.pop("kind")]
     numbers = {field.name for field in fields(kind) if field.type is float}
     for name in numbers & said.keys():
@@ -191,7 +192,7 @@ def _record(said: dict[str, Any]) -> Record:
     return msgspec.convert(said, kind)
 
 
-def _locked(folder: Path) -> int:
+def _acquire_lock(folder: Path) -> int:
     """Return the open lock of a folder; it is held until it is closed or the process ends.
 
     Raises:

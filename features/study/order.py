@@ -34,7 +34,7 @@ def williams(n: int) -> tuple[tuple[int, ...], ...]:
     return (*square, *mirrored)
 
 
-def rows(design: StudyDesign) -> int:
+def balanced_group_size(design: StudyDesign) -> int:
     """Return the number of participants that use every order once; 1 for random orders.
 
     Multiples of this number of participants are fully balanced.
@@ -42,7 +42,7 @@ def rows(design: StudyDesign) -> int:
     return len(_table(design)) if design.trials.order == "williams" else 1
 
 
-def shown(design: StudyDesign) -> tuple[str, ...]:
+def block_trials(design: StudyDesign) -> tuple[str, ...]:
     """Return the trials of one block: the conditions, or their pairs as "a|b"."""
     keys = tuple(design.conditions)
     if design.task == "rating":
@@ -77,9 +77,9 @@ def orders(design: StudyDesign, participant: int) -> tuple[str, ...]:
 def practice(design: StudyDesign, participant: int) -> tuple[str, ...]:
     """Return the practice trials of a participant, drawn at random; they do not count."""
     rng = np.random.default_rng((design.trials.seed, participant, _PRACTICE))
-    drawn = rng.permutation(len(shown(design)))
+    drawn = rng.permutation(len(block_trials(design)))
     return tuple(
-        _either_way(shown(design)[drawn[i % len(drawn)]], bool(rng.integers(2)))
+        _orient_pair(block_trials(design)[drawn[i % len(drawn)]], bool(rng.integers(2)))
         for i in range(design.trials.practice)
     )
 
@@ -87,13 +87,13 @@ def practice(design: StudyDesign, participant: int) -> tuple[str, ...]:
 def _random(design: StudyDesign, participant: int, repetitions: int) -> tuple[str, ...]:
     """Return blocks in random order; consecutive trials differ if there are two."""
     rng = np.random.default_rng((design.trials.seed, participant, _ORDERS))
-    there, out = shown(design), list[str]()
+    there, out = block_trials(design), list[str]()
     for _ in range(repetitions):
         block = [there[i] for i in rng.permutation(len(there))]
-        if out and len(block) > 1 and _same(block[0], out[-1]):
+        if out and len(block) > 1 and _show_same(block[0], out[-1]):
             at = int(rng.integers(1, len(block)))
             block[0], block[at] = block[at], block[0]
-        out += [_either_way(one, bool(rng.integers(2))) for one in block]
+        out += [_orient_pair(one, bool(rng.integers(2))) for one in block]
     return tuple(out)
 
 
@@ -103,7 +103,7 @@ def _table(design: StudyDesign) -> tuple[tuple[str, ...], ...]:
     The seed assigns conditions to the squares. Pairs are ordered as conditions are; over the table
     each is seen in both orders equally often, at every position.
     """
-    there = shown(design)
+    there = block_trials(design)
     letters = np.random.default_rng((design.trials.seed, 0, _ORDERS)).permutation(len(there))
     squares = [tuple(int(letters[one]) for one in row) for row in williams(len(there))]
     if design.task == "rating":
@@ -111,7 +111,7 @@ def _table(design: StudyDesign) -> tuple[tuple[str, ...], ...]:
     if len(squares) == len(there):  # of an even number, or one pair: the square again, reversed
         squares = 2 * squares
     return tuple(
-        tuple(_either_way(there[one], bool((number // len(there) + one) % 2)) for one in row)
+        tuple(_orient_pair(there[one], bool((number // len(there) + one) % 2)) for one in row)
         for number, row in enumerate(squares)
     )
 
@@ -123,16 +123,16 @@ def _step(table: tuple[tuple[str, ...], ...]) -> int:
     if len(table[0]) == 1:  # one pair: the other order
         return 1
     for step in range(1, n):
-        if all(not _same(table[i][-1], table[(i + step) % n][0]) for i in range(n)):
+        if all(not _show_same(table[i][-1], table[(i + step) % n][0]) for i in range(n)):
             return step
     return 0
 
 
-def _same(one: str, other: str) -> bool:
+def _show_same(one: str, other: str) -> bool:
     """Return whether two trials show the same, in either order."""
     return set(one.split(PAIR)) == set(other.split(PAIR))
 
 
-def _either_way(trial: str, turned: bool) -> str:
+def _orient_pair(trial: str, turned: bool) -> str:
     """Return a pair in the other order if ``turned``; a condition is returned unchanged."""
     return PAIR.join(reversed(trial.split(PAIR))) if turned else trial

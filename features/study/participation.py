@@ -6,7 +6,7 @@ from math import inf, isnan, nan
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.answers import WrongAnswer, checked
+from gazerig.features.study.answers import WrongAnswer, check_answer
 from gazerig.features.study.design import Exclusion, StudyDesign
 from gazerig.features.study.journal import FILE
 from gazerig.features.study.order import PAIR
@@ -116,19 +116,19 @@ def participation(
         raise ValueError("a journal begins with what opened it")
     opened = records[0]
     trials = _trials(records)
-    rows = [_judged(row, trials) for row in _rows(opened.participant, records)]
-    rows = _without_hasty(rows, design.exclusion)
+    rows = [_mark_exclusion(row, trials) for row in _rows(opened.participant, records)]
+    rows = _exclude_hasty_pages(rows, design.exclusion)
     closed = [r for r in records if isinstance(r, Closed)]
     how = closed[-1].how if closed else "unfinished"
     whole = Participation(
         opened.participant, opened.design_sha256, opened.order, opened.program, opened.utc,
         opened.simulated, how, tuple(rows), trials,
     )  # fmt: skip
-    why = _whole_reason(whole, records, design, questionnaires)
+    why = _exclusion_reason(whole, records, design, questionnaires)
     return replace(whole, left_out=why)
 
 
-def require_fit(
+def check_records(
     records: Sequence[Record],
     design: StudyDesign,
     questionnaires: Mapping[str, Questionnaire],
@@ -174,7 +174,7 @@ def _misfit(
             return f"{one.questionnaire}.{one.item} is not asked"
         item = asked.items[one.item]
         try:
-            checked(0, item, one.value, may_skip=True)
+            check_answer(0, item, one.value, may_skip=True)
         except WrongAnswer as error:
             return str(error)
         shown = one.condition.split(PAIR) if one.trial is not None else []
@@ -216,7 +216,7 @@ def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
     return tuple(found.values())
 
 
-def _judged(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
+def _mark_exclusion(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
     """Exclude practice, incomplete presentations, and missing answers."""
     if row.trial is not None and row.trial < 0:
         return replace(row, left_out="practice")
@@ -226,7 +226,7 @@ def _judged(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
     return replace(row, left_out="not answered") if row.value is None else row
 
 
-def _without_hasty(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRow]:
+def _exclude_hasty_pages(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRow]:
     """Exclude pages that were answered faster than a person can read."""
     rows = list(rows)
     slowest: dict[tuple[int | None, str], float] = {}
@@ -242,7 +242,7 @@ def _without_hasty(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRo
     ]
 
 
-def _whole_reason(
+def _exclusion_reason(
     one: Participation,
     records: Iterable[Record],
     design: StudyDesign,
@@ -258,12 +258,12 @@ def _whole_reason(
         return f"{words}: {last}" if last else words
     if one.how == "unfinished" and design.exclusion.incomplete == "exclude":
         return "did not finish"
-    if design.exclusion.same_answers and _all_the_same(one, questionnaires):
+    if design.exclusion.same_answers and _has_equal_answers(one, questionnaires):
         return "gave one answer to every item of all trials"
     return ""
 
 
-def _all_the_same(one: Participation, questionnaires: Mapping[str, Questionnaire]) -> bool:
+def _has_equal_answers(one: Participation, questionnaires: Mapping[str, Questionnaire]) -> bool:
     ratings = [
         row.value
         for row in one.answers

@@ -18,12 +18,12 @@ from scipy import stats
 
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
 from gazerig.features.study.measures import Measure
-from gazerig.features.study.order import rows
+from gazerig.features.study.order import balanced_group_size
 from gazerig.features.study.simulation import (
     BETWEEN_SD,
     ITEM_SD,
     TRIAL_SD,
-    preference,
+    choice_probability,
     shift_of,
     thresholds,
 )  # fmt: skip
@@ -76,7 +76,7 @@ class PowerClaim(NamedTuple):
     needed: int | None
 
 
-def claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -> PowerClaim:
+def power_claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -> PowerClaim:
     """Return the power of a hypothesis' own test, and the participants that it needs.
 
     With a correction for several hypotheses each gets its share of alpha; Holm's procedure only
@@ -90,8 +90,8 @@ def claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -> Powe
     asked = _question(design, hypothesis, measure)
     n, wanted = design.plan.participants, design.plan.power
     return PowerClaim(
-        asked, n, power_of(asked, n), by_formula(asked, wanted),
-        sample_size(asked, wanted, rows(design)),
+        asked, n, power_of(asked, n), sample_size_by_formula(asked, wanted),
+        sample_size(asked, wanted, balanced_group_size(design)),
     )  # fmt: skip
 
 
@@ -106,7 +106,7 @@ def _question(design: StudyDesign, one: Hypothesis, measure: Measure) -> PowerQu
     )  # fmt: skip
 
 
-def by_formula(asked: PowerQuestion, power: float) -> int:
+def sample_size_by_formula(asked: PowerQuestion, power: float) -> int:
     """Return the participants by the normal approximation, without ties.
 
     n = ((z_alpha + z_power) / d)^2, for rank tests divided by 3/pi; for choices that of the sign
@@ -115,7 +115,7 @@ def by_formula(asked: PowerQuestion, power: float) -> int:
     sides = 2 if asked.two_sided else 1
     z_null, z_power = float(stats.norm.isf(asked.alpha / sides)), float(stats.norm.ppf(power))
     if asked.test == "sign":
-        above, below = _leans(asked)
+        above, below = _preference_probabilities(asked)
         mean, lean = above - below, above + below
         return ceil(((z_null * sqrt(lean) + z_power * sqrt(lean - mean**2)) / mean) ** 2)
     return ceil(((z_null + z_power) / asked.effect) ** 2 * pi / 3.0)
@@ -129,7 +129,7 @@ def sample_size(asked: PowerQuestion, power: float, multiple: int = 1) -> int | 
         power: required probability to detect it.
         multiple: the number must be a multiple of it.
     """
-    low, high = 0, ceil(by_formula(asked, power) / multiple)
+    low, high = 0, ceil(sample_size_by_formula(asked, power) / multiple)
     if high * multiple > MOST:  # ties only increase it
         return None
     while power_of(asked, high * multiple) < power:
@@ -159,7 +159,7 @@ def power_of(asked: PowerQuestion, n: int) -> float:
 
 
 @lru_cache(maxsize=64)
-def joint(effect: float, points: int) -> Floats:
+def joint_probabilities(effect: float, points: int) -> Floats:
     """Return the joint probabilities of a participant's two ratings, (points, points).
 
     Rows are the rating of the condition expected to be better, columns of the other one.
@@ -174,9 +174,9 @@ def joint(effect: float, points: int) -> Floats:
     return found
 
 
-def _drawn(asked: PowerQuestion, n: int, rng: np.random.Generator) -> Counts:
+def _draw_ratings(asked: PowerQuestion, n: int, rng: np.random.Generator) -> Counts:
     """Return the number of participants with each pair of ratings, (studies, points, points)."""
-    cells = joint(asked.effect, asked.points)
+    cells = joint_probabilities(asked.effect, asked.points)
     found: Counts = rng.multinomial(n, (cells / cells.sum()).ravel(), _STUDIES)
     return found.reshape(_STUDIES, asked.points, asked.points)
 
@@ -184,7 +184,7 @@ def _drawn(asked: PowerQuestion, n: int, rng: np.random.Generator) -> Counts:
 def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
     """Return the power of Wilcoxon's signed-rank test, zeros left out."""
     if asked.points:
-        drawn = _drawn(asked, n, rng)
+        drawn = _draw_ratings(asked, n, rng)
         reach = range(1, asked.points)
         up = np.stack([np.trace(drawn, -k, 1, 2) for k in reach], axis=1)
         down = np.stack([np.trace(drawn, k, 1, 2) for k in reach], axis=1)
@@ -192,10 +192,10 @@ def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> floa
         d = rng.normal(asked.effect, 1.0, (_STUDIES, n))
         sign = np.take_along_axis(d, np.argsort(np.abs(d), axis=1), axis=1) > 0.0
         up, down = sign.astype(np.int64), (~sign).astype(np.int64)
-    return float(_found(up, down, asked).mean())
+    return float(_significant_studies(up, down, asked).mean())
 
 
-def _found(up: Counts, down: Counts, asked: PowerQuestion) -> NDArray[np.bool_]:
+def _significant_studies(up: Counts, down: Counts, asked: PowerQuestion) -> NDArray[np.bool_]:
     """Return which studies are significant in the signed-rank test.
 
     Args:
@@ -233,14 +233,14 @@ def _critical(size: tuple[int, ...], alpha: float) -> int:
             continue
         step = 2 * before + many + 1
         spaced = np.zeros(many * step + 1)
-        spaced[::step] = _coins(many)
+        spaced[::step] = _coin_probabilities(many)
         chances, before = np.convolve(chances, spaced), before + many
     tail = np.cumsum(chances[::-1])[::-1]
     return int(np.searchsorted(-tail, -alpha * (1.0 + 1e-9)))
 
 
 @lru_cache(maxsize=_EXACT + 1)
-def _coins(n: int) -> Floats:
+def _coin_probabilities(n: int) -> Floats:
     """Return the probabilities of 0..n heads of n coins."""
     found: Floats = stats.binom.pmf(np.arange(n + 1), n, 0.5)
     return found
@@ -249,7 +249,7 @@ def _coins(n: int) -> Floats:
 def _rank_sum(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
     """Return the power of the rank-sum test of the same participants' answers, by their swaps."""
     if asked.points:
-        drawn = _drawn(asked, n, rng)
+        drawn = _draw_ratings(asked, n, rng)
         size = drawn.sum(axis=2) + drawn.sum(axis=1)
         midrank = np.cumsum(size, axis=1) - 0.5 * (size - 1)
         scores = midrank[:, :, None] - midrank[:, None, :]
@@ -268,9 +268,11 @@ def _rank_sum(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
     return float(np.mean(found if asked.two_sided else found & (total > 0.0)))
 
 
-def _leans(asked: PowerQuestion) -> tuple[float, float]:
+def _preference_probabilities(asked: PowerQuestion) -> tuple[float, float]:
     """Return the probabilities that a participant chooses the better one more, or less, often."""
-    chances = stats.binom.pmf(np.arange(asked.choices + 1), asked.choices, preference(asked.effect))
+    chances = stats.binom.pmf(
+        np.arange(asked.choices + 1), asked.choices, choice_probability(asked.effect)
+    )
     half = 0.5 * asked.choices
     at = np.arange(asked.choices + 1)
     return float(chances[at > half].sum()), float(chances[at < half].sum())
@@ -279,7 +281,7 @@ def _leans(asked: PowerQuestion) -> tuple[float, float]:
 def _sign(asked: PowerQuestion, n: int) -> float:
     """Return the power of the exact sign test of participants' choices."""
     alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
-    above, below = _leans(asked)
+    above, below = _preference_probabilities(asked)
     kept = np.arange(n + 1)
     share = above / (above + below)
     # Without an effect, more than this number above has a probability of at most alpha.

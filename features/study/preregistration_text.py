@@ -8,9 +8,9 @@ import jinja2
 
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
 from gazerig.features.study.measures import GAZE_MEASURES, measures
-from gazerig.features.study.order import PAIR, orders, rows, shown
+from gazerig.features.study.order import PAIR, balanced_group_size, block_trials, orders
 from gazerig.features.study.participation import LEAST_SAME
-from gazerig.features.study.power import MOST, PowerClaim, claim, power_of
+from gazerig.features.study.power import MOST, PowerClaim, power_claim, power_of
 from gazerig.features.study.questionnaire import Item, Questionnaire, Texts
 
 TESTS: Mapping[Test, str] = {
@@ -74,7 +74,7 @@ def claims_of(
 ) -> tuple[PowerClaim, ...]:
     """Return the power of each hypothesis."""
     known = measures(design, questionnaires)
-    return tuple(claim(design, one, known[one.measure]) for one in design.hypotheses)
+    return tuple(power_claim(design, one, known[one.measure]) for one in design.hypotheses)
 
 
 def sentence(one: Hypothesis, design: StudyDesign) -> str:
@@ -105,7 +105,7 @@ def size_words(design: StudyDesign, found: PowerClaim) -> str:
 
 def minutes(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) -> int:
     """Return the approximate duration of a session, minutes."""
-    trials = len(shown(design)) * design.trials.repetitions + design.trials.practice
+    trials = len(block_trials(design)) * design.trials.repetitions + design.trials.practice
     sides = 2 if design.task == "pairwise" else 1
     items = sum(len(questionnaires[key].items) for key in design.questionnaires)
     once = sum(len(questionnaires[key].items) for key in design.after)
@@ -163,9 +163,9 @@ def _presentation(design: StudyDesign) -> str:
 def _trials(design: StudyDesign) -> str:
     if design.task == "rating":
         return f"each of the {len(design.conditions)} conditions"
-    if len(shown(design)) == 1:
+    if len(block_trials(design)) == 1:
         return "the pair of conditions, one after the other"
-    return f"each of the {len(shown(design))} pairs of conditions, one after the other"
+    return f"each of the {len(block_trials(design))} pairs of conditions, one after the other"
 
 
 def _times(repetitions: int) -> str:
@@ -176,7 +176,7 @@ def _order(design: StudyDesign) -> str:
     if design.trials.order == "random":
         return f"The order is random for each participant (seed {design.trials.seed})."
     return (
-        f"Orders are Williams' squares (seed {design.trials.seed}): after every {rows(design)} "
+        f"Orders are Williams' squares (seed {design.trials.seed}): after every {balanced_group_size(design)} "
         "participants each has stood in each place, and after each other one, equally often."
     )
 
@@ -195,7 +195,11 @@ def _rests(design: StudyDesign) -> str:
 
 def _rows(design: StudyDesign) -> Iterator[tuple[str, str]]:
     """Yield the orders of the first participants until they repeat."""
-    every = rows(design) if design.trials.order == "williams" else design.plan.participants
+    every = (
+        balanced_group_size(design)
+        if design.trials.order == "williams"
+        else design.plan.participants
+    )
     for number in range(1, min(every, _SHOWN_ROWS) + 1):
         yield str(number), ", ".join(one.replace(PAIR, " then ") for one in orders(design, number))
     if every > _SHOWN_ROWS:
@@ -256,7 +260,7 @@ def _correction(design: StudyDesign) -> str:
 
 def _curve(design: StudyDesign, claims: tuple[PowerClaim, ...]) -> list[tuple[int, list[str]]]:
     """Return the power of all hypotheses for some numbers of participants."""
-    every = rows(design)
+    every = balanced_group_size(design)
     found = [one.needed for one in claims if one.needed is not None]
     around = max(found, default=design.plan.participants)
     wanted = {design.plan.participants, *found}

@@ -12,7 +12,7 @@ class HeadLost(Exception):
 
 
 @dataclass(frozen=True)
-class Presented:
+class PresentationData:
     """Data of a presentation that has ended; see records.TrialEnded."""
 
     recording: str = ""
@@ -29,7 +29,7 @@ class Presenter(Protocol):
             HeadLost: it cannot be shown.
         """
 
-    def end(self) -> Presented:
+    def end(self) -> PresentationData:
         """End the presentation; return its data."""
 
     def fault(self) -> str:
@@ -45,9 +45,9 @@ class FilmPresenter:
     def begin(self, shown: ShownTrial) -> None:
         """Do nothing."""
 
-    def end(self) -> Presented:
+    def end(self) -> PresentationData:
         """Report that nothing was recorded."""
-        return Presented()
+        return PresentationData()
 
     def fault(self) -> str:
         """Report no fault."""

@@ -82,7 +82,7 @@ class StudyProgress:
                 case Closed():
                     self.closed = one
 
-    def pass_by(self, place: StudyPlace) -> None:
+    def leave_place(self, place: StudyPlace) -> None:
         """Leave a place without a record: the instructions, a rest."""
         self._passed.add(place)
 
@@ -96,7 +96,7 @@ class StudyProgress:
         if (start := StudyPlace("instructions")) not in self._passed and not self._attempts:
             return start
         for trial in self.trials:
-            if place := self._in_trial(trial):
+            if place := self._place_in_trial(trial):
                 return place
         for key in self._design.after:
             if (None, key) not in self._answered:
@@ -112,14 +112,14 @@ class StudyProgress:
         if one.outcome == "head_lost":
             self._lost[one.trial] = self._lost.get(one.trial, 0) + 1
 
-    def _given_up(self, trial: int) -> bool:
+    def _is_given_up(self, trial: int) -> bool:
         """Return whether the head was lost too often in a trial, by the design's rule."""
         rule = self._design.exclusion
         return self._lost.get(trial, 0) > (rule.repeats if rule.lost_head == "repeat" else 0)
 
-    def _in_trial(self, trial: int) -> StudyPlace | None:
+    def _place_in_trial(self, trial: int) -> StudyPlace | None:
         """Return the participant's place in a trial, None after its end."""
-        if self._given_up(trial):
+        if self._is_given_up(trial):
             return None
         every = self._design.trials.rest_every
         untouched = all((trial, side) not in self._attempts for side in range(self._sides))

@@ -8,7 +8,7 @@ from itertools import chain
 
 from gazerig.features.study.design import DECIDING, Hypothesis, StudyDesign, Test
 from gazerig.features.study.measures import GAZE_MEASURES, Measure, measures
-from gazerig.features.study.order import rows
+from gazerig.features.study.order import balanced_group_size
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.robot.model.types import JOINT_NAME
 
@@ -89,7 +89,7 @@ def _number_rules(design: StudyDesign) -> Found:
     """Yield numbers of participants that do not balance the orders."""
     if not _LEAST <= len(design.conditions) <= _MOST:
         return
-    wanted, every = design.plan.participants, rows(design)
+    wanted, every = design.plan.participants, balanced_group_size(design)
     if wanted % every:
         below, above = wanted // every * every, (wanted // every + 1) * every
         near = f"{below} or {above}" if below else f"{above} or {above + every}"
@@ -164,7 +164,7 @@ def _item_rules(key: str, item: Item) -> Found:
                 yield f"{at}.{name}", f"belongs to ratings, and this is {item.kind}"
 
 
-def asked_rules(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) -> Found:
+def consistency_rules(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) -> Found:
     """Yield contradictions between the task, the questions and the hypotheses.
 
     questionnaires: by the keys in the design, without invalid ones
@@ -242,7 +242,7 @@ def _side_rules(design: StudyDesign, one: Hypothesis) -> Found:
         ]
         if factors[0] != factors[1]:
             yield "than", "is to be a level of the same factor, or both are to be conditions"
-        elif len(design.matched(one)) != max(len(side) for side in sides.values()):
+        elif len(design.condition_pairs(one)) != max(len(side) for side in sides.values()):
             yield (
                 "than",
                 f"{one.better!r} and {one.than!r} do not stand beside the same levels of the other "

@@ -105,7 +105,7 @@ def _values(
     by_trial: dict[tuple[int | None, str], list[float]] = {}
     for row in one.counted:
         if row.questionnaire == measure.questionnaire and row.item in measure.items:
-            value = turned(row, questionnaires)
+            value = reverse_rating(row, questionnaires)
             by_trial.setdefault((row.trial, row.condition), []).append(value)
     return [
         (condition, _mean(values))
@@ -114,7 +114,7 @@ def _values(
     ]
 
 
-def turned(row: AnswerRow, questionnaires: Mapping[str, Questionnaire]) -> float:
+def reverse_rating(row: AnswerRow, questionnaires: Mapping[str, Questionnaire]) -> float:
     """Return a rating, with reversed items inverted, so that higher means more of the scale."""
     item = questionnaires[row.questionnaire].items[row.item]
     assert row.value is not None  # rows without an answer are excluded
@@ -130,7 +130,7 @@ def item_answers(
         for row in one.counted:
             if row.questionnaire == measure.questionnaire and row.item in measure.items:
                 page = pages.setdefault((one.participant, row.trial), {})
-                page[row.item] = turned(row, questionnaires)
+                page[row.item] = reverse_rating(row, questionnaires)
     whole = [[page[i] for i in measure.items] for page in pages.values()
              if len(page) == len(measure.items)]  # fmt: skip
     return np.array(whole, float).reshape(-1, len(measure.items))

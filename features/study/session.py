@@ -11,7 +11,7 @@ from math import isfinite, nan
 
 import numpy as np
 
-from gazerig.features.study.answers import WrongAnswer, checked
+from gazerig.features.study.answers import WrongAnswer, check_answer
 from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.progress import Step, StudyPlace, StudyProgress
@@ -186,7 +186,7 @@ class StudySession:
         """Return the records of a presentation that was interrupted by the end of the program."""
         if self._progress.began is None:
             return ()
-        return self._cut("interrupted", nan, utc, INTERRUPTED)
+        return self._end_presentation("interrupted", nan, utc, INTERRUPTED)
 
     def consent(self, given: bool, pictures: bool, gaze: bool, utc: str) -> tuple[Record, ...]:
         """Return the records of a decision on the consent page.
@@ -194,7 +194,7 @@ class StudySession:
         Raises:
             WrongAnswer: another screen is shown.
         """
-        self._require("consent")
+        self._require_step("consent")
         asked = self._consent_screen()
         uses = given and pictures and asked.pictures, given and gaze and asked.gaze
         said = Consented(given, *uses, utc)
@@ -210,8 +210,8 @@ class StudySession:
         Raises:
             WrongAnswer: another screen is shown.
         """
-        self._require("instructions", "rest")
-        self._progress.pass_by(self._progress.place)
+        self._require_step("instructions", "rest")
+        self._progress.leave_place(self._progress.place)
 
     def begin(self, utc: str) -> tuple[Record, ...]:
         """Return the record of the presentation that begins now.
@@ -219,7 +219,7 @@ class StudySession:
         Raises:
             WrongAnswer: no presentation can begin.
         """
-        self._require("ready")
+        self._require_step("ready")
         shown = self.shown
         if shown is None or self.paused:
             raise WrongAnswer("the experimenter has paused the study")
@@ -247,8 +247,8 @@ class StudySession:
         Raises:
             WrongAnswer: no presentation is in progress.
         """
-        self._require("presentation")
-        return self._cut(outcome, seconds, utc, reason, recording, span_s)
+        self._require_step("presentation")
+        return self._end_presentation(outcome, seconds, utc, reason, recording, span_s)
 
     def answer(
         self,
@@ -268,7 +268,7 @@ class StudySession:
         Raises:
             WrongAnswer: no questions are shown, or an answer is missing or invalid.
         """
-        self._require("questions")
+        self._require_step("questions")
         asked, items = self.asked, self._items(self._progress.place)
         assert asked is not None  # a page of questions
         if unknown := set(values) - set(range(len(items))):
@@ -276,7 +276,7 @@ class StudySession:
         at = (asked.trial, asked.condition, asked.questionnaire)
         records = []
         for number, (key, item) in enumerate(items):
-            value = checked(number, item, values.get(number), self.design.may_skip)
+            value = check_answer(number, item, values.get(number), self.design.may_skip)
             late = ms.get(number, nan)
             known = isfinite(late) and late >= 0.0 and isfinite(longest_ms)
             late = min(late, longest_ms) if known else nan
@@ -293,19 +293,22 @@ class StudySession:
         """Return the records of a participant's withdrawal."""
         if self.closed:
             return ()
-        return (*self._cut("withdrawn", nan, utc), Closed("withdrawn", "", utc))
+        return (*self._end_presentation("withdrawn", nan, utc), Closed("withdrawn", "", utc))
 
     def exclude(self, reason: str, utc: str) -> tuple[Record, ...]:
         """Return the records of the experimenter's exclusion of the participant."""
         if self.closed:
             return ()
-        return (*self._cut("interrupted", nan, utc, reason), Closed("excluded", reason, utc))
+        return (
+            *self._end_presentation("interrupted", nan, utc, reason),
+            Closed("excluded", reason, utc),
+        )
 
     def add(self, records: Iterable[Record]) -> None:
         """Apply records that are on disk."""
         self._progress.add(records)
 
-    def _cut(
+    def _end_presentation(
         self,
         outcome: Outcome,
         seconds: float,
@@ -360,7 +363,7 @@ class StudySession:
         text = f"{kind} {self.participant} {place}"
         return hmac.new(self._secret, text.encode(), hashlib.sha256).hexdigest()[:20]
 
-    def _require(self, *steps: Step) -> None:
+    def _require_step(self, *steps: Step) -> None:
         step = self._progress.place.step
         if step not in steps:
             raise WrongAnswer(f"this page is over; the participant is at: {step}")

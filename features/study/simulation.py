@@ -56,7 +56,7 @@ def levels(design: StudyDesign) -> dict[str, int]:
 
     Without hypotheses the first condition is above the others.
     """
-    pairs = [pair for one in design.hypotheses for pair in design.matched(one)]
+    pairs = [pair for one in design.hypotheses for pair in design.condition_pairs(one)]
     first, *others = design.conditions
     pairs = pairs or [(first, other) for other in others]
     found = dict.fromkeys(design.conditions, 0)
@@ -133,12 +133,12 @@ def _moments(latent: Floats, points: int) -> tuple[Floats, Floats]:
     return mean, square
 
 
-def preference(effect: float) -> float:
+def choice_probability(effect: float) -> float:
     """Return the probability that the better condition is chosen: of a difference above zero."""
     return float(special.ndtr(effect))
 
 
-def rated(latent: Floats, points: int) -> Floats:
+def ratings_from_latent(latent: Floats, points: int) -> Floats:
     """Return the ratings 1..points of latent values."""
     return np.asarray(1.0 + np.digitize(latent, thresholds(points)), np.float64)
 
@@ -149,8 +149,8 @@ def differences(
     """Return differences of one item's ratings between two conditions, (studies, participants)."""
     shift, own = shift_of(effect, points), rng.normal(0.0, BETWEEN_SD, shape)
     noise = sqrt(TRIAL_SD**2 + ITEM_SD**2)
-    above = rated(own + 0.5 * shift + rng.normal(0.0, noise, shape), points)
-    return above - rated(own - 0.5 * shift + rng.normal(0.0, noise, shape), points)
+    above = ratings_from_latent(own + 0.5 * shift + rng.normal(0.0, noise, shape), points)
+    return above - ratings_from_latent(own - 0.5 * shift + rng.normal(0.0, noise, shape), points)
 
 
 class SimulatedParticipant:
@@ -207,7 +207,7 @@ class SimulatedParticipant:
         for name in self._design.objective:
             own = self._rng(name).normal()
             noise = self._rng(f"{trial} {name}").normal()
-            latent = own + noise + shift * self._height(condition)
+            latent = own + noise + shift * self._shift_count(condition)
             values[name] = _OBJECTIVE_MIDDLE + _OBJECTIVE_SD * latent
         return values
 
@@ -229,7 +229,9 @@ class SimulatedParticipant:
         first, second = pair.split(PAIR)
         apart = self._levels[first] - self._levels[second]
         own = self._preference(first, questionnaire) - self._preference(second, questionnaire)
-        chance = special.expit(apart * special.logit(preference(self._population.effect)) + own)
+        chance = special.expit(
+            apart * special.logit(choice_probability(self._population.effect)) + own
+        )
         return "first" if rng.random() < chance else "second"
 
     def _rating(
@@ -252,13 +254,13 @@ class SimulatedParticipant:
             BETWEEN_SD * self._rng(construct).normal()
             + TRIAL_SD * self._rng(f"{trial} {construct}").normal()
             + ITEM_SD * rng.normal()
-            + shift * self._height(condition)
+            + shift * self._shift_count(condition)
             + self._preference(condition, construct)
         )
-        rating = int(rated(np.array([latent]), item.points)[0])
+        rating = int(ratings_from_latent(np.array([latent]), item.points)[0])
         return item.points + 1 - rating if item.reverse else rating
 
-    def _height(self, condition: str) -> float:
+    def _shift_count(self, condition: str) -> float:
         """Return the shifts between a condition and the middle; pairs are at the middle."""
         return self._levels[condition] - self._middle if condition in self._levels else 0.0
 

@@ -103,7 +103,7 @@ class StudyRun:
         """Record the decision on the consent page.
 
         Raises:
-            NotKept: it could not be written.
+            WriteFailed: it could not be written.
         """
         with self._lock:
             if page == self._session.page:
@@ -125,7 +125,7 @@ class StudyRun:
         A head that cannot show it pauses the session, until the experimenter continues.
 
         Raises:
-            NotKept: its start could not be written; it does not start.
+            WriteFailed: its start could not be written; it does not start.
             WrongAnswer: the page is not before a presentation.
         """
         with self._lock:
@@ -156,7 +156,7 @@ class StudyRun:
                 since the browser has the film; a film that was not fetched was not played.
 
         Raises:
-            NotKept: it could not be written.
+            WriteFailed: it could not be written.
         """
         with self._lock:
             screen = self._session.screen
@@ -175,7 +175,7 @@ class StudyRun:
         """End the presentation when its time is over or the head is lost; call it often.
 
         Raises:
-            NotKept: the end could not be written; the next call tries again.
+            WriteFailed: the end could not be written; the next call tries again.
         """
         with self._lock:
             fault = self._presenter.fault()
@@ -198,7 +198,7 @@ class StudyRun:
             ms: response times as reported by the browser, limited to the time the page was shown.
 
         Raises:
-            NotKept: they could not be written, and the page still needs answers.
+            WriteFailed: they could not be written, and the page still needs answers.
             WrongAnswer: an answer is missing or invalid.
         """
         with self._lock:
@@ -210,7 +210,7 @@ class StudyRun:
         """Record the participant's withdrawal.
 
         Raises:
-            NotKept: it could not be written.
+            WriteFailed: it could not be written.
         """
         with self._lock:
             self._leave(self._session.withdraw(self._utc()))
@@ -236,7 +236,7 @@ class StudyRun:
         """Repeat the present presentation.
 
         Raises:
-            NotKept: it could not be written.
+            WriteFailed: it could not be written.
             WrongAnswer: no presentation is in progress.
         """
         with self._lock:
@@ -248,7 +248,7 @@ class StudyRun:
         """Exclude the participant.
 
         Raises:
-            NotKept: it could not be written.
+            WriteFailed: it could not be written.
         """
         with self._lock:
             self._leave(self._session.exclude(reason, self._utc()))

@@ -313,7 +313,7 @@ CLAIMS = (
            "chances[np.abs(sums - centre) > abs(seen - centre)].sum()",
            "what was seen is not counted as extreme",
            ("study_statistics::test_all_of_nine_above_is_the_papers_first_study_at_its_clearest",), ("S3",)),
-    Mutant("features/study/simulation.py", "rated(own + 0.5 * shift +", "rated(own + 0.8 * shift +",
+    Mutant("features/study/simulation.py", "ratings_from_latent(own + 0.5 * shift +", "ratings_from_latent(own + 0.8 * shift +",
            "differences are larger than the design claims",
            ("study_simulation::test_500_studies_find_as_often_as_their_design_claims",), ("S4",)),
     Mutant("robot/control/stop_control.py", "        try:\n            body.disable_torque()", "        try:\n            pass",

@@ -33,7 +33,7 @@ from gazerig.features.study.design import (
 )
 from gazerig.features.study.measures import measures
 from gazerig.features.study.participation import participation
-from gazerig.features.study.power import claim
+from gazerig.features.study.power import power_claim
 from gazerig.features.study.simulation import Population
 from gazerig.features.study.statistics import effects
 
@@ -162,7 +162,7 @@ def is_significant(one: Planned, seed: int) -> bool:
 
 
 def _count(one: Planned, seeds: range) -> int:
-    effects.bootstrapped = lambda *_, **__: (nan, nan)
+    effects.bootstrap_interval = lambda *_, **__: (nan, nan)
     return sum(is_significant(one, seed) for seed in seeds)
 
 
@@ -188,7 +188,7 @@ def main() -> None:
             plan = replace(study.plan, effect=one.population.effect)
             hypothesis = study.hypotheses[0]
             known = measures(study, QUESTIONS)[hypothesis.measure]
-            said = claim(replace(study, plan=plan), hypothesis, known).power
+            said = power_claim(replace(study, plan=plan), hypothesis, known).power
             found = share(one)
             took = time.perf_counter() - began
             print(f"{one.name:68}{said:8.3f}{found:8.3f}{took:7.1f}", flush=True)

@@ -10,16 +10,16 @@ import pytest
 from study_records import QUESTIONS, UTC, design, pairs, records
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.analysis import analysed
+from gazerig.features.study.analysis import analyse_study
 from gazerig.features.study.cli.analyse import verdicts
-from gazerig.features.study.collected import collected
+from gazerig.features.study.collected import collect_study
 from gazerig.features.study.data_folder import StudyData, code_of
 from gazerig.features.study.design import Condition, Exclusion, StudyDesign
 from gazerig.features.study.journal import FILE, Journal
 from gazerig.features.study.preregistration import canonical
 from gazerig.features.study.records import Opened, Record, TrialBegan
 from gazerig.features.study.report.page import banners
-from gazerig.features.study.report.report import with_looks, write_report
+from gazerig.features.study.report.report import add_interim_looks, write_report
 from gazerig.features.study.report.tables import results_json
 from gazerig.features.study.simulation import Population
 
@@ -60,7 +60,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_folder_gives_back_the_design_and_all_answers(data: Path) -> None:
-    found = collected(data)
+    found = collect_study(data)
     wanted = design(participants=12)
     # Names of rigs and films are replaced by their values, which the analysis does not need.
     assert found.design == wanted and found.name == "mine"
@@ -73,7 +73,7 @@ def test_the_order_of_conditions_and_items_is_kept(tmp_path: Path) -> None:
     turned = replace(design(), conditions={"walk": Condition(), "centre": Condition()})
     swapped = dict(reversed(list(turned.conditions.items())))
     kept(tmp_path / "one", replace(turned, conditions=swapped), 1)
-    assert list(collected(tmp_path / "one").design.conditions) == ["centre", "walk"]
+    assert list(collect_study(tmp_path / "one").design.conditions) == ["centre", "walk"]
 
 
 def test_the_report_has_its_page_tables_and_results(data: Path) -> None:
@@ -110,23 +110,23 @@ def test_who_was_deleted_is_gone_from_what_is_made_again(tmp_path: Path) -> None
     analyse(tmp_path)
     written = b"".join(p.read_bytes() for p in (tmp_path / "report").rglob("*") if p.is_file())
     assert b"P001" in written and b"P002" not in written
-    assert collected(tmp_path).deleted == ("P002",)
+    assert collect_study(tmp_path).deleted == ("P002",)
 
 
 def test_an_unfinished_participant_is_left_out_or_kept_by_the_rule(tmp_path: Path) -> None:
     kept(tmp_path / "a", design(), 3, cut=-2)
-    assert [p.left_out for p in collected(tmp_path / "a").people] == ["", "", "did not finish"]
+    assert [p.left_out for p in collect_study(tmp_path / "a").people] == ["", "", "did not finish"]
     kept(tmp_path / "b", replace(design(), exclusion=Exclusion(incomplete="keep")), 3, cut=-2)
-    assert not any(p.left_out for p in collected(tmp_path / "b").people)
+    assert not any(p.left_out for p in collect_study(tmp_path / "b").people)
 
 
 def test_a_torn_line_is_no_record_and_hinders_nothing(tmp_path: Path) -> None:
     data = kept(tmp_path, design(), 2)
     journal = data.participant(1) / FILE
-    whole = collected(tmp_path)
+    whole = collect_study(tmp_path)
     with journal.open("ab") as file:
         file.write(b'[{"kind": "Closed", "how": "wit')
-    assert collected(tmp_path) == whole
+    assert collect_study(tmp_path) == whole
 
 
 def test_a_damaged_line_is_named_with_its_number(tmp_path: Path) -> None:
@@ -160,8 +160,8 @@ def test_whatever_a_damaged_journal_holds_is_one_message_and_nothing_is_lost(
                 line = json.dumps([*whole[:at], changed, *whole[at + 1 :]]).encode() + b"\n"
                 path.write_bytes(line)
                 try:
-                    found = collected(tmp_path)
-                    analysed("m", found.design, found.questionnaires, "ab", found.people)
+                    found = collect_study(tmp_path)
+                    analyse_study("m", found.design, found.questionnaires, "ab", found.people)
                 except SetupError as error:
                     assert "P001" in str(error) and "\n" not in str(error)
                     refused += 1
@@ -178,7 +178,7 @@ def test_a_journal_that_lost_a_line_is_refused(tmp_path: Path) -> None:
     with Journal(data.participant(1)) as journal:
         journal.write(without)
     with pytest.raises(SetupError, match="record 3, TrialEnded: the presentation did not begin"):
-        collected(tmp_path)
+        collect_study(tmp_path)
 
 
 def test_bytes_of_a_journal_that_are_wrong_are_one_message_and_nothing_is_lost(
@@ -194,7 +194,7 @@ def test_bytes_of_a_journal_that_are_wrong_are_one_message_and_nothing_is_lost(
         damaged = whole[:at] + junk + whole[at + length :]
         path.write_bytes(damaged)
         try:
-            collected(tmp_path)
+            collect_study(tmp_path)
         except SetupError as error:
             refused += "\n" not in str(error)
         assert path.read_bytes() == damaged
@@ -223,9 +223,9 @@ def real(folder: Path, count: int) -> StudyData:
 def test_a_look_before_the_planned_sample_is_kept_in_the_data_and_reported(tmp_path: Path) -> None:
     # The same people once more are no other look, and the whole sample is none.
     for day, count in ((1, 3), (2, 3), (3, 5), (9, 12)):
-        data, found = real(tmp_path, count), collected(tmp_path)
-        study = analysed("m", found.design, found.questionnaires, "ab", found.people)
-        study = with_looks(study, data, f"2026-11-0{day}T10:00:00Z")
+        data, found = real(tmp_path, count), collect_study(tmp_path)
+        study = analyse_study("m", found.design, found.questionnaires, "ab", found.people)
+        study = add_interim_looks(study, data, f"2026-11-0{day}T10:00:00Z")
     looks = [("2026-11-01T10:00:00Z", 3, 3, 12), ("2026-11-03T10:00:00Z", 5, 5, 12)]
     assert list(data.looks()) == looks
     (said,) = banners(study)
@@ -234,7 +234,7 @@ def test_a_look_before_the_planned_sample_is_kept_in_the_data_and_reported(tmp_p
     assert [tuple(look.values()) for look in results["interim_looks"]] == looks
     (tmp_path / "interim-looks.jsonl").write_text("{}\n")
     with pytest.raises(SetupError, match=r"interim-looks.jsonl cannot be read"):
-        with_looks(study, data, UTC)
+        add_interim_looks(study, data, UTC)
 
 
 @pytest.mark.usefixtures("unlaid_figures")
@@ -246,9 +246,9 @@ def test_the_command_records_a_look_once(tmp_path: Path) -> None:
 
 def test_a_look_at_simulated_participants_is_none(tmp_path: Path) -> None:
     data = kept(tmp_path, design(), 2)
-    found = collected(tmp_path)
-    study = analysed("m", found.design, found.questionnaires, "ab", found.people)
-    assert not with_looks(study, data, UTC).looks and not data.looks()
+    found = collect_study(tmp_path)
+    study = analyse_study("m", found.design, found.questionnaires, "ab", found.people)
+    assert not add_interim_looks(study, data, UTC).looks and not data.looks()
 
 
 def test_data_of_two_designs_are_refused_with_both_hashes(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from recorded_run import record
 from study_records import QUESTIONS, design, records
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.analysis import StudyAnalysis, analysed
+from gazerig.features.study.analysis import StudyAnalysis, analyse_study
 from gazerig.features.study.participation import participation
 from gazerig.features.study.records import ItemAnswered, Record, TrialEnded
 from gazerig.features.study.report.bids import StudyDataSet, write_study
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 def study(*people: list[Record]) -> StudyAnalysis:
     of = replace(design(), description=("What is looked at", "and how it looks."))
-    return analysed(
+    return analyse_study(
         "mine_1", of, QUESTIONS, "ab" * 32, [participation(p, of, QUESTIONS) for p in people]
     )
 

@@ -10,7 +10,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.study.data_folder import StudyData, code_of
 from gazerig.features.study.journal import FILE, Journal, read
 from gazerig.features.study.records import Closed, ItemAnswered, Opened
-from gazerig.features.study.run.participant import opened_journal
+from gazerig.features.study.run.participant import open_journal
 from gazerig.features.study.run.simulated_session import simulate_study
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.simulation import Population
@@ -66,7 +66,7 @@ def test_a_design_edited_after_the_first_participant_is_refused(
         data.claim(changed.name, changed.canonical)
     StudyData(tmp_path / "new").claim(changed.name, changed.canonical)
     with pytest.raises(SetupError, match="was begun with another design"):
-        opened_journal(changed, data, 1, changed.sha256)
+        open_journal(changed, data, 1, changed.sha256)
 
 
 def test_what_is_said_of_the_design_cannot_be_changed_unseen(
@@ -106,7 +106,7 @@ def test_deleting_a_participant_leaves_nothing_but_the_code(
     with pytest.raises(SetupError, match="has nothing of P002; there is P001, P003"):
         data.delete(2)
     with pytest.raises(SetupError, match="the data of P002 were deleted on request"):
-        opened_journal(study, data, 2, study.sha256)
+        open_journal(study, data, 2, study.sha256)
 
 
 def test_a_participant_with_a_damaged_journal_can_be_deleted(
@@ -115,7 +115,7 @@ def test_a_participant_with_a_damaged_journal_can_be_deleted(
     data = simulated(study, tmp_path)
     (data.participant(2) / FILE).write_bytes(b"nonsense\n")
     with pytest.raises(SetupError, match="damaged"):
-        opened_journal(study, data, 2, study.sha256)
+        open_journal(study, data, 2, study.sha256)
     assert data.delete(2) and data.numbers() == (1, 3)
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 from study_records import PAPER, QUESTIONS, UTC, design, pairs, records
 
-from gazerig.features.study.analysis import analysed, circular_triples
+from gazerig.features.study.analysis import analyse_study, circular_triples
 from gazerig.features.study.decisions import Decision, decisions
 from gazerig.features.study.design import (
     Exclusion,
@@ -281,7 +281,7 @@ def test_a_verdict_has_the_sign_of_the_tests_own_effect() -> None:
     assert one.test is not None and one.test.deciding_p == pytest.approx(0.0014, abs=0.0003)
     assert one.means[0] < one.means[1] and one.test.effect.value > 0.0
     assert one.verdict == "supported"
-    said = apa.sentence(one, analysed("mine", study, questions, "ab", people))
+    said = apa.sentence(one, analyse_study("mine", study, questions, "ab", people))
     assert "was above" in said and "have the other sign" in said
 
 

@@ -13,10 +13,10 @@ from gazerig.features.study.decisions import decisions
 from gazerig.features.study.design import Condition, Hypothesis, StudyDesign, Trials
 from gazerig.features.study.measures import measures
 from gazerig.features.study.participation import Participation, participation
-from gazerig.features.study.power import claim, power_of
+from gazerig.features.study.power import power_claim, power_of
 from gazerig.features.study.preregistration_text import sentence
 from gazerig.features.study.records import ItemAnswered
-from gazerig.features.study.rules import asked_rules
+from gazerig.features.study.rules import consistency_rules
 from gazerig.features.study.scores import scores
 from gazerig.features.study.simulation import Population, levels
 
@@ -46,8 +46,14 @@ def test_a_level_is_all_conditions_that_have_it() -> None:
     assert study.side("gaze=walk") == ("walk_blink", "walk_stare")
     assert study.side("walk_stare") == ("walk_stare",)
     assert study.side("gaze=nothing") == study.side("walk") == ()
-    assert study.matched(GAZE) == (("walk_blink", "centre_blink"), ("walk_stare", "centre_stare"))
-    assert study.matched(LIDS) == (("walk_blink", "walk_stare"), ("centre_blink", "centre_stare"))
+    assert study.condition_pairs(GAZE) == (
+        ("walk_blink", "centre_blink"),
+        ("walk_stare", "centre_stare"),
+    )
+    assert study.condition_pairs(LIDS) == (
+        ("walk_blink", "walk_stare"),
+        ("centre_blink", "centre_stare"),
+    )
 
 
 def test_the_figures_are_those_of_scipy_on_the_means_of_each_participant() -> None:
@@ -102,7 +108,7 @@ def test_simulated_participants_have_the_effect_between_levels() -> None:
 def test_power_is_that_of_means_which_have_hardly_any_ties() -> None:
     one = Hypothesis("paper.looked_at", "walk_blink", "centre_blink")
     level, single = (
-        claim(crossed(each), each, measures(crossed(each), QUESTIONS)["paper.looked_at"])
+        power_claim(crossed(each), each, measures(crossed(each), QUESTIONS)["paper.looked_at"])
         for each in (GAZE, one)
     )
     assert level.question.points == 0 and single.question.points == 5
@@ -132,17 +138,17 @@ def test_levels_that_cannot_be_compared_are_refused(
     changed: dict[str, object], wanted: tuple[str, str]
 ) -> None:
     study = crossed(replace(GAZE, **changed))  # type: ignore[arg-type]
-    found = dict(asked_rules(study, QUESTIONS))
+    found = dict(consistency_rules(study, QUESTIONS))
     assert wanted[1] in found[f"hypotheses.0.{wanted[0]}"]
-    assert not dict(asked_rules(crossed(GAZE, LIDS), QUESTIONS))
+    assert not dict(consistency_rules(crossed(GAZE, LIDS), QUESTIONS))
 
 
 def test_levels_beside_other_levels_of_the_rest_are_refused() -> None:
     study = crossed(GAZE)
     few = {key: one for key, one in study.conditions.items() if key != "centre_stare"}
-    (found,) = asked_rules(replace(study, conditions=few), QUESTIONS)
+    (found,) = consistency_rules(replace(study, conditions=few), QUESTIONS)
     assert found[0] == "hypotheses.0.than" and "do not stand beside the same levels" in found[1]
-    assert not list(asked_rules(replace(study, trials=Trials(repetitions=2)), QUESTIONS))
+    assert not list(consistency_rules(replace(study, trials=Trials(repetitions=2)), QUESTIONS))
 
 
 def test_a_factor_alone_names_its_conditions() -> None:
@@ -150,7 +156,7 @@ def test_a_factor_alone_names_its_conditions() -> None:
     study = design(hypotheses=(replace(GAZE, also=("chi_square",)),))
     alone = {key: Condition(factors={"gaze": key}) for key in study.conditions}
     study = replace(study, conditions=alone)
-    assert not list(asked_rules(study, QUESTIONS))
+    assert not list(consistency_rules(study, QUESTIONS))
     (one,) = decisions(study, QUESTIONS, people_of(study, 24, 1.2))
     by_name = Hypothesis("paper.looked_at", "walk", "centre", also=("chi_square",))
     named = replace(study, hypotheses=(by_name,))

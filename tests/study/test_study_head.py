@@ -13,7 +13,7 @@ from gazerig.features.study.records import STEP_DEG, Record, TrialBegan, TrialEn
 from gazerig.features.study.run.head_presenter import HeadPresenter
 from gazerig.features.study.run.head_process import as_line, options_in
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
-from gazerig.features.study.run.trial_measures import SWITCH_S, measured
+from gazerig.features.study.run.trial_measures import SWITCH_S, measure_presentations
 from gazerig.features.study.session import ShownTrial
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import RealClock
@@ -76,7 +76,7 @@ def test_conditions_switch_without_a_jump_and_a_lost_bus_is_told_and_mended(
     finally:
         shows.close()
     assert shows.head is None
-    found = measured(study, records, tmp_path, said.append)
+    found = measure_presentations(study, records, tmp_path, said.append)
     assert [(one.trial, one.condition) for one in found] == [*enumerate((*keys, keys[0]))]
     ticks = list(RunRecording(tmp_path / "run-01.mcap").ticks())
     (_, _, _, second, *_) = records
@@ -88,7 +88,9 @@ def test_conditions_switch_without_a_jump_and_a_lost_bus_is_told_and_mended(
         assert 0.2 <= one.values["participant_gaze_share"] <= 1.0
     tuned = [type(command).__name__ for tick in ticks for command in tick.commands]
     assert tuned.count("Tune") == 3, "each switch stands in the recording"
-    assert measured(study, [*records, *found], tmp_path, said.append) == () and not said
+    assert (
+        measure_presentations(study, [*records, *found], tmp_path, said.append) == () and not said
+    )
 
 
 def test_a_head_that_cannot_start_is_lost_with_its_reason(
@@ -109,5 +111,8 @@ def test_a_recording_that_is_gone_is_said_and_costs_its_measures_alone(
 ) -> None:
     ended = TrialEnded(0, 0, "complete", 1.0, "", 0, "run-09.mcap", "", 1.0, 2.0)
     said: list[str] = []
-    assert measured(study, [TrialBegan(0, 0, "simple", ""), ended], tmp_path, said.append) == ()
+    assert (
+        measure_presentations(study, [TrialBegan(0, 0, "simple", ""), ended], tmp_path, said.append)
+        == ()
+    )
     assert len(said) == 1 and "run-09.mcap" in said[0]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.study.journal import FILE, Journal, NotKept, encoded, read
+from gazerig.features.study.journal import FILE, Journal, WriteFailed, encode_records, read
 from gazerig.features.study.records import (
     Closed,
     Consented,
@@ -53,7 +53,7 @@ def test_what_is_not_a_number_comes_back_as_that(tmp_path: Path) -> None:
 
 def test_a_step_is_there_whole_or_not_at_all_wherever_it_was_cut(tmp_path: Path) -> None:
     """As after a crash or a lost power: the file ends at any byte of the last line."""
-    whole, step = encoded(ALL[:3]), encoded(ALL[3:5])
+    whole, step = encode_records(ALL[:3]), encode_records(ALL[3:5])
     for cut in range(len(step)):
         folder = tmp_path / str(cut)
         folder.mkdir()
@@ -69,7 +69,9 @@ def test_a_step_is_there_whole_or_not_at_all_wherever_it_was_cut(tmp_path: Path)
 
 
 def test_a_damaged_line_is_named(tmp_path: Path) -> None:
-    (tmp_path / FILE).write_bytes(encoded(ALL[:1]) + b'[{"kind": "Rumour"}]\n' + encoded(ALL[1:2]))
+    (tmp_path / FILE).write_bytes(
+        encode_records(ALL[:1]) + b'[{"kind": "Rumour"}]\n' + encode_records(ALL[1:2])
+    )
     with pytest.raises(SetupError, match=rf"{FILE}:2: no records of a session"):
         Journal(tmp_path)
     with pytest.raises(SetupError, match=rf"{FILE}:2:"):
@@ -99,7 +101,7 @@ def test_a_full_disk_keeps_nothing_by_halves_and_may_be_tried_again(
             return there(fd, part)
 
         monkeypatch.setattr(os, "write", full)
-        with pytest.raises(NotKept, match="not kept: No space left on device"):
+        with pytest.raises(WriteFailed, match="not kept: No space left on device"):
             journal.write(ALL[2:5])
         assert journal.records == ALL[:2] == read(tmp_path)
         monkeypatch.setattr(os, "write", there)

@@ -10,7 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.features.study.design import Condition, StudyDesign, Trials
-from gazerig.features.study.order import PAIR, orders, practice, rows, shown, williams
+from gazerig.features.study.order import (
+    PAIR,
+    balanced_group_size,
+    block_trials,
+    orders,
+    practice,
+    williams,
+)
 
 
 def design_of(n: int, **trials: object) -> StudyDesign:
@@ -42,7 +49,7 @@ def test_multiples_of_the_rows_are_balanced_to_the_last_cell(
     n: int, repetitions: int, seed: int, times: int
 ) -> None:
     design = design_of(n, repetitions=repetitions, seed=seed)
-    every = [orders(design, p) for p in range(1, times * rows(design) + 1)]
+    every = [orders(design, p) for p in range(1, times * balanced_group_size(design) + 1)]
     for k in range(repetitions):
         blocks = [order[k * n : (k + 1) * n] for order in every]
         assert all(sorted(block) == sorted(design.conditions) for block in blocks)
@@ -64,23 +71,23 @@ def test_no_condition_is_shown_twice_in_a_row_across_blocks(n: int) -> None:
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
 def test_pairs_are_seen_both_ways_round_equally_often_in_every_place(n: int) -> None:
     design = replace(design_of(n), task="pairwise")
-    assert rows(design) == n * (n - 1)
-    every = [orders(design, p) for p in range(1, rows(design) + 1)]
+    assert balanced_group_size(design) == n * (n - 1)
+    every = [orders(design, p) for p in range(1, balanced_group_size(design) + 1)]
     cells = Counter((i, one) for order in every for i, one in enumerate(order))
-    pairs = len(shown(design))
+    pairs = len(block_trials(design))
     assert len(cells) == pairs * pairs * 2 and set(cells.values()) == {1}
     for order in every:
         unordered = [frozenset(one.split(PAIR)) for one in order]
         assert len(set(unordered)) == pairs
     if n > 2:  # nobody could learn that the first is always the same one
-        assert all(len({one in shown(design) for one in order}) == 2 for order in every)
+        assert all(len({one in block_trials(design) for one in order}) == 2 for order in every)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_repeated_pairs_stay_balanced_and_one_pair_is_turned(n: int) -> None:
     design = replace(design_of(n, repetitions=3), task="pairwise")
-    every = [orders(design, p) for p in range(1, rows(design) + 1)]
-    pairs = len(shown(design))
+    every = [orders(design, p) for p in range(1, balanced_group_size(design) + 1)]
+    pairs = len(block_trials(design))
     for k in range(3):
         cells = Counter((i, o[k * pairs + i]) for o in every for i in range(pairs))
         assert set(cells.values()) == {1} and len(cells) == 2 * pairs * pairs
@@ -94,7 +101,7 @@ def test_the_participant_and_the_seed_decide_and_nothing_else() -> None:
     assert orders(design, 3) == orders(design, 3)
     assert len({orders(design, p) for p in range(1, 40)}) > 20
     assert orders(design_of(5, order="random", seed=5), 3) != orders(design, 3)
-    assert rows(design) == 1
+    assert balanced_group_size(design) == 1
     squares = {orders(design_of(4, seed=seed), 1) for seed in range(30)}
     assert len(squares) > 5, "which condition has which letter is drawn by the seed"
     with pytest.raises(ValueError, match="counted from 1"):

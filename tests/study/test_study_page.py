@@ -15,7 +15,7 @@ from page_at_the_door import fetch
 from study_at_the_page import CODE, EXPERIMENTER, PARTICIPANT, Pages, Tab, answers, serving
 
 from gazerig.features.study.design import Condition
-from gazerig.features.study.journal import NotKept
+from gazerig.features.study.journal import WriteFailed
 from gazerig.features.study.pages import server
 from gazerig.features.study.pages.study_files import FOLDER, HEADERS
 from gazerig.features.study.records import Closed, Consented, ItemAnswered, TrialBegan, TrialEnded
@@ -217,7 +217,7 @@ def test_what_the_disk_does_not_take_is_said_and_taken_when_it_can_be(
     before = pages.journal.records
 
     def full(records: object) -> None:
-        raise NotKept("/secret/default/P007: no space left on device")
+        raise WriteFailed("/secret/default/P007: no space left on device")
 
     with monkeypatch.context() as now:
         now.setattr(pages.journal, "write", full)

@@ -14,7 +14,7 @@ from page_layout import value, violations
 from shown_page import wait_for
 from study_at_the_page import CODE, Pages, Tab, serving
 
-from gazerig.features.study.journal import NotKept
+from gazerig.features.study.journal import WriteFailed
 from gazerig.features.study.records import AnswerValue, ItemAnswered, TrialBegan, TrialEnded
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 
@@ -204,7 +204,7 @@ def test_what_is_not_kept_is_said_and_goes_on_by_itself_on_a_phone(
     def full(records: object) -> None:
         nonlocal refusals
         refusals += 1
-        raise NotKept("no space left on device")
+        raise WriteFailed("no space left on device")
 
     with on_a_phone(desk) as tab:
         person = Participant(tab)

@@ -12,11 +12,11 @@ from gazerig.features.study.measures import measures
 from gazerig.features.study.power import (
     MOST,
     PowerQuestion,
-    by_formula,
-    claim,
-    joint,
+    joint_probabilities,
+    power_claim,
     power_of,
     sample_size,
+    sample_size_by_formula,
 )
 from gazerig.features.study.run.study_file import load_study
 from gazerig.features.study.simulation import differences, effect_of, shift_of
@@ -43,14 +43,14 @@ def test_the_claim_is_what_simulated_participants_give(
 
 
 def test_the_joint_chances_are_those_of_the_effect() -> None:
-    chances, points = joint(0.6, 5), np.arange(1, 6)
+    chances, points = joint_probabilities(0.6, 5), np.arange(1, 6)
     assert chances.sum() == pytest.approx(1.0, abs=1e-9)
     difference = points[:, None] - points[None, :]
     mean = (chances * difference).sum()
     spread = np.sqrt((chances * (difference - mean) ** 2).sum())
     assert mean / spread == pytest.approx(0.6, abs=2e-3)
     assert effect_of(shift_of(0.6, 5), 5) == pytest.approx(0.6, abs=1e-6)
-    assert joint(0.0, 5) == pytest.approx(joint(0.0, 5).T)
+    assert joint_probabilities(0.0, 5) == pytest.approx(joint_probabilities(0.0, 5).T)
 
 
 @pytest.mark.parametrize("test", DECIDING)
@@ -73,7 +73,7 @@ def test_continuous_answers_have_the_power_that_the_efficiency_says() -> None:
     assert power_of(replace(asked, effect=0.3 * np.sqrt(np.pi / 3)), 100) == pytest.approx(
         t_test, abs=0.02
     )
-    assert sample_size(asked, 0.8) == pytest.approx(by_formula(asked, 0.8), abs=3)
+    assert sample_size(asked, 0.8) == pytest.approx(sample_size_by_formula(asked, 0.8), abs=3)
 
 
 def test_ties_cost_power_and_more_participants_give_it() -> None:
@@ -82,7 +82,7 @@ def test_ties_cost_power_and_more_participants_give_it() -> None:
     by_effect = [power_of(replace(SIGNED, effect=d), 24) for d in (0.2, 0.4, 0.6, 0.8)]
     assert by_effect == sorted(by_effect)
     few = sample_size(SIGNED, 0.8)
-    assert few is not None and few >= by_formula(SIGNED, 0.8)
+    assert few is not None and few >= sample_size_by_formula(SIGNED, 0.8)
     assert power_of(SIGNED, few) >= 0.8
 
 
@@ -95,14 +95,14 @@ def test_a_sample_size_is_the_least_multiple_with_the_power(multiple: int) -> No
 
 def test_what_would_take_too_many_has_no_size() -> None:
     assert sample_size(replace(SIGNED, effect=0.05, points=0), 0.95) is None
-    assert by_formula(replace(SIGNED, effect=0.05), 0.95) > MOST
+    assert sample_size_by_formula(replace(SIGNED, effect=0.05), 0.95) > MOST
 
 
 @pytest.mark.parametrize("points", [5, 0])
 def test_the_rank_sum_test_has_the_power_of_its_swaps(points: int) -> None:
     rng = np.random.default_rng(2)
     if points:
-        cells = joint(0.6, 5)
+        cells = joint_probabilities(0.6, 5)
         drawn = rng.choice(25, (300, 20), p=(cells / cells.sum()).ravel()).astype(float)
         above, below = drawn // 5, drawn % 5
     else:
@@ -139,9 +139,9 @@ def test_a_hypothesis_gets_its_share_of_the_false_alarms() -> None:
     study = load_study("default_against_papers")
     known = measures(study.design, study.questionnaires)
     one = study.design.hypotheses[0]
-    found = claim(study.design, one, known[one.measure])
+    found = power_claim(study.design, one, known[one.measure])
     assert found.question.alpha == pytest.approx(0.05 / 4)
     assert found.participants == 42 and found.power >= 0.8
     assert found.needed is not None and found.needed <= 42 and found.needed % 6 == 0
     alone = replace(study.design, plan=replace(study.design.plan, correction="none"))
-    assert claim(alone, one, known[one.measure]).question.alpha == 0.05
+    assert power_claim(alone, one, known[one.measure]).question.alpha == 0.05

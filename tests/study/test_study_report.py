@@ -12,7 +12,11 @@ from math import nan
 import pytest
 from study_records import QUESTIONS, design, pairs, records
 
-from gazerig.features.study.analysis import StudyAnalysis, analysed, within_halves
+from gazerig.features.study.analysis import (
+    StudyAnalysis,
+    analyse_study,
+    within_participant_half_widths,
+)
 from gazerig.features.study.design import Condition, Hypothesis, StudyDesign, Trials
 from gazerig.features.study.participation import participation
 from gazerig.features.study.records import STEP_DEG, ItemAnswered, Opened, TrialEnded
@@ -34,7 +38,7 @@ def study(
         participation(records(of, k, population or Population(1.0)), of, QUESTIONS)
         for k in range(1, count + 1)
     ]
-    return analysed("mine", of, QUESTIONS, SHA, people)
+    return analyse_study("mine", of, QUESTIONS, SHA, people)
 
 
 def text_of(page: str) -> str:
@@ -178,7 +182,7 @@ def test_simulated_ones_do_not_count_beside_people() -> None:
     first = found[0][0]
     assert isinstance(first, Opened)
     found[0][0] = replace(first, simulated=False)
-    one = analysed("m", of, QUESTIONS, SHA, [participation(r, of, QUESTIONS) for r in found])
+    one = analyse_study("m", of, QUESTIONS, SHA, [participation(r, of, QUESTIONS) for r in found])
     assert [p.left_out for p in one.people] == ["", "simulated", "simulated", "simulated"]
     assert any("3 of 4 participants are simulated" in words for words in banners(one))
 
@@ -216,7 +220,7 @@ def test_remarks_are_shown_as_they_were_written() -> None:
         else r
         for r in records(of, 1)
     ]
-    one = analysed("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
+    one = analyse_study("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
     assert "It <b>stared</b>" in text_of(page_of(one))
 
 
@@ -237,7 +241,7 @@ def test_a_text_that_a_spreadsheet_would_run_is_written_as_text(text: str) -> No
         else replace(r, ms=-1.5) if isinstance(r, ItemAnswered) else r
         for r in records(of, 1)
     ]  # fmt: skip
-    one = analysed("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
+    one = analyse_study("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
     table = answers_csv(one)
     rows = list(csv.DictReader(StringIO(table, newline="")))
     assert len(rows) == 5 and rows[-1]["value"] == "'" + text.replace("\r", "\n")
@@ -247,7 +251,7 @@ def test_a_text_that_a_spreadsheet_would_run_is_written_as_text(text: str) -> No
 def test_what_was_not_answered_is_an_empty_cell() -> None:
     of = replace(design(), may_skip=True)
     found = [replace(r, value=None) if isinstance(r, ItemAnswered) else r for r in records(of, 1)]
-    one = analysed("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
+    one = analyse_study("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
     rows = list(csv.DictReader(answers_csv(one).splitlines()))
     assert {(row["value"], row["left_out"]) for row in rows} == {("", "not answered")}
 
@@ -294,7 +298,7 @@ def test_a_presentation_is_found_in_its_recording() -> None:
         if isinstance(r, TrialEnded) else r
         for r in records(of, 1)
     ]  # fmt: skip
-    one = analysed("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
+    one = analyse_study("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
     (row, *_) = csv.DictReader(trials_csv(one).splitlines())
     assert (row["recording"], row["from_s"], row["to_s"]) == (
         "run-01.mcap", "6828.507365", "6831.517",
@@ -323,4 +327,4 @@ def test_intervals_within_participants_are_those_of_morey() -> None:
 
     rows = np.array([[1.0, 2.0], [5.0, 7.0], [2.0, 5.0]])
     half = 4.302653 * 1.0 / np.sqrt(2) / np.sqrt(3)
-    assert within_halves(rows) == pytest.approx([half, half], rel=1e-5)
+    assert within_participant_half_widths(rows) == pytest.approx([half, half], rel=1e-5)

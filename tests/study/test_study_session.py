@@ -12,7 +12,7 @@ from gazerig.config.shipped import shipped_names
 from gazerig.features.study.answers import LONGEST_TEXT, WrongAnswer
 from gazerig.features.study.journal import read
 from gazerig.features.study.order import PAIR
-from gazerig.features.study.presenter import HeadLost, Presented
+from gazerig.features.study.presenter import HeadLost, PresentationData
 from gazerig.features.study.records import Closed, ItemAnswered, TrialBegan, TrialEnded
 from gazerig.features.study.run.study_file import LoadedStudy, load_questionnaire, load_study
 from gazerig.features.study.screens import (
@@ -220,8 +220,8 @@ class LosesHead:
         self._count += 1
         self._why = "servo 3 does not answer" if self._count in self._lost else ""
 
-    def end(self) -> Presented:
-        return Presented("run-01.mcap", (1.0, 2.0))
+    def end(self) -> PresentationData:
+        return PresentationData("run-01.mcap", (1.0, 2.0))
 
     def fault(self) -> str:
         return self._why

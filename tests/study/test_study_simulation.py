@@ -19,11 +19,11 @@ from gazerig.features.study.simulation import (
     TRIAL_SD,
     Population,
     SimulatedParticipant,
+    choice_probability,
     differences,
     effect_of,
     levels,
-    preference,
-    rated,
+    ratings_from_latent,
     shift_of,
 )
 from gazerig.features.study.statistics.ranks import exact_signed_rank
@@ -45,7 +45,7 @@ def test_means_of_scales_and_repetitions_have_it_too(items: int, repetitions: in
     for side in (0.5, -0.5):
         trial = rng.normal(0.0, TRIAL_SD, (people, repetitions, 1))
         item = rng.normal(0.0, ITEM_SD, (people, repetitions, items))
-        means.append(rated(own + trial + item + side * shift, 5).mean(axis=(1, 2)))
+        means.append(ratings_from_latent(own + trial + item + side * shift, 5).mean(axis=(1, 2)))
     found = means[0] - means[1]
     assert found.mean() / found.std() == pytest.approx(0.6, abs=0.025)
     assert effect_of(shift, 5, items, repetitions) == pytest.approx(0.6)
@@ -103,7 +103,7 @@ def test_choices_prefer_as_often_as_differences_are_positive() -> None:
     table = wins(measures(study, QUESTIONS)["choice.alive"], people, tuple(study.conditions))
     assert table.sum() == 300
     assert table[0, 1] / 300 == pytest.approx(stats.norm.cdf(0.6), abs=0.08)
-    assert preference(0.0) == 0.5
+    assert choice_probability(0.0) == 0.5
 
 
 def test_careless_and_hasty_ones_are_among_them_and_are_left_out() -> None:

@@ -12,7 +12,7 @@ from aiohttp import web
 
 from gazerig.features.study.answers import WrongAnswer
 from gazerig.features.study.design import StudyDesign
-from gazerig.features.study.journal import NotKept
+from gazerig.features.study.journal import WriteFailed
 from gazerig.features.study.pages.head_link import HeadLink
 from gazerig.features.study.pages.study_files import HEADERS
 from gazerig.features.study.screens import (
@@ -81,7 +81,7 @@ class ExperimenterLine:
         """Add the addresses that the page's scripts use."""
         self._opened_s = asyncio.get_running_loop().time()
         router.add_get("/rig/line", self._line)
-        router.add_post("/rig/ask", self._asked)
+        router.add_post("/rig/ask", self._handle_request)
 
     async def _line(self, request: web.Request) -> web.StreamResponse:
         """Send the state at every change and every second; receive stops."""
@@ -137,31 +137,31 @@ class ExperimenterLine:
         async for message in line:
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
-            status, text = await self._obey(from_browser(message.data, WHO))
+            status, text = await self._run_request(from_browser(message.data, WHO))
             async with asyncio.timeout(TAKES_S):
                 await line.send_str(json.dumps({"answer": status, "words": text}))
 
-    async def _asked(self, request: web.Request) -> web.Response:
+    async def _handle_request(self, request: web.Request) -> web.Response:
         async with asyncio.timeout(_READ_S):
             body = await request.read()
-        status, text = await self._obey(from_browser(body, WHO))
+        status, text = await self._run_request(from_browser(body, WHO))
         return web.Response(status=status, text=f"{text}\n" if text else None, headers=HEADERS)
 
-    async def _obey(self, asked: dict[str, object] | None) -> tuple[int, str]:
+    async def _run_request(self, asked: dict[str, object] | None) -> tuple[int, str]:
         """Run a request; return an HTTP status, and the reason of a refusal."""
         if asked is None:
             return 400, "not a JSON object that can be asked for"
         what, why = asked.get("do"), f"{asked.get('why', '')!s}".strip()[:_WORDS]
         try:
-            refused = await asyncio.to_thread(self._do, what, why)
-        except (WrongAnswer, NotKept) as error:
+            refused = await asyncio.to_thread(self._press_button, what, why)
+        except (WrongAnswer, WriteFailed) as error:
             return 409, str(error)
         except OSError as error:
             return 503, str(error)
         self._notify()
         return (503, refused) if refused else (204, "")
 
-    def _do(self, what: object, why: str) -> str:
+    def _press_button(self, what: object, why: str) -> str:
         """Press a button; return the reason of a refusal, "" on success."""
         match what:
             case "stop":

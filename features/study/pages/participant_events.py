@@ -27,7 +27,7 @@ class ParticipantEvent(msgspec.Struct, tag_field="do"):
         """Apply it to the session; on return it is on disk.
 
         Raises:
-            NotKept: it could not be written.
+            WriteFailed: it could not be written.
             WrongAnswer: it does not fit the page.
         """
         raise NotImplementedError
@@ -88,7 +88,7 @@ class _Withdraw(ParticipantEvent, tag="withdraw"):
 _DECODER = msgspec.json.Decoder(_Consent | _Next | _Begin | _FilmSeen | _Answers | _Withdraw)
 
 
-def event_of(body: bytes) -> ParticipantEvent:
+def parse_event(body: bytes) -> ParticipantEvent:
     """Return the event in a request of a browser.
 
     Raises:

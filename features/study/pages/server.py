@@ -16,13 +16,13 @@ from aiohttp.typedefs import Handler, Middleware
 
 from gazerig.features.study.answers import WrongAnswer
 from gazerig.features.study.design import StudyDesign
-from gazerig.features.study.journal import NotKept
+from gazerig.features.study.journal import WriteFailed
 from gazerig.features.study.pages.experimenter_line import ExperimenterLine
 from gazerig.features.study.pages.head_link import HeadLink, NoHead
 from gazerig.features.study.pages.participant_events import (
     Malformed,
     ParticipantEvent,
-    event_of,
+    parse_event,
 )
 from gazerig.features.study.pages.participant_page import Json, page_json
 from gazerig.features.study.pages.study_files import HEADERS, StudyFiles
@@ -160,10 +160,10 @@ class StudyServer:
         await runner.cleanup()
 
     def _app(self) -> web.Application:
-        app = web.Application(middlewares=[self._doorkeeper()], client_max_size=SENT_BYTES)
+        app = web.Application(middlewares=[self._access_middleware()], client_max_size=SENT_BYTES)
         app.router.add_get("/study/page", self._page)
-        app.router.add_get("/study/news", self._tell_news)
-        app.router.add_post("/study/done", self._done)
+        app.router.add_get("/study/news", self._stream_news)
+        app.router.add_post("/study/done", self._handle_event)
         app.router.add_get("/study/film/{token}", self._film)
         app.router.add_post("/study/film_failed", self._film_failed)
         StudyFiles(self._design.language).add_to(app.router)
@@ -171,7 +171,7 @@ class StudyServer:
         app.router.add_get("/{path:.*}", _nothing)
         return app
 
-    def _doorkeeper(self) -> Middleware:
+    def _access_middleware(self) -> Middleware:
         """Accept a request, redirect it to an address without token, or refuse it in one line."""
 
         @web.middleware
@@ -190,7 +190,7 @@ class StudyServer:
 
         return admit
 
-    def _shown(self) -> Json:
+    def _present_page(self) -> Json:
         """Return the present page."""
         name, screen = self._study_run.now()
         return {
@@ -201,23 +201,23 @@ class StudyServer:
     # --- the participant ----------------------------------------------------------------------
 
     async def _page(self, request: web.Request) -> web.Response:
-        return web.json_response(await asyncio.to_thread(self._shown), headers=HEADERS)
+        return web.json_response(await asyncio.to_thread(self._present_page), headers=HEADERS)
 
-    async def _done(self, request: web.Request) -> web.Response:
+    async def _handle_event(self, request: web.Request) -> web.Response:
         """Apply an event; answer with the next page."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
         try:
-            event = event_of(body)
+            event = parse_event(body)
         except Malformed as error:
             return web.Response(status=400, text=f"{error}\n", headers=HEADERS)
 
         try:
             async with self._one_at_a_time:
-                status, page = await asyncio.to_thread(self._take, event)
+                status, page = await asyncio.to_thread(self._apply_event, event)
         except WrongAnswer as error:
             return web.Response(status=400, text=f"{error}\n", headers=HEADERS)
-        except NotKept as error:
+        except WriteFailed as error:
             self._experimenter.trouble = str(error)
             self._wake()
             # An error of the disk may contain file names, which are not for participants.
@@ -227,16 +227,16 @@ class StudyServer:
         self._wake()
         return web.json_response(page, status=status, headers=HEADERS)
 
-    def _take(self, event: ParticipantEvent) -> tuple[int, Json]:
+    def _apply_event(self, event: ParticipantEvent) -> tuple[int, Json]:
         """Return 200 for an applied event, 409 if its page is over; and the present page."""
         if event.once != self._once:
             if event.page != self._study_run.now()[0]:
-                return 409, self._shown()
+                return 409, self._present_page()
             event.tell(self._study_run)
             self._once = event.once
-        return 200, self._shown()
+        return 200, self._present_page()
 
-    async def _tell_news(self, request: web.Request) -> web.StreamResponse:
+    async def _stream_news(self, request: web.Request) -> web.StreamResponse:
         """Send the name of the present page at every change, and every two seconds."""
         stream = web.StreamResponse(headers={**HEADERS, "Content-Type": "text/event-stream"})
         await stream.prepare(request)

@@ -98,7 +98,7 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
         facts=_facts(study), hypotheses=[_line(one, study) for one in study.decisions],
         tests=list(_tests(study)), forest=_forest(study) if study.decisions else None, sections=sections,
         choices=[_choice_section(one, study) for one in study.choices],
-        checks=[(_short(one, study), one.checks) for one in study.decisions if one.checks],
+        checks=[(_label(one, study), one.checks) for one in study.decisions if one.checks],
         left_out=[one for one in study.people if one.left_out], rows=_rows_left_out(study),
         remarks=study.remarks, plan=study.design.plan, rules=_rules(study),
         css=lambda fine: "pass" if fine else "uncertain", p=apa.chance, isfinite=isfinite,
@@ -106,7 +106,7 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
 
 
 def _forest(study: StudyAnalysis) -> StudyFigure:
-    names = [_short(one, study) for one in study.decisions]
+    names = [_label(one, study) for one in study.decisions]
     return StudyFigure(
         "Effects", figures.forest_png(study, names),
         "Squares: the effect of each hypothesis; lines: its 95 % interval. Right of zero lies what "
@@ -157,7 +157,7 @@ def _facts(study: StudyAnalysis) -> tuple[tuple[str, str], ...]:
         ("study", study.name),
         ("design (SHA-256)", f"{study.design_sha256}; all {len(people)} participants carry it"),
         ("participants", f"{len(people)} came, {len(study.counted)} count, {plan.participants} "
-                         f"were planned{_deleted(study.deleted)}"),
+                         f"were planned{_deletion_text(study.deleted)}"),
         ("from, to", f"{dates[0]}, {dates[-1]}" if dates else ""),
         ("conditions", "; ".join(f"{k}: {study.label(k)}" for k in design.conditions)),
         ("task", "each was rated" if design.task == "rating" else "one of two was chosen"),
@@ -182,7 +182,7 @@ def _switches(study: StudyAnalysis) -> list[tuple[str, str]]:
                          f"{len(known)} switches")]  # fmt: skip
 
 
-def _deleted(count: int) -> str:
+def _deletion_text(count: int) -> str:
     return f"; data of {count} more were deleted as they wished" if count else ""
 
 
@@ -209,7 +209,7 @@ def _rows_left_out(study: StudyAnalysis) -> list[tuple[str, int]]:
     return why.most_common()
 
 
-def _short(one: Decision, study: StudyAnalysis) -> str:
+def _label(one: Decision, study: StudyAnalysis) -> str:
     """Return a hypothesis as a label: "looked at: walk > centre"."""
     said = one.hypothesis
     return f"{apa.measure_words(one.measure)}: {said.better} > {said.than}"
@@ -237,7 +237,7 @@ def _tests(study: StudyAnalysis) -> Iterator[TestLine]:
 def _test_line(one: Decision, test: StatisticalTest, study: StudyAnalysis) -> TestLine:
     planned = test is one.test
     return TestLine(
-        _short(one, study), apa.TEST_NAMES[test.key], planned, apa.statistic(test),
+        _label(one, study), apa.TEST_NAMES[test.key], planned, apa.statistic(test),
         apa.chance(test.p),
         apa.chance(test.exact_p) if isfinite(test.exact_p) else Markup(""),
         apa.chance(one.corrected_p) if planned else Markup(""),
@@ -269,13 +269,13 @@ def _measure_section(one: MeasureSummary, study: StudyAnalysis) -> MeasureSectio
         drawn.append(StudyFigure("Answers", figures.counts_png([one], study), _COUNTS))
     drawn.append(StudyFigure("Participants and means", figures.paired_png(one, study), _PAIRED))
     rows = tuple(
-        (study.label(c.condition), str(c.n), _known(c.mean),
+        (study.label(c.condition), str(c.n), _number_text(c.mean),
          f"{number(c.low95)} to {number(c.high95)}" if isfinite(c.low95) else "",
-         _known(c.sd), _known(c.median))
+         _number_text(c.sd), _number_text(c.median))
         for c in one.conditions
     )  # fmt: skip
     title = apa.measure_words(measure)
-    return MeasureSection(title, _asked(one, study), tuple(facts), rows, tuple(drawn))
+    return MeasureSection(title, _question_text(one, study), tuple(facts), rows, tuple(drawn))
 
 
 _COUNTS = "How often each point was answered. The middle of the scale stands on the line."
@@ -285,11 +285,11 @@ _PAIRED = (
 )
 
 
-def _known(value: float) -> str:
+def _number_text(value: float) -> str:
     return f"{value:.2f}" if isfinite(value) else "unknown"
 
 
-def _asked(one: MeasureSummary | ChoiceSummary, study: StudyAnalysis) -> str:
+def _question_text(one: MeasureSummary | ChoiceSummary, study: StudyAnalysis) -> str:
     """Return the question in the study's language, or the source of the measure."""
     measure = one.measure
     if measure.kind == "objective":
@@ -314,5 +314,5 @@ def _choice_section(one: ChoiceSummary, study: StudyAnalysis) -> ChoiceSection:
         facts.append(f"{one.circles[0]} of {one.circles[1]} triples of conditions go in a circle")
     names = tuple(study.label(key) for key in keys)
     return ChoiceSection(
-        apa.measure_words(one.measure), _asked(one, study), tuple(facts), names, table
+        apa.measure_words(one.measure), _question_text(one, study), tuple(facts), names, table
     )

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
-from gazerig.features.study.analysis import StudyAnalysis, analysed
-from gazerig.features.study.collected import collected
+from gazerig.features.study.analysis import StudyAnalysis, analyse_study
+from gazerig.features.study.collected import collect_study
 from gazerig.features.study.data_folder import InterimLook, StudyData
 from gazerig.features.study.report.bids import StudyDataSet, write_study
 from gazerig.features.study.report.page import Progress, study_page
@@ -48,12 +48,12 @@ def write_report(data: Path, out: Path, made_by: str, utc: str, progress: Progre
             be written.
     """
     refuse_foreign_folder(out)
-    found = collected(data)
-    study = analysed(
+    found = collect_study(data)
+    study = analyse_study(
         found.name, found.design, found.questionnaires, found.design_sha256, found.people,
         len(found.deleted),
     )  # fmt: skip
-    study = with_looks(study, StudyData(data), utc)
+    study = add_interim_looks(study, StudyData(data), utc)
     page = study_page(study, made_by, progress)
     make_folder(out)
     for name, text in (
@@ -68,7 +68,7 @@ def write_report(data: Path, out: Path, made_by: str, utc: str, progress: Progre
     return StudyReport(study, out / PAGE, data_set)
 
 
-def with_looks(study: StudyAnalysis, data: StudyData, utc: str) -> StudyAnalysis:
+def add_interim_looks(study: StudyAnalysis, data: StudyData, utc: str) -> StudyAnalysis:
     """Return a study with its interim looks; record the present one if the sample is incomplete.
 
     Raises:

@@ -55,8 +55,8 @@ def _answer(one: Participation, row: AnswerRow, study: StudyAnalysis) -> list[ob
     pair = (first, second) if second else ("", "")
     rating = item.kind == "rating"
     return [
-        row.participant, _yes(one.simulated), row.trial, row.condition, *pair, row.questionnaire,
-        row.item, item.kind, item.scale, _yes(item.reverse) if rating else "",
+        row.participant, _yes_or_no(one.simulated), row.trial, row.condition, *pair, row.questionnaire,
+        row.item, item.kind, item.scale, _yes_or_no(item.reverse) if rating else "",
         item.points if rating else "", row.value, row.ms, row.utc, one.left_out or row.left_out,
     ]  # fmt: skip
 
@@ -73,7 +73,7 @@ def trials_csv(study: StudyAnalysis) -> str:
     )
     rows = (
         [
-            one.participant, _yes(one.simulated), t.trial, t.side, t.condition, t.attempts,
+            one.participant, _yes_or_no(one.simulated), t.trial, t.side, t.condition, t.attempts,
             t.outcome, t.seconds, t.utc, t.recording, t.from_s, t.to_s, t.reason,
             *(t.measured.get(name) for name in measured),
         ]
@@ -96,12 +96,12 @@ def results_json(study: StudyAnalysis) -> str:
             "left_out": {one.participant: one.left_out for one in study.people if one.left_out},
         },
         "interim_looks": [look._asdict() for look in study.looks],
-        "hypotheses": [_decided(one) for one in study.decisions],
+        "hypotheses": [_decision_json(one) for one in study.decisions],
     }
-    return json.dumps(_known(said), indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(_json_value(said), indent=1, ensure_ascii=False) + "\n"
 
 
-def _decided(one: Decision) -> dict[str, object]:
+def _decision_json(one: Decision) -> dict[str, object]:
     return {
         **asdict(one.hypothesis),
         "verdict": one.verdict,
@@ -121,12 +121,12 @@ def _test(test: StatisticalTest) -> dict[str, object]:
     return {**asdict(test), "effect": test.effect._asdict(), "deciding_p": test.deciding_p}
 
 
-def _known(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     """Return a value with null for NaN, which JSON does not have."""
     if isinstance(value, dict):
-        return {key: _known(one) for key, one in value.items()}
+        return {key: _json_value(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_known(one) for one in value]
+        return [_json_value(one) for one in value]
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
@@ -152,5 +152,5 @@ def as_text(value: str) -> str:
     return f"'{value}" if value.startswith(_FORMULAS) else value
 
 
-def _yes(value: bool) -> str:
+def _yes_or_no(value: bool) -> str:
     return "yes" if value else "no"

@@ -76,7 +76,7 @@ class HeadPictures:
         up_mm = shape.pitch_axis_height_mm + shape.eyes_above_mm
         middle = np.array([0.001 * shape.eyes_ahead_mm, 0.0, 0.001 * up_mm - _BELOW_EYES_M])
         self._p_m = np.array(p_viewer_m)
-        self._R, away_m = _looking(self._p_m, middle)
+        self._R, away_m = _camera_looking_at(self._p_m, middle)
         focal_px = _HEAD_SHARE * SIZE_PX * away_m / _HEAD_M
         self._lens = Intrinsics(focal_px, focal_px, 0.5 * (SIZE_PX - 1), 0.5 * (SIZE_PX - 1))
 
@@ -92,7 +92,7 @@ class HeadPictures:
         self._renderer.close()
 
 
-def _looking(p_m: Floats, at_m: Floats) -> tuple[Floats, float]:
+def _camera_looking_at(p_m: Floats, at_m: Floats) -> tuple[Floats, float]:
     """Return the rotation of a camera that looks at a point, optical axes, and its distance."""
     ahead = at_m - p_m
     away_m = float(np.linalg.norm(ahead))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gazerig.drivers.errors import DriverError
 from gazerig.features.study.pages.head_link import HeadReport
-from gazerig.features.study.presenter import HeadLost, Presented
+from gazerig.features.study.presenter import HeadLost, PresentationData
 from gazerig.features.study.run.head_process import HeadProcess
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.session import ShownTrial
@@ -75,13 +75,13 @@ class HeadPresenter:
         self._condition = shown.condition
         self._from_s = head.state().t_s
 
-    def end(self) -> Presented:
+    def end(self) -> PresentationData:
         """End the presentation; return its place in the recording."""
         try:
             to_s = nan if self.head is None else self.head.state().t_s
         except HeadLost:
             to_s = nan
-        return Presented(self._recording, (self._from_s, to_s))
+        return PresentationData(self._recording, (self._from_s, to_s))
 
     def fault(self) -> str:
         """Return why conditions cannot be shown, "" without a fault or a run."""
@@ -107,11 +107,11 @@ class HeadPresenter:
 
     def stop(self, why: str) -> str:
         """Switch its torque off; return the reason of a failure, "" on success."""
-        return self._asked(lambda head: head.client.stop(why))
+        return self._call_head(lambda head: head.client.stop(why))
 
     def resume(self) -> str:
         """Switch its torque on again; return the reason of a failure, "" on success."""
-        return self._asked(lambda head: head.client.resume(confirmed=True))
+        return self._call_head(lambda head: head.client.resume(confirmed=True))
 
     def close(self) -> None:
         """Park the head and end its process."""
@@ -126,7 +126,7 @@ class HeadPresenter:
         if head is not None:
             head.end()
 
-    def _asked(self, what: Callable[[HeadProcess], object]) -> str:
+    def _call_head(self, what: Callable[[HeadProcess], object]) -> str:
         head = self.head
         if head is None:
             return "the head does not run"
@@ -168,7 +168,7 @@ class HeadPresenter:
 
     def _watch(self) -> None:
         """Keep the report up to date; the target of the watching thread."""
-        judge = _Judge(self._clock)
+        judge = _HealthMonitor(self._clock)
         while not self._ended.wait(_LOOKS_S):
             head = self.head
             if head is None:
@@ -181,7 +181,7 @@ class HeadPresenter:
                 self._report = report
 
 
-class _Judge:
+class _HealthMonitor:
     """Derives a head's health from its newest ticks."""
 
     def __init__(self, clock: Clock) -> None:

@@ -45,10 +45,10 @@ class HeadProcess:
         try:
             self._process.stdin.write(as_line(options))
             self._process.stdin.flush()
-            self.client = self._connected()
+            self.client = self._connect()
         except (OSError, HeadLost) as error:
             self.end()
-            raise HeadLost(str(error) or self.last_words()) from error
+            raise HeadLost(str(error) or self.last_log_line()) from error
         except BaseException:
             self.end()
             raise
@@ -67,12 +67,12 @@ class HeadProcess:
         try:
             state, _ = self.client.state()
         except DriverError as error:
-            raise HeadLost(self.last_words() if not self.alive else str(error)) from error
+            raise HeadLost(self.last_log_line() if not self.alive else str(error)) from error
         if state is None:
             raise HeadLost("the head has not started to move")
         return state
 
-    def last_words(self) -> str:
+    def last_log_line(self) -> str:
         """Return the last line of its output."""
         with contextlib.suppress(OSError):
             lines = self._log.read_text(encoding="utf-8", errors="replace").split("\n")
@@ -95,13 +95,13 @@ class HeadProcess:
             self._process.kill()
             self._process.wait()
 
-    def _connected(self) -> RobotClient:
+    def _connect(self) -> RobotClient:
         """Wait until the head moves; return the connection to it."""
         end_s = self._clock.now_s() + _STARTS_S
         client: RobotClient | None = None
         while self._clock.now_s() < end_s:
             if not self.alive:
-                raise HeadLost(self.last_words())
+                raise HeadLost(self.last_log_line())
             try:
                 client = client or RobotClient.connect(self._process.pid, "the study")
                 if client.state()[0] is not None:
@@ -112,7 +112,7 @@ class HeadProcess:
                 client = None
             self._clock.sleep_until(self._clock.now_s() + _LOOKS_S)
         late = f"the head did not start to move within {_STARTS_S:g} s"
-        raise HeadLost(f"{late}: {self.last_words()}")
+        raise HeadLost(f"{late}: {self.last_log_line()}")
 
 
 def as_line(options: RunOptions) -> bytes:

@@ -10,9 +10,9 @@ from pathlib import Path
 import gazerig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.data_folder import StudyData, code_of
-from gazerig.features.study.journal import Journal, NotKept
+from gazerig.features.study.journal import Journal, WriteFailed
 from gazerig.features.study.pages.server import StudyServer
-from gazerig.features.study.participation import require_fit
+from gazerig.features.study.participation import check_records
 from gazerig.features.study.presenter import FilmPresenter
 from gazerig.features.study.records import Opened
 from gazerig.features.study.run.head_presenter import HeadPresenter
@@ -52,7 +52,7 @@ def utc_now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def opened_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str) -> Journal:
+def open_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str) -> Journal:
     """Return the journal of a participant who has not finished yet, for this design.
 
     Raises:
@@ -71,7 +71,7 @@ def opened_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str
                     f"{folder} was begun with another design ({one.design_sha256[:12]}; this one "
                     f"is {sha256[:12]}): begin a new study with --data NEW_FOLDER"
                 )
-        require_fit(journal.records, study.design, study.questionnaires, folder)
+        check_records(journal.records, study.design, study.questionnaires, folder)
     except SetupError:
         journal.close()
         raise
@@ -100,7 +100,7 @@ def run_session(
     study, data = plan.study, plan.data
     sha256 = data.claim(study.name, study.canonical)
     folder = data.participant(plan.number)
-    with opened_journal(study, data, plan.number, sha256) as journal:
+    with open_journal(study, data, plan.number, sha256) as journal:
         session = StudySession(
             study.design, study.questionnaires, plan.number, data.secret(), journal.records
         )
@@ -117,13 +117,13 @@ def run_session(
             lambda: finished.append("ended by the experimenter"), head,
         )  # fmt: skip
         try:
-            over = _ending(head, study, journal, folder, say)
+            over = _end_action(head, study, journal, folder, say)
             _open(server, plan)
             say(f"participant: {server.participant_url}")
             say(f"experimenter: {server.experimenter_url}")
             if browse is not None:
                 browse(server.participant_url)
-            why = _until_told(
+            why = _poll_until_stopped(
                 run, server, lambda: finished[0] if finished else stopped(), over, say, clock
             )
         finally:
@@ -143,7 +143,7 @@ def _head(
     return HeadPresenter(plan.study, plan.head, folder, session.agreed, clock)
 
 
-def _ending(
+def _end_action(
     head: HeadPresenter | None,
     study: LoadedStudy,
     journal: Journal,
@@ -157,11 +157,11 @@ def _ending(
     """
     if head is None:
         return lambda: None
-    from gazerig.features.study.run.trial_measures import measured  # 0.7 s of CPU time
+    from gazerig.features.study.run.trial_measures import measure_presentations  # 0.7 s of CPU time
 
     def over() -> None:
         head.close_head()
-        journal.write(measured(study, journal.records, folder, say))
+        journal.write(measure_presentations(study, journal.records, folder, say))
 
     return over
 
@@ -190,7 +190,7 @@ def _open(server: StudyServer, plan: SessionPlan) -> None:
         ) from error
 
 
-def _until_told(
+def _poll_until_stopped(
     run: StudyRun,
     server: StudyServer,
     told: Callable[[], str | None],
@@ -206,7 +206,7 @@ def _until_told(
     while (why := told()) is None:
         try:
             run.poll()
-        except NotKept as error:
+        except WriteFailed as error:
             if str(error) != said:
                 said = str(error)
                 say(said)

@@ -9,7 +9,7 @@ from gazerig.features.study.data_folder import StudyData, code_of
 from gazerig.features.study.journal import Journal
 from gazerig.features.study.presenter import FilmPresenter
 from gazerig.features.study.records import AnswerValue, Measured, TrialEnded
-from gazerig.features.study.run.participant import opened_journal
+from gazerig.features.study.run.participant import open_journal
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.screens import (
     ConsentScreen,
@@ -54,7 +54,7 @@ def simulate_study(
         )
     sha256 = data.claim(study.name, study.canonical)
     for number in range(1, count + 1):
-        with opened_journal(study, data, number, sha256) as journal:
+        with open_journal(study, data, number, sha256) as journal:
             _simulate(study, journal, number, population, sha256, data.secret())
         progress(number / count)
 

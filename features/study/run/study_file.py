@@ -15,7 +15,7 @@ from gazerig.config.schema import load_rig
 from gazerig.features.study.design import Condition, StudyDesign
 from gazerig.features.study.preregistration import canonical, design_sha256
 from gazerig.features.study.questionnaire import Questionnaire
-from gazerig.features.study.rules import asked_rules, design_rules, questionnaire_rules
+from gazerig.features.study.rules import consistency_rules, design_rules, questionnaire_rules
 from gazerig.features.study.shipped import HOME
 from gazerig.gaze.attention.top_down import PLANNED
 from gazerig.robot.model.commands import Value
@@ -62,13 +62,13 @@ class LoadedStudy:
             after: a condition of the same rig.
         """
         there = self.rig if before is None else self.rigs[before]
-        return _differing(there, self.rigs[after])
+        return _differences(there, self.rigs[after])
 
     def changes_of_own_rig(self, condition: str) -> dict[str, Value]:
         """Return a condition's changes to its own rig, profile and character, by dotted key."""
         one = self.design.conditions[condition]
         there = load_rig(one.rig or self.design.presentation.rig, one.character, one.profile)
-        return _differing(there, self.rigs[condition])
+        return _differences(there, self.rigs[condition])
 
     @cached_property
     def canonical(self) -> bytes:
@@ -91,7 +91,7 @@ class LoadedStudy:
         seen: dict[str, object] = {
             key: value for key, value in values(rig).items() if _section(key) in _GAZE
         }
-        for key, value in _differing(self.rig, rig).items():
+        for key, value in _differences(self.rig, rig).items():
             if _section(key) not in _MACHINE:
                 seen[key] = value
         for name in _ENDS:
@@ -116,8 +116,8 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
     folder = path.parent
     checks: list[Check[StudyDesign]] = [design_rules, partial(_asked_faults, folder)]
     checks += [partial(_rig_faults, folder)]
-    checks += [partial(_located, folder, check) for check in further]
-    design = _from_its_folder(load(path, StudyDesign, checks=checks), folder)
+    checks += [partial(_check_located, folder, check) for check in further]
+    design = _resolve_paths(load(path, StudyDesign, checks=checks), folder)
     files = (*design.questionnaires, *design.after)
     design = replace(
         design,
@@ -134,10 +134,10 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
     )
 
 
-def _located(
+def _check_located(
     folder: Path, check: Check[StudyDesign], raw: StudyDesign
 ) -> Iterable[tuple[str, str]]:
-    return check(_from_its_folder(raw, folder))
+    return check(_resolve_paths(raw, folder))
 
 
 def load_questionnaire(name_or_path: str) -> Questionnaire:
@@ -176,7 +176,7 @@ def _section(key: str) -> str:
     return key.partition(".")[0]
 
 
-def _differing(before: Rig, after: Rig) -> dict[str, Value]:
+def _differences(before: Rig, after: Rig) -> dict[str, Value]:
     """Return the changes from one rig to another, without names of files."""
     found = differences(before, after)
     return {key: value for key, value in found.items() if key not in _WHILE_READ}
@@ -195,11 +195,11 @@ def _is_path(name_or_path: str) -> bool:
     return "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
 
 
-def _from_its_folder(design: StudyDesign, folder: Path) -> StudyDesign:
+def _resolve_paths(design: StudyDesign, folder: Path) -> StudyDesign:
     """Return a design with paths relative to the working folder."""
 
     def found(name: str | None) -> str | None:
-        return name if name is None or not _is_path(name) else _beside(folder, name)
+        return name if name is None or not _is_path(name) else _resolve_path(folder, name)
 
     conditions = {
         key: replace(
@@ -207,8 +207,8 @@ def _from_its_folder(design: StudyDesign, folder: Path) -> StudyDesign:
             rig=found(one.rig),
             profile=found(one.profile),
             character=found(one.character),
-            recording=one.recording and _beside(folder, one.recording),
-            film=one.film and _beside(folder, one.film),
+            recording=one.recording and _resolve_path(folder, one.recording),
+            film=one.film and _resolve_path(folder, one.film),
         )
         for key, one in design.conditions.items()
     }
@@ -222,13 +222,13 @@ def _from_its_folder(design: StudyDesign, folder: Path) -> StudyDesign:
     )
 
 
-def _beside(folder: Path, name: str) -> str:
+def _resolve_path(folder: Path, name: str) -> str:
     return str(folder / Path(name).expanduser())
 
 
 def _asked_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
     """Yield unreadable questionnaires, and contradictions with the readable ones."""
-    design = _from_its_folder(raw, folder)
+    design = _resolve_paths(raw, folder)
     found: dict[str, Questionnaire] = {}
     for list_name in ("questionnaires", "after"):
         files = getattr(design, list_name)
@@ -236,22 +236,22 @@ def _asked_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
             try:
                 found[Path(file).stem] = load_questionnaire(file)
             except ConfigError as error:
-                yield from _here(f"{list_name}.{i}", error)
+                yield from _faults_at_key(f"{list_name}.{i}", error)
     keys = replace(
         design,
         questionnaires=tuple(Path(file).stem for file in design.questionnaires),
         after=tuple(Path(file).stem for file in design.after),
     )
-    yield from asked_rules(keys, found)
+    yield from consistency_rules(keys, found)
 
 
 def _rig_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
     """Yield conditions that cannot be shown at all, or on a running head, or are equal."""
-    design = _from_its_folder(raw, folder)
+    design = _resolve_paths(raw, folder)
     try:
         own: Rig | None = load_rig(design.presentation.rig)
     except ConfigError as error:
-        yield from _here("presentation.rig", error)
+        yield from _faults_at_key("presentation.rig", error)
         own = None
     rigs: dict[str, Rig] = {}
     for key, one in design.conditions.items():
@@ -265,7 +265,7 @@ def _rig_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
         yield from _file_faults(f"conditions.{key}", one)
         if own is not None:
             yield from _start_faults(design, key, own, rigs[key])
-    yield from _alike(design, rigs)
+    yield from _find_equal_conditions(design, rigs)
 
 
 def _condition_faults(at: str, one: Condition, error: ConfigError) -> Iterator[tuple[str, str]]:
@@ -304,7 +304,7 @@ def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator
     one = design.conditions[key]
     if one.rig is not None or design.presentation.on == "film":
         return
-    for name in _differing(own, rig):
+    for name in _differences(own, rig):
         when = live(name)
         if not when.startswith(NEXT_START):
             continue
@@ -319,12 +319,14 @@ def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator
         )
 
 
-def _alike(design: StudyDesign, rigs: Mapping[str, Rig]) -> Iterator[tuple[str, str]]:
+def _find_equal_conditions(
+    design: StudyDesign, rigs: Mapping[str, Rig]
+) -> Iterator[tuple[str, str]]:
     """Yield conditions that show the same as another one."""
     keys = [key for key in design.conditions if key in rigs]
     for i, key in enumerate(keys):
         for other in keys[:i]:
-            if _same(design, rigs, key, other):
+            if _show_same(design, rigs, key, other):
                 rule = (
                     f"cannot be told apart from {other!r}: both show the same; change a value of "
                     "one of them, or leave it out"
@@ -333,17 +335,17 @@ def _alike(design: StudyDesign, rigs: Mapping[str, Rig]) -> Iterator[tuple[str, 
                 break
 
 
-def _same(design: StudyDesign, rigs: Mapping[str, Rig], key: str, other: str) -> bool:
+def _show_same(design: StudyDesign, rigs: Mapping[str, Rig], key: str, other: str) -> bool:
     """Return whether two conditions show the same."""
     one, two = design.conditions[key], design.conditions[other]
     files = [(c.recording, c.film) for c in (one, two)]
     if any(file is not None for pair in files for file in pair):
         return files[0] == files[1]
     planned = [c.behaviour == PLANNED for c in (one, two)]
-    return planned[0] == planned[1] and not _differing(rigs[key], rigs[other])
+    return planned[0] == planned[1] and not _differences(rigs[key], rigs[other])
 
 
-def _here(key: str, error: ConfigError) -> Iterator[tuple[str, str]]:
+def _faults_at_key(key: str, error: ConfigError) -> Iterator[tuple[str, str]]:
     """Yield the faults of a file that a key names; for an unknown shipped name, the rule."""
     for fault in error.faults:
         yield key, fault.rule if fault.file.startswith("config/") else str(fault)

@@ -36,7 +36,7 @@ SWITCH_S = 0.5
 """Time before and after a switch in which steps of the joints belong to it, seconds."""
 
 
-def measured(
+def measure_presentations(
     study: LoadedStudy, records: Sequence[Record], folder: Path, say: Callable[[str], None]
 ) -> tuple[Measured, ...]:
     """Return the measures of presentations that have none yet.
@@ -62,7 +62,7 @@ def measured(
         ends = [one for one in wanted if one.recording == name]
         try:
             with used(folder / name):
-                runs = _cut(RunRecording(folder / name).ticks(), ends)
+                runs = _split_ticks(RunRecording(folder / name).ticks(), ends)
         except SetupError as error:
             say(str(error))
             continue
@@ -73,7 +73,7 @@ def measured(
     return tuple(found)
 
 
-def _cut(ticks: Iterator[Tick], ends: Sequence[TrialEnded]) -> list[list[Tick]]:
+def _split_ticks(ticks: Iterator[Tick], ends: Sequence[TrialEnded]) -> list[list[Tick]]:
     """Return the ticks of each presentation, and those shortly before it, in one pass."""
     cut: list[list[Tick]] = [[] for _ in ends]
     for tick in ticks:
@@ -88,7 +88,7 @@ def _values(names: Sequence[str], ticks: Sequence[Tick], from_s: float) -> dict[
     shown = [tick for tick in ticks if tick.t_s >= from_s]
     values = {STEP_DEG: largest_step_deg(ticks, from_s)}
     if any(name in GAZE_MEASURES for name in names):
-        gaze = participants_gaze(shown, from_s)
+        gaze = participant_gaze_measures(shown, from_s)
         values |= {name: gaze[name] for name in names if name in gaze}
     if others := [name for name in names if name not in GAZE_MEASURES]:
         building = GazeTraceBuilder()
@@ -110,7 +110,7 @@ def largest_step_deg(ticks: Sequence[Tick], from_s: float) -> float:
     return degrees(float(np.abs(np.diff(goals, axis=0)).max()))
 
 
-def participants_gaze(ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
+def participant_gaze_measures(ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
     """Return the measures of GAZE_MEASURES as shares of the time with a visible face.
 
     They are nan if no face was visible, or its gaze was never known.
@@ -124,7 +124,7 @@ def participants_gaze(ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
         known += 1
         if face.looks_at_head:
             looks += 1
-            both += _looked_at(tick, face)
+            both += _is_looking_at(tick, face)
             first_s = first_s if isfinite(first_s) else tick.t_s - from_s
     share = 1.0 / known if known else nan
     return {
@@ -141,7 +141,7 @@ def _participant(tick: Tick) -> Face | None:
     return min(faces, key=lambda face: norm(sub(face.p_world_m, head)), default=None)
 
 
-def _looked_at(tick: Tick, face: Face) -> bool:
+def _is_looking_at(tick: Tick, face: Face) -> bool:
     """Return whether the head's measured gaze is inside the oval of a face."""
     elapsed_s = max(0.0, tick.t_s - (tick.percept.captured_s if tick.percept is not None else 0.0))
     p_m = add(face.p_world_m, scale(face.v_world_m_s, elapsed_s))

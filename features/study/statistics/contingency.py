@@ -49,7 +49,7 @@ def chi_square(
     if dropped := table.shape[1] - kept.shape[1]:
         which = ", ".join(str(k + 1) for k in np.flatnonzero(table.sum(axis=0) == 0))
         notes.append(f"{dropped} of {table.shape[1]} columns are empty and dropped ({which})")
-    n, least = int(kept.sum()), _least(table.sum(axis=1))
+    n, least = int(kept.sum()), _least_probability(table.sum(axis=1))
     if kept.shape[1] < 2:
         nothing, same = no_effect("Cramér's V", "V"), (*notes, "all answers are the same")
         return StatisticalTest("chi_square", "χ²", 0.0, nan, 1.0, 1.0, least, n, nothing, same)
@@ -62,7 +62,7 @@ def chi_square(
     )  # fmt: skip
 
 
-def _least(rows: Counts) -> float:
+def _least_probability(rows: Counts) -> float:
     """Return the exact probability of rows that share no column, two columns in all."""
     n, first = int(rows.sum()), int(rows[0])
     # For rows of equal length the reversed table is as extreme.

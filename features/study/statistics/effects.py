@@ -30,7 +30,7 @@ def rank_biserial(differences: Floats, resamples: int = RESAMPLES) -> EffectSize
         differences: (n,) one per participant; zeros count for neither side.
         resamples: of the bootstrap.
     """
-    interval = bootstrapped([differences], matched_correlation, resamples)
+    interval = bootstrap_interval([differences], matched_correlation, resamples)
     value = float(matched_correlation(differences))
     return EffectSize("matched rank-biserial correlation", "r", value, *interval, _BCA)
 
@@ -56,7 +56,7 @@ def cliffs_delta(a: Floats, b: Floats, paired: bool, resamples: int = RESAMPLES)
         paired: the same participants in the same order gave both; they are resampled together.
         resamples: of the bootstrap.
     """
-    interval = bootstrapped([a, b], dominance, resamples, paired)
+    interval = bootstrap_interval([a, b], dominance, resamples, paired)
     return EffectSize("Cliff's delta", "δ", float(dominance(a, b)), *interval, _BCA)
 
 
@@ -77,7 +77,7 @@ def cohens_dz(differences: Floats, resamples: int = RESAMPLES) -> EffectSize:
         differences: (n,) one per participant.
         resamples: of the bootstrap.
     """
-    interval = bootstrapped([differences], standardised_mean, resamples)
+    interval = bootstrap_interval([differences], standardised_mean, resamples)
     value = float(standardised_mean(differences)) if len(differences) > 1 else nan
     return EffectSize("Cohen's d_z", "d_z", value, *interval, _BCA, bounded=False)
 
@@ -102,7 +102,7 @@ def kendalls_w(rows: Floats, resamples: int = RESAMPLES) -> EffectSize:
     def along(*samples: Floats, axis: int = -1) -> Floats:
         return concordance(np.moveaxis(np.stack(samples), 0, -1))
 
-    interval = bootstrapped(columns, along, resamples, paired=True)
+    interval = bootstrap_interval(columns, along, resamples, paired=True)
     return EffectSize("Kendall's W", "W", float(concordance(rows)), *interval, _BCA)
 
 
@@ -151,7 +151,7 @@ def _noncentrality(chi2: float, df: int, share: float) -> float:
     return float(optimize.brentq(lambda c: beyond(c) - share, 0.0, min(most, _MOST_NONCENTRAL)))
 
 
-def bootstrapped(
+def bootstrap_interval(
     samples: Sequence[Floats], figure: Along, resamples: int = RESAMPLES, paired: bool = False
 ) -> tuple[float, float]:
     """Return the 95 % BCa interval of a statistic, (nan, nan) if it is undefined.

@@ -4,7 +4,7 @@ from math import nan
 
 import numpy as np
 
-from gazerig.features.study.statistics.effects import bootstrapped
+from gazerig.features.study.statistics.effects import bootstrap_interval
 from gazerig.features.study.statistics.results import EffectSize
 from gazerig.gaze.types import Floats
 
@@ -23,7 +23,7 @@ def cronbachs_alpha(answers: Floats) -> EffectSize:
     def along(*items: Floats, axis: int = -1) -> Floats:
         return _alpha(np.stack(items))
 
-    interval = bootstrapped(list(rows.T), along, paired=True)
+    interval = bootstrap_interval(list(rows.T), along, paired=True)
     return EffectSize(name, "α", float(_alpha(rows.T)), *interval, "BCa bootstrap")
 
 
