@@ -86,8 +86,8 @@ def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolutio
         check(LookAt(point_m))
     except ValueError as error:
         raise Refused(str(error)) from None
-    found = _loaded(rig)
-    kinematics, oculomotor = _parts(found)
+    found = _load(rig)
+    kinematics, oculomotor = _gaze_parts(found)
     target = Target(point_m, (0.0, 0.0, 0.0), 0.0, "point", -1, 1.0, True, None, 1, "asked for")
     ranges = limits(found.joints)
     reply = look_reply(target, oculomotor, kinematics, ranges)
@@ -113,7 +113,7 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
         Refused: the rig has no such joint; the message lists its joints.
         ConfigError: the rig is invalid.
     """
-    kinematics, _ = _parts(_loaded(rig))
+    kinematics, _ = _gaze_parts(_load(rig))
     if strange := [name for name in joints_rad if name not in kinematics.names]:
         there = ", ".join(kinematics.names)
         raise Refused(f"this rig has no joint {strange[0]!r}; there is {there}")
@@ -131,12 +131,12 @@ def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
     )
 
 
-def _loaded(rig: Rig | str) -> Rig:
+def _load(rig: Rig | str) -> Rig:
     return load_rig(rig) if isinstance(rig, str) else rig
 
 
-def _parts(rig: Rig) -> tuple[Kinematics, Oculomotor]:
-    return _made(_RigKey(rig))
+def _gaze_parts(rig: Rig) -> tuple[Kinematics, Oculomotor]:
+    return _cached_parts(_RigKey(rig))
 
 
 class _RigKey:
@@ -153,5 +153,5 @@ class _RigKey:
 
 
 @lru_cache(maxsize=8)
-def _made(held: _RigKey) -> tuple[Kinematics, Oculomotor]:
-    return gaze_parts(held.rig, 0)
+def _cached_parts(key: _RigKey) -> tuple[Kinematics, Oculomotor]:
+    return gaze_parts(key.rig, 0)

@@ -90,12 +90,12 @@ class Head(ABC):
             Refused: the coordinates are not a point.
         """
         if frame == "head":
-            return self._give(LookAtInHead((x_m, y_m, z_m), self._who, self._stay, for_s))
+            return self._send(LookAtInHead((x_m, y_m, z_m), self._who, self._stay, for_s))
         if frame != "world":
             from gazerig.errors import Refused
 
             raise Refused(f"frame {frame!r}: expected world or head")
-        return self._give(LookAt((x_m, y_m, z_m), self._who, self._stay, for_s))
+        return self._send(LookAt((x_m, y_m, z_m), self._who, self._stay, for_s))
 
     def look_towards(
         self, yaw_deg: float, pitch_deg: float, *, frame: Frame = "world",
@@ -114,7 +114,7 @@ class Head(ABC):
             Refused: the angles are not a direction.
         """
         angles = (radians(yaw_deg), radians(pitch_deg))
-        return self._give(LookAtDirection(angles, frame, distance_m, self._who, self._stay, for_s))
+        return self._send(LookAtDirection(angles, frame, distance_m, self._who, self._stay, for_s))
 
     def look_at_person(self, id: int, *, for_s: float | None = None) -> Order:
         """Look at a person's face, part by part as people do, and follow it.
@@ -125,7 +125,7 @@ class Head(ABC):
             id: ``Person.id``.
             for_s: seconds until the order gives up control.
         """
-        return self._give(LookAtPerson(id, self._who, self._stay, for_s))
+        return self._send(LookAtPerson(id, self._who, self._stay, for_s))
 
     def look_at_pixel(
         self, x_px: float, y_px: float, *, distance_m: float | None = None,
@@ -142,13 +142,13 @@ class Head(ABC):
             for_s: seconds until the order gives up control.
         """
         pixel = (x_px, y_px)
-        return self._give(
+        return self._send(
             LookAtPixel(pixel, distance_m, captured_s, None, self._who, self._stay, for_s)
         )
 
     def look_freely(self) -> Order:
         """Let the head choose its targets again."""
-        return self._give(LookAt(None, self._who))
+        return self._send(LookAt(None, self._who))
 
     # Joints
 
@@ -163,11 +163,11 @@ class Head(ABC):
         Raises:
             Refused: the rig has no such joint, or the angle is outside its range.
         """
-        return self._give(Jog(((joint, radians(deg)),), self._who, self._stay, for_s))
+        return self._send(Jog(((joint, radians(deg)),), self._who, self._stay, for_s))
 
     def release_joints(self) -> Order:
         """Return all joints from ``jog`` to the control of gaze."""
-        return self._give(Jog((), self._who))
+        return self._send(Jog((), self._who))
 
     # Face and behaviour
 
@@ -182,7 +182,7 @@ class Head(ABC):
         Raises:
             Refused: the rig has no such gesture; the message lists its gestures.
         """
-        return self._give(Play(gesture, speed, times, self._who))
+        return self._send(Play(gesture, speed, times, self._who))
 
     def express(self, expression: str, strength: float = 1.0) -> Order:
         """Blend to an expression of the rig's table, and keep it.
@@ -191,7 +191,7 @@ class Head(ABC):
             expression: its name; "neutral" ends it.
             strength: 0 (no effect) .. 1 (as written).
         """
-        return self._give(Express(expression, strength))
+        return self._send(Express(expression, strength))
 
     def level(self, name: str, value: float) -> Order:
         """Set a level of the rig's table, such as the jaw's opening by loudness.
@@ -202,7 +202,7 @@ class Head(ABC):
             name: name of the level.
             value: 0..1.
         """
-        return self._give(SetLevel(name, value))
+        return self._send(SetLevel(name, value))
 
     def converse(self, mode: str) -> Order:
         """Look away and blink as speakers or listeners do.
@@ -213,7 +213,7 @@ class Head(ABC):
         Raises:
             Refused: the mode is unknown.
         """
-        return self._give(Ask("conversation", mode))
+        return self._send(Ask("conversation", mode))
 
     def behave(self, behaviour: str) -> Order:
         """Choose a behaviour of the rig's rules.
@@ -221,17 +221,17 @@ class Head(ABC):
         Raises:
             Refused: the rig has no such behaviour; the message lists its behaviours.
         """
-        return self._give(Ask("behaviour", behaviour))
+        return self._send(Ask("behaviour", behaviour))
 
     def wink(self, side: Literal["left", "right"]) -> Order:
         """Wink once with the head's own left or right eye."""
-        return self._give(Ask("lids", f"wink {side}"))
+        return self._send(Ask("lids", f"wink {side}"))
 
     # Stop
 
     def stop(self, why: str = "asked for by the program") -> Order:
         """Switch the torque off immediately, without parking; the program continues."""
-        order = self._give(Stop(why, self._who))
+        order = self._send(Stop(why, self._who))
         _ = order.reply  # wait until the torque is off
         return order
 
@@ -242,7 +242,7 @@ class Head(ABC):
             confirmed: a person has confirmed that no hand is in the mechanism; needed if another
                 person or program has stopped the head.
         """
-        order = self._give(Resume(self._who, confirmed))
+        order = self._send(Resume(self._who, confirmed))
         _ = order.reply
         return order
 
@@ -333,8 +333,8 @@ class Head(ABC):
                 yield event
             if timeout_s == 0.0:
                 return
-            self._pause(partial(self._happened, number), timeout_s or 3600.0)
-            if timeout_s is not None and not self._happened(number):
+            self._pause(partial(self._has_events, number), timeout_s or 3600.0)
+            if timeout_s is not None and not self._has_events(number):
                 return
 
     def sleep(self, seconds: float) -> None:
@@ -357,9 +357,9 @@ class Head(ABC):
             HeadEnded: the head has ended in the meantime.
         """
 
-    def _let_go(self) -> None:
+    def _release_control(self) -> None:
         """Let the head choose its targets again, without waiting for the reply."""
-        self._give(LookAt(None, self._who))
+        self._send(LookAt(None, self._who))
 
     def _states(self, every_s: float, seconds: float | None) -> Iterator[HeadState]:
         last_s, end_s = float("-inf"), float("inf")
@@ -374,7 +374,7 @@ class Head(ABC):
                 yield state
             self._pause(lambda: False, every_s)
 
-    def _happened(self, after: int) -> bool:
+    def _has_events(self, after: int) -> bool:
         return bool(self._events(after))
 
     @abstractmethod
@@ -382,7 +382,7 @@ class Head(ABC):
         """Return the stored events with numbers above ``after``."""
 
     @abstractmethod
-    def _give(self, command: Command) -> Order:
+    def _send(self, command: Command) -> Order:
         """Send a command to the head.
 
         Raises:

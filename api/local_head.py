@@ -61,7 +61,7 @@ class LocalHead(Head):
         """Return the newest tick of the control loop."""
         tick = self._feed.newest
         if tick is None:
-            self._running()
+            self._active_run()
             self._pause(lambda: self._feed.newest is not None, 10.0)
             tick = self._feed.newest
         if tick is None:
@@ -70,28 +70,28 @@ class LocalHead(Head):
 
     def get(self, prefix: str = "") -> Mapping[str, Value]:
         """Return the present values of all keys of the rig that start with a prefix."""
-        with _as_refused():
+        with _raising_refused():
             return self._params().get(prefix)
 
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Apply values at dotted keys from the next tick on, all of them or none."""
-        with _as_refused():
+        with _raising_refused():
             return self._params().set(changes)
 
     def save(self, path: Path | str | None = None) -> Path:
         """Write the present values into the rig's file, or into another one; return its path."""
         whole = None if path is None else Path(path).expanduser().absolute()
-        with _as_refused():
+        with _raising_refused():
             return self._params().save(whole).path
 
     def revert(self) -> tuple[str, ...]:
         """Restore the values of the rig's file; return a line for each change."""
-        with _as_refused():
+        with _raising_refused():
             return self._params().revert()
 
     def menus(self) -> Mapping[str, tuple[str, ...]]:
         """Return behaviours, conversation modes and lid states; the active one is the first."""
-        return self._running().made.robot.menus()
+        return self._active_run().made.robot.menus()
 
     def _progress(self) -> Progress:
         return self._feed.progress()
@@ -99,17 +99,17 @@ class LocalHead(Head):
     def _events(self, after: int) -> tuple[HeadEvent, ...]:
         return self._feed.events(after)
 
-    def _give(self, command: Command) -> Order:
-        robot = self._running().made.robot
+    def _send(self, command: Command) -> Order:
+        robot = self._active_run().made.robot
         try:
             ticket = robot.command(command)
         except ValueError as error:
             raise Refused(str(error)) from None
         order = Order(self, lambda: ticket.wait(0.0))
-        self._feed.follow(order._see)
+        self._feed.follow(order._update_outcome)
         return order
 
-    def _running(self) -> session.ComposedRun:
+    def _active_run(self) -> session.ComposedRun:
         """Return the run.
 
         Raises:
@@ -123,8 +123,8 @@ class LocalHead(Head):
         return self._composed
 
     def _params(self) -> ParamStore:
-        """Return the parameters of the run; raises as ``_running`` does."""
-        tuning = self._running().tuning
+        """Return the parameters of the run; raises as ``_active_run`` does."""
+        tuning = self._active_run().tuning
         assert tuning is not None, "only a run without a program has none"
         return tuning
 
@@ -158,9 +158,9 @@ class RunningHead(LocalHead):
         say: Callable[[str], None] | None = None,
     ) -> None:
         super().__init__(options, substitutes, say)
-        self._interrupts = Interrupts(also=self._abandoned, signals=False)
+        self._interrupts = Interrupts(also=self._abandonment_reason, signals=False)
         self._owner = threading.current_thread()
-        self._begun, self._over = threading.Event(), threading.Event()
+        self._started, self._finished = threading.Event(), threading.Event()
         self._failure: BaseException | None = None
         self._pid = os.getpid()
         self._clock = RealClock()
@@ -178,9 +178,9 @@ class RunningHead(LocalHead):
         SIGNALS.add(self)
         try:
             self._thread.start()
-            while not self._begun.wait(0.05) and not self._over.is_set():
+            while not self._started.wait(0.05) and not self._finished.is_set():
                 pass
-            if not self._begun.is_set():
+            if not self._started.is_set():
                 raise self._failure if self._failure is not None else HeadEnded(self._ended)
         except BaseException:
             self._close()
@@ -223,7 +223,7 @@ class RunningHead(LocalHead):
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self._clock.now_s() + seconds
         while not until():
-            self._running()
+            self._active_run()
             now_s = self._clock.now_s()
             if now_s >= end_s:
                 return
@@ -244,14 +244,14 @@ class RunningHead(LocalHead):
             ended = f"fault: {error}"
         finally:
             self._ended = ended
-            self._over.set()
+            self._finished.set()
 
     def _update(self, tick: Tick) -> None:
         self._feed.update(tick)
-        if not self._begun.is_set():
-            self._begun.set()
+        if not self._started.is_set():
+            self._started.set()
 
-    def _abandoned(self) -> str | None:
+    def _abandonment_reason(self) -> str | None:
         """Return why the block cannot end the head any more, None if it can."""
         if not threading.main_thread().is_alive():
             return "the end of the program"
@@ -267,9 +267,9 @@ class RunningHead(LocalHead):
         raised: BaseException | None = None
         # Not Thread.join: when a signal interrupts it, CPython up to 3.12 considers the thread
         # ended, and the interpreter exits while the head parks.
-        while self._thread.ident is not None and not self._over.is_set():
+        while self._thread.ident is not None and not self._finished.is_set():
             try:
-                self._over.wait()
+                self._finished.wait()
             except BaseException as error:  # from a signal handler of the program
                 raised = error
                 self._interrupts.request(_ENDED)
@@ -324,7 +324,7 @@ class SimulatedHead(LocalHead):
     @property
     def time_s(self) -> float:
         """Return the simulated time."""
-        return self._running().made.clock.now_s()
+        return self._active_run().made.clock.now_s()
 
     def step(self, seconds: float | None = None) -> None:
         """Let simulated time pass.
@@ -335,7 +335,7 @@ class SimulatedHead(LocalHead):
         Raises:
             HeadEnded: a fault has ended the head.
         """
-        made = self._running().made
+        made = self._active_run().made
         ticks = 1 if seconds is None else round(seconds * made.loop.rate_hz)
         for _ in range(ticks):
             self._tick()
@@ -363,7 +363,7 @@ class SimulatedHead(LocalHead):
             self._tick()
 
     def _tick(self) -> None:
-        self._running()
+        self._active_run()
         ended = self._loop.step()
         if ended is not None:
             self._ended = ended
@@ -371,7 +371,7 @@ class SimulatedHead(LocalHead):
 
 
 @contextlib.contextmanager
-def _as_refused() -> Any:
+def _raising_refused() -> Any:
     """Raise ``Refused`` when parameters refuse a request."""
     try:
         yield

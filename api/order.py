@@ -39,7 +39,7 @@ class OrderHost(Protocol):
         """
         ...
 
-    def _let_go(self) -> None:
+    def _release_control(self) -> None:
         """Let the head choose its targets again."""
         ...
 
@@ -59,15 +59,15 @@ class Order:
     """
 
     def __init__(
-        self, host: OrderHost, answered: Callable[[], CommandReply | None], within_s: float = 1.0
+        self, host: OrderHost, read_reply: Callable[[], CommandReply | None], within_s: float = 1.0
     ) -> None:
-        self._host, self._answered, self._within_s = host, answered, within_s
+        self._host, self._read_reply, self._within_s = host, read_reply, within_s
         self._reply: CommandReply | None = None
         self._outcome: Outcome | None = None
         self._why = ""
 
     def __repr__(self) -> str:
-        reply = self._taken_up()
+        reply = self._accepted_reply()
         said = "not accepted yet" if reply is None else reply.text()
         return f"<Order: {self._outcome or 'in progress'}; {said}>"
 
@@ -78,10 +78,10 @@ class Order:
         Raises:
             HeadEnded: the head has ended, or does not respond.
         """
-        reply = self._taken_up()
+        reply = self._accepted_reply()
         if reply is None:
-            self._host._pause(lambda: self._taken_up() is not None, self._within_s)
-            reply = self._taken_up()
+            self._host._pause(lambda: self._accepted_reply() is not None, self._within_s)
+            reply = self._accepted_reply()
         if reply is None:
             from gazerig.errors import HeadEnded
 
@@ -97,13 +97,13 @@ class Order:
     def outcome(self) -> Outcome | None:
         """Return how the order ended, None while it is in progress."""
         if self._outcome is None:
-            self._see(self._host._progress())
+            self._update_outcome(self._host._progress())
         return self._outcome
 
     @property
     def active(self) -> bool:
         """Return whether the order still controls gaze or joints."""
-        reply, lead = self._taken_up(), self._host._progress().lead
+        reply, lead = self._accepted_reply(), self._host._progress().lead
         return reply is not None and 0 < reply.lead == lead.number and lead.active
 
     @property
@@ -130,7 +130,7 @@ class Order:
     def end(self) -> None:
         """Give up control, if the order still has it."""
         if self.active:
-            self._host._let_go()
+            self._host._release_control()
 
     def __enter__(self) -> Self:
         """Return the order itself."""
@@ -145,16 +145,16 @@ class Order:
         """Give up control."""
         self.end()
 
-    def _see(self, now: Progress) -> bool:
+    def _update_outcome(self, now: Progress) -> bool:
         """Update from the newest owner and gesture; return whether the order has ended."""
-        reply = self._taken_up()
+        reply = self._accepted_reply()
         if reply is None or self._outcome is not None:
             return self._outcome is not None
         played = reply.gesture.number if reply.gesture is not None else 0
         if reply.refused:
             self._end("refused", reply.refused)
         elif played:
-            self._see_gesture(played, now.gesture)
+            self._update_from_gesture(played, now.gesture)
         elif reply.lead == 0:  # it takes no control: done as soon as accepted
             self._end("arrived", "")
         elif reply.error_rad > ARRIVED_RAD:
@@ -168,7 +168,7 @@ class Order:
             self._end("taken over", now.led or now.lead.ended)
         return self._outcome is not None
 
-    def _see_gesture(self, number: int, newest: GestureState) -> None:
+    def _update_from_gesture(self, number: int, newest: GestureState) -> None:
         if newest.number > number:
             self._end("taken over", f"another gesture: {newest.name or newest.ended}")
         elif newest.number == number and newest.ended:
@@ -180,7 +180,7 @@ class Order:
         self._why = why
         self._outcome = outcome
 
-    def _taken_up(self) -> CommandReply | None:
+    def _accepted_reply(self) -> CommandReply | None:
         if self._reply is None:
-            self._reply = self._answered()
+            self._reply = self._read_reply()
         return self._reply

@@ -92,7 +92,7 @@ class RemoteHead(Head):
     def _events(self, after: int) -> tuple[HeadEvent, ...]:
         return self._client.state(after)[1]
 
-    def _give(self, command: Command) -> Order:
+    def _send(self, command: Command) -> Order:
         try:
             reply = self._client.give(command)
         except RequestRejected as rejected:

@@ -37,11 +37,11 @@ from gazerig.testing.bus_bench import (
     BusBench,
     BusUnderTest,
     Fault,
-    InProcess,
+    InProcessBench,
     Wires,
     starts_of,
 )
-from gazerig.testing.bus_bench import in_process as bench_in_process
+from gazerig.testing.bus_bench import create_in_process_bench as bench_in_process
 
 PLACES: dict[str, dict[str, tuple[int, ...]]] = {
     "dynamixel": {"dynamixel": (0, 1, 2, 3)},
@@ -170,7 +170,7 @@ OF: dict[str, BusUnderTest] = {
 """Our kinds by the names of ``PLACES``."""
 
 
-def in_process(kind: str) -> InProcess:
+def in_process(kind: str) -> InProcessBench:
     """Make a kind's bench in this process, on a clock that waiting moves."""
     return bench_in_process(OF, PLACES[kind])
 

@@ -265,7 +265,7 @@ def starts_of(kind: BusUnderTest, places: Sequence[int]) -> dict[int, float]:
     return {s.id: kind.low + SHARES[p % 4] * (kind.high - kind.low) for p, s in setups.items()}
 
 
-class InProcess(NamedTuple):
+class InProcessBench(NamedTuple):
     """A bench in this process, with its devices and all bytes that were sent to them."""
 
     bench: BusBench
@@ -273,9 +273,9 @@ class InProcess(NamedTuple):
     sent: list[bytes]
 
 
-def in_process(
+def create_in_process_bench(
     kinds: Mapping[str, BusUnderTest], places: Mapping[str, tuple[int, ...]]
-) -> InProcess:
+) -> InProcessBench:
     """Return a bench in this process, on a clock that advances only by waiting."""
     now = [50.0]
 
@@ -299,10 +299,10 @@ def in_process(
         return devices[name].faults.command(text)
 
     wires = Wires(ports, lambda: now[0], wait, command)
-    return InProcess(BusBench(kinds, places, wires, patient=False), devices, sent)
+    return InProcessBench(BusBench(kinds, places, wires, patient=False), devices, sent)
 
 
-def holding(bench: BusBench) -> Iterator[ServoBus]:
+def held_bus(bench: BusBench) -> Iterator[ServoBus]:
     """Yield a bus that holds every servo in its position; release it afterwards."""
     bench.pulses_on()
     bus = bench.bus()

@@ -59,7 +59,7 @@ class BusLossSuite(BusBenches):
         assert readings[place] is None
         assert held_here.health().errors["timeout"] >= 1
         here.until(
-            held_here, lambda r: _says(held_here, here, place, "does not answer"), here.starts()
+            held_here, lambda r: _reports(held_here, here, place, "does not answer"), here.starts()
         )
         here.command("clear", here.on[place])
         here.until(held_here, well, here.starts())
@@ -81,7 +81,7 @@ class BusLossSuite(BusBenches):
             assert all(readings[p] is not None for p in rest)
             twin.wait(0.01)
         twin.command("plug", name)
-        rearmed = _until_back(twin, held, gone)
+        rearmed = _run_until_recovered(twin, held, gone)
         assert sorted(rearmed) == sorted(gone)
         assert twin.near([twin.truth()[p] for p in gone], [twin.starts()[p] for p in gone])
         told = held.events()
@@ -90,7 +90,7 @@ class BusLossSuite(BusBenches):
 
     def test_a_port_that_stays_away_is_given_up_and_told_at_release(self, another):
         for name in another().bench.buses:
-            _given_up(another().bench, name)
+            _expect_give_up(another().bench, name)
 
     def test_no_read_takes_long_while_nobody_answers(self, here):
         here.pulses_on()
@@ -118,7 +118,7 @@ class BusLossSuite(BusBenches):
         struck = struck if here.is_board(place) else [place]
         here.run(held_here, 0.2, here.starts())
         here.strike("brown-out", place)
-        rearmed = _until_back(here, held_here, struck)
+        rearmed = _run_until_recovered(here, held_here, struck)
         assert sorted(rearmed) == struck
         assert all(here.holding())
         told = held_here.events()
@@ -136,7 +136,7 @@ class BusLossSuite(BusBenches):
         bus.open()
         bus.enable_torque()
         here.run(bus, 0.3, here.starts())
-        _befall(here, bus, befalls)
+        _apply_fault(here, bus, befalls)
         before_s, before = here.now_s(), here.steps(here.truth())
         for _ in range(30):
             here.run(bus, 0.0, [0.95] * here.count)
@@ -177,13 +177,13 @@ class BusLossSuite(BusBenches):
         bus.close()
 
 
-def _says(bus, twin, place, what):
+def _reports(bus, twin, place, what):
     """Return whether the bus reports an event of a servo under its joint's name."""
     who = servo_label(twin.setups[place])
     return any(line.startswith(who) and what in line for line in bus.events())
 
 
-def _until_back(twin, bus, gone):
+def _run_until_recovered(twin, bus, gone):
     """Tick until all hold again, with distant goals until a servo reports its position."""
     goals, rearmed = [0.9] * twin.count, []
     before = twin.truth()
@@ -206,7 +206,7 @@ def _until_back(twin, bus, gone):
     return rearmed
 
 
-def _given_up(here, name):
+def _expect_give_up(here, name):
     here.pulses_on()
     bus = here.bus(give_up_s=1.0)
     bus.open()
@@ -228,7 +228,7 @@ def _given_up(here, name):
     bus.close()
 
 
-def _befall(here, bus, what):
+def _apply_fault(here, bus, what):
     """Apply a fault to all servos while they hold, until all hold again."""
     if what == "unplug":
         here.command("unplug for 0.2")

@@ -15,7 +15,14 @@ from hypothesis import strategies as st
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.types import ServoBus
-from gazerig.testing.bus_bench import PLACES, BusBench, BusUnderTest, InProcess, holding, in_process
+from gazerig.testing.bus_bench import (
+    PLACES,
+    BusBench,
+    BusUnderTest,
+    InProcessBench,
+    create_in_process_bench,
+    held_bus,
+)
 from gazerig.testing.rows import present, rows, well
 
 ANY = st.integers(-(2**40), 2**40) | st.floats(allow_nan=True, allow_infinity=True)
@@ -31,14 +38,14 @@ class BusBenches:
     under_test: BusUnderTest | None = None
 
     @pytest.fixture
-    def another(self) -> Callable[[], InProcess]:
+    def another(self) -> Callable[[], InProcessBench]:
         """Return a function that creates another bench in this process."""
         kind = self.under_test
         assert kind is not None, "set under_test, or define your own fixture another"
-        return lambda: in_process({kind.name: kind}, {kind.name: PLACES})
+        return lambda: create_in_process_bench({kind.name: kind}, {kind.name: PLACES})
 
     @pytest.fixture
-    def here(self, another: Callable[[], InProcess]) -> BusBench:
+    def here(self, another: Callable[[], InProcessBench]) -> BusBench:
         """Return a bench in this process: for long tests, and for tests that need no terminal."""
         return another().bench
 
@@ -50,12 +57,12 @@ class BusBenches:
     @pytest.fixture
     def held(self, twin: BusBench) -> Iterator[ServoBus]:
         """Return the bus of ``twin``, which holds every servo in its position."""
-        yield from holding(twin)
+        yield from held_bus(twin)
 
     @pytest.fixture
     def held_here(self, here: BusBench) -> Iterator[ServoBus]:
         """Return the bus of ``here``, which holds every servo in its position."""
-        yield from holding(here)
+        yield from held_bus(here)
 
 
 class BusSuite(BusBenches):
@@ -115,7 +122,9 @@ class BusSuite(BusBenches):
         here.run(bus, 0.3, wanted)
         assert here.near(here.truth(), wanted)
         told = bus.events()
-        limp = [line for line in told if "had no pulses: they move to their goals immediately" in line]
+        limp = [
+            line for line in told if "had no pulses: they move to their goals immediately" in line
+        ]
         assert len(limp) == any(hobby)
         for place, setup in enumerate(here.setups):
             assert not any(hobby) or hobby[place] == (servo_label(setup) in limp[0])

@@ -103,7 +103,7 @@ class FaultOutcome(NamedTuple):
         return self.end in ("came back", "left, named")
 
 
-class Broken(AssertionError):
+class RuleViolation(AssertionError):
     """A servo broke a rule."""
 
 
@@ -222,10 +222,10 @@ class Machine:
         self.longest_s = max(self.longest_s, self.clock.now_s() - t_s)
         desired = tuple(self.desired(t_s))
         verdict = self.guard.check(desired, joints, 0.0, t_s)
-        self._judge_command(verdict.command_rad, joints.rearmed, t_s)
+        self._check_command(verdict.command_rad, joints.rearmed, t_s)
         self.body.write(verdict.command_rad)
         self.said += self.body.bus.events()
-        true = self._judge_servos()
+        true = self._check_servos()
         self.heard = tuple(
             name not in joints.missing and joints.torque[i] for i, name in enumerate(self.names)
         )
@@ -236,7 +236,7 @@ class Machine:
             for i in range(len(self.names))
         )
 
-    def _judge_command(self, command: Sequence[float], rearmed: Sequence[bool], t_s: float) -> None:
+    def _check_command(self, command: Sequence[float], rearmed: Sequence[bool], t_s: float) -> None:
         """Check range, speed and acceleration of commands, except after a joint restarted."""
         dt_s = t_s - self._last_s
         # No goal came meanwhile, and servos braked: the guard may restart from there.
@@ -245,18 +245,18 @@ class Machine:
         for i, limit in enumerate(self.limits):
             low, high, top, hard = limit[:4]
             if not low - 1e-6 <= command[i] <= high + 1e-6:
-                raise Broken(f"{self.names[i]} was commanded to {command[i]:.4f} rad")
+                raise RuleViolation(f"{self.names[i]} was commanded to {command[i]:.4f} rad")
             speed = (command[i] - self._command[i]) / dt_s
             if rearmed[i]:
                 speed = 0.0
             elif abs(speed) > top + 1e-6:
-                raise Broken(f"{self.names[i]} was commanded at {speed:.3f} rad/s")
+                raise RuleViolation(f"{self.names[i]} was commanded at {speed:.3f} rad/s")
             else:
                 # The position and speed at which it restarted are unknown here.
                 steps = 2.0 if self._began[i] else 1.0
                 most = steps * hard * max(dt_s, self._dt_s) * 1.001 + 1e-6
                 if not late and abs(speed - self._speed[i]) > most:
-                    raise Broken(
+                    raise RuleViolation(
                         f"{self.names[i]} was commanded with {speed - self._speed[i]:.3f} rad/s"
                     )
             self._command[i], self._speed[i] = command[i], speed
@@ -266,7 +266,7 @@ class Machine:
     _dt_s = 0.0
     _late = False
 
-    def _judge_servos(self) -> list[float]:
+    def _check_servos(self) -> list[float]:
         """Check that servos are in their range and not faster than allowed."""
         now_s, true = self.clock.now_s(), self.true_rad()
         dt_s = now_s - self._true_s
@@ -276,7 +276,7 @@ class Machine:
             if self._kinds[i] in HOBBY_KINDS:
                 took_s = max(dt_s, 0.01)  # a board updates its channels at this interval
             if goal is not None and not setup.min_steps <= goal <= setup.max_steps:
-                raise Broken(f"{name}'s servo has goal {goal}")
+                raise RuleViolation(f"{name}'s servo has goal {goal}")
             room = self.room_rad + (GIVES_RAD if self._loaded else 0.0)
             inside = limit.low_rad - room <= true[i] <= limit.high_rad + room
             if goal is None and self._loaded:
@@ -286,11 +286,11 @@ class Machine:
             if i in self._fallen:
                 continue
             if not inside:
-                raise Broken(f"{name} is at {true[i]:.4f} rad")
+                raise RuleViolation(f"{name} is at {true[i]:.4f} rad")
             if moved > self._gentle_rad_s * took_s + 1e-4:
                 self._fast_s[i] = now_s
             if not self.own_speed and moved > FAST * limit.speed_rad_s * took_s + 0.01:
-                raise Broken(f"{name} moved {moved:.4f} rad in {dt_s * 1e3:.1f} ms")
+                raise RuleViolation(f"{name} moved {moved:.4f} rad in {dt_s * 1e3:.1f} ms")
         self._true, self._true_s = true, now_s
         return true
 
@@ -328,9 +328,9 @@ class Machine:
                 break
         after_s = self.clock.now_s() - end_s
         said = (*self.said, *self.body.bus.faults())
-        return FaultOutcome(self._ended(well, said), after_s, self.longest_s, said)
+        return FaultOutcome(self._end_state(well, said), after_s, self.longest_s, said)
 
-    def _ended(self, well: Sequence[bool], said: Sequence[str]) -> str:
+    def _end_state(self, well: Sequence[bool], said: Sequence[str]) -> str:
         if all(well):
             return "came back"
         for i, name in enumerate(self.names):

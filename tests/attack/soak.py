@@ -33,7 +33,7 @@ from gazerig.drivers.errors import DriverError  # noqa: E402
 from gazerig.robot.model.types import JointState  # noqa: E402
 from gazerig.sim_mock.smart_servo.chain import ServoChain  # noqa: E402
 from gazerig.testing import struck_machine  # noqa: E402
-from gazerig.testing.struck_machine import NEAR_RAD, ROOM_RAD, Broken, Case, Machine  # noqa: E402
+from gazerig.testing.struck_machine import NEAR_RAD, ROOM_RAD, Case, Machine, RuleViolation  # noqa: E402
 
 SEEN_RAD = 0.004
 ROOM_C, ROOM_V = 2.0, 0.15
@@ -219,7 +219,7 @@ def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> 
                     print(f"{watch.where}: {outcome.end}", flush=True)
                 if outcome.end != "came back":
                     break  # a person has to help: another machine
-        except Broken as broken:
+        except RuleViolation as broken:
             counts["outside"] += 1
             print(f"{watch.where}: {broken}", flush=True)
         except DriverError as error:
