@@ -15,7 +15,7 @@ _HEAD = """# Every parameter of a rig
 Written by `python docs/make_parameters.py` from the declarations in the code, the same that the loader,
 the page and `gazerig ctl set` read. A star stands for a name that you choose: a joint's, a rule's, a bus's.
 A default is the program's own; the shipped rigs and profiles set their values over it, and a dash
-means that a rig file must give one. [tuning.md](tuning.md) says how to change them while the head moves
+means that a rig file must give one. [tuning.md](tuning.md) describes how to change them while the head moves
 and how to add one.
 """
 
@@ -23,16 +23,19 @@ and how to add one.
 def text() -> str:
     """Return the whole page."""
     parts = [_HEAD]
-    for title, rows in _sections(Rig, ""):
-        parts.append(
-            f"\n## {title or 'rig'}\n\n| key | default | unit, range | what it is |\n|---|---|---|---|\n"
-        )
-        parts += rows
+    listed: dict[type, str] = {}
+    for title, params, rows in _sections(Rig, ""):
+        parts.append(f"\n## {title or 'rig'}\n\n")
+        same = listed.setdefault(params, title)
+        if same != title:
+            parts.append(f"The keys of {same}.\n")
+        else:
+            parts += ["| key | default | unit, range | meaning |\n|---|---|---|---|\n", *rows]
     return "".join(parts)
 
 
-def _sections(params: type, above: str) -> Iterator[tuple[str, list[str]]]:
-    """Return the rows of a section and those of the sections in it, from the top."""
+def _sections(params: type, above: str) -> Iterator[tuple[str, type, list[str]]]:
+    """Return each section with its type and its rows, from the top."""
     nested: list[tuple[str, type]] = []
     rows: list[str] = []
     defaults = {f.name: _default(f) for f in fields(params)}
@@ -48,7 +51,7 @@ def _sections(params: type, above: str) -> Iterator[tuple[str, list[str]]]:
                 f"| `{name}` | {defaults[name]} | {_limits(shape)} | {_cell(shape.description)} |\n"
             )
     if rows:
-        yield above, rows
+        yield above, params, rows
     for key, inside in nested:
         yield from _sections(inside, key)
 
