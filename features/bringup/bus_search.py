@@ -1,19 +1,19 @@
-"""Who is on a port, whatever its kind; nothing is changed and nothing moves.
+"""Search for servos and boards of any kind on a port; nothing is changed and nothing moves.
 
 Why the order is as it is, and what is sent at all:
 
-- To a Maestro every byte from 80 on is a command, and FF is one that moves a servo (FF,
-  channel, target), with which packets of the servos begin. So a port of Pololu's is asked
-  as a Maestro only, and every other port is asked as one first. What a Maestro is asked
-  holds no FF, so no servo can take it for the head of a packet. Where one answers nothing
-  else is sent.
+- To a Maestro every byte from 80 on is a command, and FF moves a servo (FF, channel,
+  target). Packets of smart servos begin with FF. So a port of Pololu's is searched for a
+  Maestro only, and every other port is searched for one first. Queries to a Maestro
+  contain no FF, so no servo can take them for the head of a packet. After an answer of a
+  Maestro nothing else is sent.
 - Dynamixel servos heed FF FF FD 00, STS servos FF FF, an id and a length of 2 or more. To
   an STS a Dynamixel packet is one with the id 253 and the length 0, which is none; to a
   Dynamixel an STS packet has no 00 behind FD, or no FD. Even servos that took one for the
   other would be pinged or read only: nothing else is ever sent here.
 
-A board that hears the line but cannot answer on it (one wire, a rate that is not asked)
-is not found out: with such a one on the line name the kind that is meant.
+A board that receives the line but cannot answer (one wire, a rate that is not searched) is
+not detected: with such a board on the line, name the kind of servo.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -42,11 +42,11 @@ RATES: Mapping[BusKind, Sequence[int]] = {
 
 @dataclass(frozen=True)
 class SearchRound:
-    """What asking one kind at one baud rate has brought.
+    """Result of the search for one kind at one baud rate.
 
     possible: the adaptor can run at it; junk: bytes that made no sense
     shared: ids that two servos seem to have; protocol_1: ids that answer to the old protocol
-    board: a Maestro; channels: how many it has, None where that is not known
+    board: a Maestro; channels: how many it has, None if unknown
     """
 
     kind: BusKind
@@ -68,10 +68,10 @@ class SearchRound:
 def plan(
     usb: str, kinds: Sequence[BusKind], rates: Sequence[int] | None
 ) -> tuple[tuple[BusKind, int], ...]:
-    """Return which kinds to ask at which rates, in order.
+    """Return the kinds and rates to search, in order.
 
-    usb: vendor and product id of the port, "" where it has none
-    kinds: those to ask; rates: likewise, None for all
+    usb: vendor and product id of the port, "" if it has none
+    kinds, rates: those to search; None: all rates
     """
     if usb.startswith(POLOLU):
         return (("maestro", BOARD_RATES[0]),) if "maestro" in kinds else ()
@@ -94,7 +94,7 @@ def search(
 ) -> Iterator[SearchRound]:
     """Search with one kind of bus after the other; end after the first kind that replied.
 
-    asked: as ``plan`` gives it
+    asked: result of ``plan``
     thorough: wait long for Dynamixel servos, ask each STS id even if no servo answers a
         broadcast ping
     to_the_end: servos of a kind do not end it, as a line can carry two kinds; a board does

@@ -1,7 +1,7 @@
-"""One channel of a board led slowly from place to place, for a person to see which servo moves.
+"""Slow motion of one channel of a board, so that a person sees which servo moves.
 
 A first pulse cannot be slowed down: a servo without pulses goes there at once, at its own
-speed. From then on it is led slowly. The pulses end with the walk, whatever happens.
+speed. From then on it moves slowly. The pulses end with the walk, whatever happens.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -34,7 +34,7 @@ MOST_TRIES = 10
 
 
 class ChannelPosition(NamedTuple):
-    """A place that a channel was sent to, and where the board's pulse ended, in steps."""
+    """A commanded place of a channel, and the board's pulse at the end, in steps."""
 
     asked: int
     got: int
@@ -47,7 +47,7 @@ def walk(
     sleep_until: Callable[[float], None],
     speed_steps_s: float = SLOW_STEPS_S,
 ) -> tuple[ChannelPosition, ...]:
-    """Lead a channel to places, the first at once, the others slowly; the pulses are off then.
+    """Move a channel to places, the first at once, the others slowly; then stop the pulses.
 
     Args:
         board: its port is open.
@@ -65,16 +65,22 @@ def walk(
         max_speed_steps_s=speed_steps_s, max_accel_steps_s2=None, rest_steps=places[0]
     )
     gone: list[ChannelPosition] = []
+    now_s = board.line.port.now_s
     with given(board, slow) as channel:
         start = round(channel.ramp.pulse_steps)
         for nth, asked in enumerate(places):
-            channel.aim(channel.clip(asked), board.line.port.now_s())
+            channel.aim(channel.clip(asked), now_s())
             board.send_goals([channel])
-            way_s = abs(asked - start) / speed_steps_s + SETTLE_S
-            start = _arrived(board, channel, asked, way_s, sleep_until)
+            takes_s = abs(asked - start) / speed_steps_s + SETTLE_S
+            until_s = now_s() + takes_s + LATE_S
+            start = _led(board, channel, sleep_until)
+            while abs(start - asked) > FINE_STEPS and now_s() < until_s:
+                start = _led(board, channel, sleep_until)
             gone.append(ChannelPosition(asked, start))
-            if not nth:
-                _wait(board, channel, SETTLE_S, sleep_until)
+            until_s = now_s() + SETTLE_S
+            # The board may have a timeout, so it is read meanwhile.
+            while not nth and now_s() < until_s:
+                _led(board, channel, sleep_until)
     return tuple(gone)
 
 
@@ -104,32 +110,8 @@ def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
         _end(board, setup)
 
 
-def _arrived(
-    board: Board,
-    channel: Channel,
-    asked: int,
-    way_s: float,
-    sleep_until: Callable[[float], None],
-) -> int:
-    """Lead a pulse until it is where it was sent, or its time is over; return where it is."""
-    until_s = board.line.port.now_s() + way_s + LATE_S
-    while True:
-        got = _led(board, channel, sleep_until)
-        if abs(got - asked) <= FINE_STEPS or board.line.port.now_s() >= until_s:
-            return got
-
-
-def _wait(
-    board: Board, channel: Channel, for_s: float, sleep_until: Callable[[float], None]
-) -> None:
-    """Wait; the board is asked meanwhile, it may have a timeout."""
-    until_s = board.line.port.now_s() + for_s
-    while board.line.port.now_s() < until_s:
-        _led(board, channel, sleep_until)
-
-
 def _led(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
-    """Wait a moment, lead a pulse on where the board does not, and return what it is."""
+    """Wait a moment and return the pulse; move it on if the board does not do so itself."""
     sleep_until(board.line.port.now_s() + LOOK_S)
     channel.advance(board.line.port.now_s())
     board.lead([channel])

@@ -21,7 +21,7 @@ _LEAST_SHARE = 0.5
 
 
 class HandRecording(NamedTuple):
-    """What was recorded.
+    """A recording.
 
     series: times in seconds from the beginning, and angles in degrees, by joint
     left_out: joints whose servos were silent too often
@@ -61,7 +61,7 @@ def record(
     stopped: Callable[[], str | None],
     seconds: float = LONGEST_S,
 ) -> HandRecording:
-    """Read the joints until the time is over or somebody ends it.
+    """Read the joints until the time is over or a person ends it.
 
     Args:
         sample: reads every servo once.

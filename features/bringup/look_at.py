@@ -23,13 +23,13 @@ TOGETHER = "eyes_pan"
 
 
 class LookedAt(NamedTuple):
-    """How well both eyes point at a point, as measured at the end. Degrees, metres.
+    """Measured gaze error of both eyes at the end. Degrees, metres.
 
     left_error, right_error: angle between each eye's line of sight and the point
-    error: the larger of both; where one linkage turns both eyes to the sides, that of their
+    error: the larger of both; if one linkage turns both eyes to the sides, that of their
         mean line of sight, from midway between them
     vergence: angle between the lines of sight; desired_vergence: what the point needs
-    converges: each eye turns to the sides by itself, so there can be vergence
+    converges: each eye has a yaw joint of its own, so vergence is possible
     head: (yaw, pitch, roll); distance_m: from midway between the eyes
     moved: what the guard sent of the last desired pose, joint by joint
     """
@@ -52,7 +52,7 @@ def look_at(
     p_world_m: Vec3,
     seconds: float,
 ) -> LookedAt:
-    """Turn eyes and head to a point for so long; ``control`` has been started.
+    """Turn eyes and head to a point for some seconds; ``control`` has been started.
 
     p_world_m: x forward, y left, z up from the neck base
 
@@ -159,7 +159,7 @@ def refuse_inside(p_world_m: Vec3, pose: GazeState) -> None:
     """Refuse a point that no eye can look at.
 
     Raises:
-        SetupError: it lies within 3 cm of the head's middle.
+        SetupError: it is within 3 cm of the head's middle.
     """
     if norm(sub(p_world_m, pose.p_world_head_m)) < 0.03:
         x, y, z = p_world_m

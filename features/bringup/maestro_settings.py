@@ -1,6 +1,6 @@
-"""What must be set on a Maestro in Pololu's program, as no serial command can set it. Pure.
+"""Settings of a Maestro for Pololu's program, as no serial command can set them. Pure.
 
-On an error - one damaged byte is one - a board sends every channel where its setting says.
+On an error - one damaged byte is one - a board moves every channel as its setting requires.
 Off stops the pulses, until the servos are held again where they are.
 Ignore would go on, but also when the program dies; Go to moves all servos home.
 
@@ -40,7 +40,7 @@ def range_us(setup: ServoConfig) -> tuple[int, int]:
 
 
 def wide_range(setup: ServoConfig) -> tuple[int, int] | None:
-    """Return Min and Max of a channel where a new board's would cut the joint's range."""
+    """Return Min and Max of a channel if a new board's would cut the joint's range."""
     low, high = range_us(setup)
     if setup.min_steps >= FACTORY_US[0] * US_STEPS and setup.max_steps <= FACTORY_US[1] * US_STEPS:
         return None

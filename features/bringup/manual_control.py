@@ -1,4 +1,4 @@
-"""Moving a rig slowly, joint by joint or all at once, for bringing it up and for own programs.
+"""Slow motion of a rig, joint by joint or all at once, for bring-up and for own programs.
 
 No camera, no attention. Every goal goes through the guard, and the caller gets back
 what was really applied:
@@ -12,7 +12,7 @@ what was really applied:
         control.stop()
 
 Between two calls nothing is sent: Dynamixel servos are held by their own bus watchdog, others
-stay at their last goal, or lose their torque where a guardian watches them
+stay at their last goal, or lose their torque if a guardian watches them
 (gazerig.robot.guardian, after .4 s), and the next call goes on from there.
 """
 
@@ -41,7 +41,7 @@ _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
 
 @dataclass(frozen=True)
 class JogParams:
-    """How slowly to move, and when a goal counts as reached."""
+    """Speed of a slow move, and when a goal counts as reached."""
 
     # fmt: off
     speed_deg_s: Annotated[float, Bounds(0.5, 200), "top speed on the way; the guard's gentle speed holds as well"] = 20.0
@@ -72,7 +72,7 @@ class ManualControl:
         guard: the same rig's.
         clock: the host's, or a simulated one with the emulated bus.
         params: how slowly.
-        stopped: asked at every step; return why to stop, None while there is no reason.
+        stopped: called at every step; returns why to stop, None without a reason.
         watch: gets every step.
     """
 
@@ -96,11 +96,11 @@ class ManualControl:
 
     @property
     def goal_rad(self) -> JointAngles:
-        """Return the goals in force."""
+        """Return the active goals."""
         return self._goal
 
     def start(self) -> JointAngles:
-        """Open the bus and switch torque on where the joints are; return the goals in force.
+        """Open the bus and switch torque on at the present pose; return the active goals.
 
         Raises:
             SetupError: port or servos are not as configured.
@@ -110,7 +110,7 @@ class ManualControl:
         return self._goal
 
     def stop(self) -> tuple[str, ...]:
-        """Torque off and close the bus; return what the bus says of it."""
+        """Switch torque off and close the bus; return the bus's messages."""
         return self.body.stop()
 
     def jog(self, joint: str, angle_deg: float) -> MoveResult:
@@ -169,9 +169,9 @@ class ManualControl:
     def park(
         self, angles_deg: Mapping[str, float], stopped: Callable[[], str | None] = no_reason
     ) -> MoveResult:
-        """Move to a pose whatever asked for a stop so far; joints left out go to 0.
+        """Move to a pose despite earlier requests to stop; joints left out go to 0.
 
-        stopped: asked at every step; return why to stop, None while there is no reason
+        stopped: called at every step; returns why to stop, None without a reason
 
         Raises:
             DriverError: the bus is gone.
@@ -190,11 +190,11 @@ class ManualControl:
         ends_on: JointAngles | None = None,
         gently: bool = False,
     ) -> MoveResult:
-        """Send desired poses through the guard until ``done`` says how it ended.
+        """Send desired poses through the guard until ``done`` returns how it ended.
 
         longest_s: after that it has ended "not there in time"
         ends_on: the pose that the result is judged by; None: the last one
-        gently: the guard goes slowly all the way, not only at the start
+        gently: the guard moves slowly throughout, not only at the start
 
         Raises:
             DriverError: the bus is gone.
@@ -243,13 +243,13 @@ class ManualControl:
 
 
 def parked(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
-    """Park slowly unless the user asks again for the end; return what to say of it."""
+    """Park slowly unless the user requests the end again; return the result as text."""
     moved = control.park(park_deg, lambda: "interrupted" if again() else None)
     return "parked" if moved.arrived else f"not parked ({moved})"
 
 
 def duration_s(distance_rad: float, params: JogParams) -> float:
-    """Return the time of a way from rest to rest that keeps to speed and acceleration."""
+    """Return the time of a move from rest to rest within speed and acceleration."""
     far = degrees(abs(distance_rad))
     slow = _PEAK_SPEED * far / params.speed_deg_s
     return max(0.05, slow, sqrt(_PEAK_ACCEL * far / params.accel_deg_s2))

@@ -1,4 +1,4 @@
-"""How a movement ended, joint by joint, with the reason where it differs from what was asked."""
+"""Result of a movement, joint by joint, with the reason for each difference from the goal."""
 
 from collections.abc import Iterable
 from math import degrees, radians
@@ -7,18 +7,18 @@ from typing import NamedTuple
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 
 PASSING = ("starting slowly", "too hard", "too fast")
-"""Reasons that say how a goal is approached, not that it cannot be reached."""
+"""Reasons about the approach to a goal, which can still be reached."""
 
 _STILL_DEG_S = 2.0
 
 
 class JointResult(NamedTuple):
-    """Where one joint ended, in degrees.
+    """Result of a movement for one joint, in degrees.
 
-    desired, commanded: what was asked for, and what the guard sent of it in the end
-    measured: where the joint is; error: measured less desired
+    desired, commanded: the goal, and what the guard sent of it in the end
+    measured: present angle; error: measured less desired
     reasons: why commanded or measured differ, as the guard names it; empty when all is well
-    estimated: its servo tells nothing, so measured is the goal moved by its known speed
+    estimated: its servo has no sensor, so measured is the goal moved by its known speed
     """
 
     joint: str
@@ -30,7 +30,7 @@ class JointResult(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Return how far the joint is from where it was sent."""
+        """Return the distance of the joint from its goal."""
         return self.measured - self.desired
 
     def __str__(self) -> str:
@@ -52,11 +52,11 @@ class Step(NamedTuple):
 
 
 class MoveResult(NamedTuple):
-    """How a movement ended.
+    """Result of a movement.
 
     ended: "arrived", "held back" (by the guard), "not there in time", "torque_off", or the name
         of what stopped it
-    level: the guard's last level; events: what the bus reported on the way
+    level: the guard's last level; events: reports of the bus during it
     last: the last exchange
     """
 
@@ -69,7 +69,7 @@ class MoveResult(NamedTuple):
 
     @property
     def arrived(self) -> bool:
-        """Return whether every joint that was to move came near where it was sent."""
+        """Return whether every moving joint came near its goal."""
         return self.ended == "arrived"
 
     def __str__(self) -> str:
@@ -82,7 +82,7 @@ class MoveResult(NamedTuple):
         return next(part for part in self.joints if part.joint == joint)
 
     def remarkable(self) -> tuple[JointResult, ...]:
-        """Return the joints that something is to be said of."""
+        """Return the joints with reasons."""
         return tuple(part for part in self.joints if part.reasons)
 
 
@@ -93,7 +93,7 @@ class GuardReasons:
         self._by_joint: dict[str, dict[str, None]] = {}
 
     def add(self, guard_result: GuardResult) -> None:
-        """Add what a guard result says, but for how goals are approached."""
+        """Add the reasons of a guard result, except those about the approach to a goal."""
         for line in guard_result.reasons:
             joint, _, reason = line.partition(": ")
             if reason not in PASSING:
@@ -125,7 +125,7 @@ def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[Join
 def standing(
     step: Step, desired: JointAngles, moving: Iterable[int], near_rad: float
 ) -> str | None:
-    """Return how joints that stand have ended: where they were sent, or where they are kept."""
+    """Return the result for joints at rest: at their goals or held back; None while they move."""
     joints, command = step.joints, step.guard_result.command_rad
     held = False
     for i in moving:

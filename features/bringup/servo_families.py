@@ -19,7 +19,7 @@ Tell = Callable[[str], None]
 
 
 class Setting(NamedTuple):
-    """A register that must have a value where it is calibrated; ``mask`` chooses its bits."""
+    """A register that must have a value for calibration; ``mask`` chooses its bits."""
 
     register: str
     value: int
@@ -31,11 +31,11 @@ class Setting(NamedTuple):
 
 
 class Driving(NamedTuple):
-    """How one servo of a kind is led gently by itself.
+    """Gentle motion of one servo of a kind.
 
     settings: without which its steps do not mean what they should
     offset: register that shifts its position; offset_usable: it keeps to that
-    full_drive: register and the one that holds its largest value, to which it is put back
+    full_drive: a register, and the register of its largest value, which it gets back
     gentle: makes the registers of a share of full drive and a speed in steps/s; reads registers
         by name
     load: present current as a share of the stall current, of a model by its name
@@ -54,10 +54,10 @@ class ServoKind(NamedTuple):
 
     title: as people call it
     family: what the engine must know of it
-    no_reply: what to look at where no servo answers
+    no_reply: what to check if no servo answers
     notes: what must be known of all of them
-    driving: None where this program does not drive one by itself
-    set_middle: makes the present position the middle, None where a kind cannot
+    driving: None if this program does not move a servo of the kind alone
+    set_middle: makes the present position the middle, None if the kind cannot
     """
 
     name: BusKind

@@ -1,4 +1,4 @@
-"""Restarting one servo: on a Dynamixel the only way but the switch to clear a latched error."""
+"""Restart of one servo, which clears a latched error of a Dynamixel as a power cycle does."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -15,9 +15,9 @@ PAUSE_S = 0.1
 
 
 class Standing(NamedTuple):
-    """How a servo stands.
+    """Status of a servo.
 
-    errors: by name; torque: None where it could not be read
+    errors: by name; torque: None if it could not be read
     position: in steps, None likewise
     latching: errors stay until a restart; else they go with their cause
     """
@@ -61,7 +61,7 @@ def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> FoundSe
 
 
 def standing(port: BusPort, kind: ServoKind, servo_id: int) -> Standing:
-    """Return how a servo stands.
+    """Return the status of a servo.
 
     Raises:
         BusLost: the port is gone.

@@ -1,9 +1,9 @@
 """Finding the one servo that is connected, and giving it its id and baud rate.
 
-Only one servo may be connected: two with one id cannot be told apart, and an id given to
+Only one servo may be connected: two with one id look like one, and an id given to
 both would make it worse.
 
-Id and baud rate act at once, after the status of their own write. Where the memory has a lock
+Id and baud rate act at once, after the status of their own write. If the memory has a lock
 they are written with it open, or they would hold until the next power-off only; it is closed
 under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory table STS3215.
 """
@@ -28,7 +28,7 @@ from gazerig.features.bringup.servo_families import ServoKind, Tell
 
 
 class SetUp(NamedTuple):
-    """What has become of one servo: as it was found, as it is now, and what was written."""
+    """Result for one servo: as it was found, as it is now, and what was written."""
 
     before: FoundServo
     now: FoundServo
@@ -41,7 +41,7 @@ def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
 
 
 def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> FoundServo:
-    """Find the one servo that is connected, whatever its id and baud rate; all rates are asked.
+    """Find the one servo that is connected, at any id and baud rate; all rates are searched.
 
     Raises:
         ServoMissing: none answers, or more than one.
@@ -93,9 +93,9 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: 
 def assign(
     port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
 ) -> SetUp:
-    """Return the servo found the id of a joint and the bus's baud rate, and see that it has them.
+    """Give the servo found the id of a joint and the bus's baud rate, and verify them.
 
-    Its torque goes off. Whatever goes wrong, the message says where the servo now answers.
+    Its torque goes off. The message of every failure names id and rate of the servo now.
 
     Raises:
         ValueError: there is no such id or baud rate.

@@ -1,7 +1,7 @@
-"""What one servo tells of itself: reads alone, nothing is written.
+"""Telemetry of servos: registers and pulses are read, nothing is written.
 
-A bus watchdog is fed by it, as by every packet. A Maestro is asked for pulse widths and never
-for its errors: reading them clears them, and the program that moves the servos would miss them.
+A bus watchdog is fed by it, as by every packet. Of a Maestro only pulse widths are read and never
+its errors: reading them clears them, and the program that moves the servos would miss them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,13 +34,13 @@ LIVE = (
 
 
 class Telemetry(NamedTuple):
-    """What one servo says of itself now; None where its kind does not tell.
+    """Present values of one servo; None for values that its kind does not have.
 
     goal_deg, position_deg, velocity_deg_s: at the joint; the steps are the servo's own
     load: share of the stall torque, signed, -1..1
     errors: of the hardware, by name
-    measured: False where the position is estimated: that of the pulse, wherever the servo is
-    pulse_us: pulse width that a hobby servo gets, 0 where it gets none
+    measured: False if the position is estimated: that of the pulse
+    pulse_us: pulse width that a hobby servo gets, 0 for no pulses
     """
 
     goal_deg: float | None
@@ -110,8 +110,8 @@ def telemetry_of(kind: ServoKind, joint: JointParams, values: Mapping[str, int])
 class MaestroTelemetry:
     """Reads the channels of a Maestro: which pulse each gives, and nothing else.
 
-    A board that is still to detect its baud rate waits for the first byte of the Pololu
-    form; so where it keeps silent the question is put in that form, too.
+    A board that has not detected its baud rate yet waits for the first byte of the Pololu
+    form; so after a silence the query is sent in that form, too.
     """
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
@@ -142,7 +142,7 @@ class Pca9685Telemetry:
 
 
 def pulse_telemetry(joint: JointParams, pulse_steps: int) -> Telemetry:
-    """Return what the pulse of a joint's channel tells; 0 is none, so nothing holds the servo."""
+    """Return the telemetry of a joint's pulse; 0 is no pulse, so nothing holds the servo."""
     if 0 < pulse_steps <= MOST_INPUT:
         return Telemetry(*_UNTOLD, False, ("its channel is an input",), False, None)
     at = degrees(joint.angle_rad(pulse_steps)) if pulse_steps else None
@@ -160,8 +160,8 @@ class TelemetrySample(NamedTuple):
     """One reading of all servos.
 
     at_s, took_s: when it was done and how long it took
-    servos: by joint; None where the servo did not answer
-    asked, unanswered: servos asked since the start, and how many of those did not answer
+    servos: by joint; None if the servo did not answer
+    asked, unanswered: queries since the start, and those without an answer
     """
 
     at_s: float
@@ -214,7 +214,7 @@ class Monitor:
 def coupled_angles(
     pair: CoupledPair, one: Telemetry | None, other: Telemetry | None
 ) -> tuple[Telemetry | None, Telemetry | None]:
-    """Return what two coupled servos say with the angles of their joints.
+    """Return the telemetry of two coupled servos with the angles of their joints.
 
     Without either of them both joints' angles are unknown.
     """

@@ -1,1 +1,1 @@
-"""What a rig does not know of itself until it is measured: joints, camera, faces."""
+"""Calibration of joints, linkages, camera and faces."""

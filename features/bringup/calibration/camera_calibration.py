@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 # Limits in pixels are for images of this width and grow with it.
 _WIDTH_PX = 640
-# The third radial coefficient is kept where the views prove it: so many times its spread.
+# The third radial coefficient is kept if it is this many times its spread.
 _PROVEN = 4.0
 # No view is an outlier that is as good as this.
 _GOOD_PX = 0.25
@@ -34,12 +34,12 @@ _MOST_DROPPED = 0.2
 
 
 class CameraCalibrationRefused(SetupError):
-    """The frames do not make a calibration; the message says why and what to do."""
+    """The frames do not make a calibration; the message has the reason and the remedy."""
 
 
 @dataclass(frozen=True)
 class LensCalibrationParams:
-    """What is good enough."""
+    """Limits of an acceptable result."""
 
     # fmt: off
     most_error_px: Annotated[float, Bounds(0.05, 20),
@@ -109,10 +109,10 @@ def calibrate_lens(
 ) -> LensCalibration:
     """Find the lens that explains all views.
 
-    guess: a lens that is about right, by which views are told apart
+    guess: a lens that is about right, by which views are compared
 
     Raises:
-        CameraCalibrationRefused: too few views or too much alike (says what is missing), or
+        CameraCalibrationRefused: too few views or too much alike (names the missing ones), or
             the result is not good or not sure enough.
     """
     par = params if params is not None else LensCalibrationParams()
@@ -124,7 +124,7 @@ def calibrate_lens(
             break
         del kept[worst]
         fit = _fit(views, kept, width_px, height_px)
-    # What is left without the outliers must still show all of the lens.
+    # The views without the outliers must still show all of the lens.
     _usable([views[k] for k in kept], guess, width_px, height_px, par.views)
     _judge(fit, width_px, height_px, par)
     fx, fy, cx, cy = fit.std[:4].tolist()
@@ -144,7 +144,7 @@ def calibrate_lens(
 def _usable(
     views: Sequence[SeenBoard], guess: Intrinsics, width: int, height: int, params: ViewParams
 ) -> list[int]:
-    """Return the numbers of the views that tell something new, or refuse if they are too few."""
+    """Return the numbers of the views that show something new, or refuse if they are too few."""
     collector = ViewCollector(guess, width, height, params)
     usable = [k for k, seen in enumerate(views) if not collector.offer(seen)]
     if not collector.coverage.enough:
@@ -157,7 +157,7 @@ def _usable(
 
 
 def _fit(views: Sequence[SeenBoard], kept: Sequence[int], width: int, height: int) -> _Fit:
-    """Fit a lens; with the third radial coefficient where the views prove it."""
+    """Fit a lens; with the third radial coefficient if the views prove it."""
     plain = _calibrated([views[k] for k in kept], width, height, cv2.CALIB_FIX_K3)
     full = _calibrated([views[k] for k in kept], width, height, 0)
     k3, spread = full.lens.distortion[4], float(full.std[8])

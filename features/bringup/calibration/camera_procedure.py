@@ -29,7 +29,7 @@ from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenB
 Look = Callable[[], Shot | None]
 """Returns the newest frame at once, None before the first."""
 
-# Shares of the neck's way (yaw, pitch, roll): pairs of axes mixed, both ways alike.
+# Shares of the neck's range (yaw, pitch, roll): pairs of axes mixed, symmetric.
 _PATTERN = (
     (0.0, 0.0, 0.0), (0.5, 0.5, 1.0), (1.0, 0.0, 0.0), (1.0, 0.0, -1.0), (0.9, 0.8, 0.0),
     (0.0, 1.0, 0.0), (-0.5, 0.5, -1.0), (-0.9, 0.8, 0.0), (-1.0, 0.0, 0.0), (-1.0, 0.0, 1.0),
@@ -40,7 +40,7 @@ _PATTERN = (
 
 @dataclass(frozen=True)
 class NeckStepParams:
-    """How the head looks at the board from several sides."""
+    """Neck angles and frames of the views of the board."""
 
     # fmt: off
     yaw_deg: Annotated[float, Bounds(2, 60), "farthest to each side"] = 18.0
@@ -53,7 +53,7 @@ class NeckStepParams:
 
 
 class LensStep(NamedTuple):
-    """What one frame added.
+    """Contribution of one frame.
 
     number: of the frame; corners: how many were seen; kept: it counts as a view
     why: it was not kept; coverage: what is there and what to do next
@@ -147,7 +147,7 @@ class Neck(Protocol):
 
 
 class NeckStep(NamedTuple):
-    """What one neck angle added.
+    """Contribution of one neck angle.
 
     number, of: which of how many angles; asked_rad: yaw, pitch, roll requested
     corners: how many were seen in every frame; view: what counts, or None and why not

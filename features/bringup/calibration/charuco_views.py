@@ -1,4 +1,7 @@
-"""Where the board is in the camera frame, from one image of it. Pure.
+"""Views of the ChArUco board: its pose, and the views that a lens calibration needs. Pure.
+
+A lens shows its focal length only on a tilted board, its centre and distortion only near
+the edges of the image: many similar views fit well and show little.
 
 Frames as in gazerig.robot.model.charuco_board and gazerig.robot.model.intrinsics. A flat
 board seen from far has two poses that explain it nearly as well, mirrored about the line of sight;
@@ -56,7 +59,7 @@ def board_poses(seen: SeenBoard, lens: Intrinsics) -> tuple[BoardPose, ...]:
 
 @dataclass(frozen=True)
 class ViewParams:
-    """How many views, and how different."""
+    """Number of views, and differences between them."""
 
     # fmt: off
     least_views: Annotated[int, Bounds(4, 200), "fewer are refused"] = 12
@@ -70,7 +73,7 @@ class ViewParams:
 
 
 class Held(NamedTuple):
-    """How the board was held in one view.
+    """Position and tilt of the board in one view.
 
     left, right, top, bottom: of its corners in the image, 0..1
     tilt_right_deg: right edge nearer; tilt_down_deg: bottom edge nearer
@@ -84,7 +87,7 @@ class Held(NamedTuple):
     tilt_down_deg: float
 
     def differs(self, other: "Held", params: ViewParams) -> bool:
-        """Return whether it tells something that the other does not."""
+        """Return whether it shows something that the other does not."""
         moved = max(abs(a - b) for a, b in zip(self[:4], other[:4], strict=True))
         tilted = hypot(
             self.tilt_right_deg - other.tilt_right_deg, self.tilt_down_deg - other.tilt_down_deg
@@ -93,7 +96,7 @@ class Held(NamedTuple):
 
 
 class Coverage(NamedTuple):
-    """What the views kept so far show, and what a person should do next.
+    """Coverage of the views kept, and what a person should do next.
 
     views: number kept; missing: one instruction each, empty when all is there
     """
@@ -145,7 +148,7 @@ def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
 
 
 class ViewCollector:
-    """Keeps the views that tell something new."""
+    """Keeps the views that show something new."""
 
     def __init__(
         self, guess: Intrinsics, width_px: int, height_px: int, params: ViewParams | None = None

@@ -1,8 +1,8 @@
-"""Leading a joint slowly to its stop, and knowing when it is there. Pure.
+"""Slow search for the stop of a joint. Pure.
 
 The goal runs ahead of the joint by a few degrees at most, so the servo pushes no harder
-than its position gain makes of that; where the joint stands still although it is pushed,
-its stop is reached and the goal goes back at once. It cannot tell a stop from a finger:
+than its position gain makes of that; if the joint does not move although it is pushed, its
+stop is reached and the goal goes back at once. A stop and a finger look the same:
 both are treated alike, gently and for half a second at the longest.
 """
 
@@ -24,7 +24,7 @@ BACK_OFF_EXCHANGES = 25
 
 @dataclass(frozen=True)
 class StopSearchParams:
-    """How gently to look for a stop; angles are those of the servo."""
+    """Speed and force of a search for a stop; angles are those of the servo."""
 
     # fmt: off
     speed_deg_s: Annotated[float, Bounds(1, 60), "speed of the search"] = 15.0
@@ -39,7 +39,7 @@ class StopSearchParams:
 
 
 class EndStop(NamedTuple):
-    """Where a search ended, in unwrapped steps.
+    """Result of a search, in unwrapped steps.
 
     kind: "stop", pushed and did not move; "limit", the end of what the servo allows
     pushed_s: time for which it stood still under the goal
@@ -71,7 +71,7 @@ class StopSearch:
     def step(self, position_steps: int, load: float, t_s: float) -> int:
         """Add a measurement, return the goal; after the end the goal that backs off.
 
-        load: present current as a share of the stall current, 0 where it is not known
+        load: present current as a share of the stall current, 0 if unknown
         """
         par, way = self._params, self._way
         if self._goal is None:
@@ -113,7 +113,7 @@ Exchange = Callable[[int | None], tuple[int, float, float]]
 def search(
     params: StopSearchParams, direction: int, limits: tuple[int, int], exchange: Exchange
 ) -> EndStop:
-    """Run one search to its end and the way back; return where the stop is."""
+    """Run one search to its end and move back; return the stop."""
     look = StopSearch(params, direction, *limits)
     goal: int | None = None
     while look.found is None:
@@ -124,7 +124,7 @@ def search(
 
 
 def go(goal_steps: int, params: StopSearchParams, exchange: Exchange) -> bool:
-    """Lead a joint slowly to a position; return whether it came there unhindered."""
+    """Move a joint slowly to a position; return whether it came there unhindered."""
     position, _, _ = exchange(None)
     way = 1 if goal_steps > position else -1
     look = StopSearch(params, way, min(goal_steps, position), max(goal_steps, position))

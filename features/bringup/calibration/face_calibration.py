@@ -1,9 +1,9 @@
-"""Where a person's own face parts are: offsets that keys move until the gaze seems right.
+"""Places of a person's own face parts: offsets that keys move until the gaze seems right.
 
 People judge well where another person looks (Nakamoto & Tsuruno 3.7), so a person whose face
-differs from an adult's average steers the gaze to each part of it and says when it is
-there. Of a gaze only the direction can be judged: a part moves in the face's plane, to its
-owner's left and up, and its place out of the face stays as it was.
+differs from an adult's average steers the gaze to each part of it and confirms each. Only the
+direction of a gaze can be judged: a part moves in the face's plane, to its owner's left and up,
+and its distance out of the face stays as it was.
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up;
 millimetres. The offsets live in that frame, so they hold wherever the face goes and
@@ -50,13 +50,13 @@ _WAYS: Mapping[str, tuple[float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class FaceCalibration:
-    """How far a person has come.
+    """Progress of a calibration.
 
     starts_mm, places_mm: each part's place in the face frame as it was at first, and now
     at: number of the part in ORDER, len(ORDER) after the last
     chosen: parts that the gaze seemed to look at
     step: number of the present step in STEPS_MM
-    ended: nothing more is asked for
+    ended: no part is due any more
     """
 
     starts_mm: tuple[Vec3, ...]
@@ -77,7 +77,7 @@ class FaceCalibration:
         return STEPS_MM[self.step]
 
     def place_mm(self, part: str) -> Vec3:
-        """Return where a part is now, in the face frame."""
+        """Return the present place of a part, in the face frame."""
         return self.places_mm[ORDER.index(part)]
 
     def moved_mm(self, part: str) -> tuple[float, float]:
@@ -88,7 +88,7 @@ class FaceCalibration:
 
 
 def begun(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
-    """Start from a rig's own places where it has some, from those of an adult's face elsewhere.
+    """Return the start: a rig's own places, or those of an adult's face for parts without one.
 
     own_mm: part -> place in the face frame, as under ``face_parts_mm`` of a rig file
     """
@@ -121,13 +121,13 @@ def pressed(state: FaceCalibration, key: Key) -> FaceCalibration:
 
 
 def point_world_m(place_mm: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
-    """Return where a place in the face frame is, for a face that is there and turned so."""
+    """Return the point in the world of a place in the face frame."""
     x, y, z = place_mm
     return add(p_world_face_m, rotate(R_world_face, (x / 1e3, y / 1e3, z / 1e3)))
 
 
 def place_in_face_mm(p_world_m: Vec3, p_world_face_m: Vec3, R_world_face: Mat3) -> Vec3:
-    """Return the place in the face frame of a point in the world: the way back."""
+    """Return the place in the face frame of a point in the world."""
     x, y, z = rotate_back(R_world_face, sub(p_world_m, p_world_face_m))
     return x * 1e3, y * 1e3, z * 1e3
 

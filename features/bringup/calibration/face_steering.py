@@ -95,7 +95,7 @@ class FaceSteering:
         )  # fmt: skip
 
     def press(self, key: Key, t_s: float) -> str | None:
-        """Do what a key asks for; return what stands against it.
+        """Apply a key; return why that is impossible.
 
         An Enter counts as soon as the eyes are on the part, see ``update``.
         """
@@ -110,7 +110,7 @@ class FaceSteering:
         return None
 
     def update(self, tick: Tick) -> str | None:
-        """See where the eyes are; return why a waiting Enter was dropped."""
+        """Measure the gaze; return why a waiting Enter was dropped."""
         self.error_deg = self._off_deg(tick)
         if tick.target.kind != "part" or tick.gaze.phase == "saccade":
             self.error_deg = inf
@@ -130,7 +130,7 @@ class FaceSteering:
         return None
 
     def _off_deg(self, tick: Tick) -> float:
-        """Return how far beside the part the eyes look, as well as they can meet it at all."""
+        """Return the angle of the gaze from the part, as far as the eyes can meet it."""
         return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
 
     def _nearest(self, percept: Percept | None, p_head: Vec3, t_s: float) -> Face | None:
@@ -144,7 +144,7 @@ class FaceSteering:
         )
 
     def _waiting(self, t_s: float) -> Target:
-        """Stay where the face was, and after a while rest straight ahead."""
+        """Keep looking at the last face, and after a while rest straight ahead."""
         lost = t_s - self._seen_s > _LOST_S
         p = self._rest if lost else self._lost_at
         self._count(("rest", lost))

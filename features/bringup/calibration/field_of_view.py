@@ -1,8 +1,8 @@
 """The field of view of a camera by a face at a known distance, without a board.
 
-A face is as large in the image as its distance and the focal length make it. How far it would be by
-an assumed field of view, over how far it is, gives the true one. People's faces differ in size by
-8 %, so no number of frames makes this surer than that; the printed board gives 0.2 %.
+The size of a face in the image depends on its distance and the focal length. Its distance by an
+assumed field of view, over its true distance, gives the true field. People's faces differ in size
+by 8 %, so no number of frames makes this surer than that; the printed board gives 0.2 %.
 """
 
 from collections.abc import Sequence

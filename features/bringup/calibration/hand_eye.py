@@ -1,7 +1,7 @@
-"""Where the camera sits on the head, from one fixed board seen at several neck angles. Pure.
+"""Place of the camera on the head, from one fixed board seen at several neck angles. Pure.
 
-Hand-eye calibration, AX = XB: the head moves by what the joints say, the board seems to
-move by what the camera sees, and only one place of the camera on the head makes both
+Hand-eye calibration, AX = XB: the joints measure how the head moves, the camera sees how
+the board seems to move, and only one place of the camera on the head makes both
 agree. OpenCV's closed forms (manual, cv2.calibrateHandEye) start the search; they trust
 every single pose of the board, whose tilt is poorly seen, so the answer is the place of
 camera and board that brings all corners of all frames nearest to where they are seen.
@@ -50,7 +50,7 @@ _BEST_JOINT_DEG = 0.02
 
 @dataclass(frozen=True)
 class HandEyeParams:
-    """What is good enough."""
+    """Limits of an acceptable result."""
 
     # fmt: off
     least_views: Annotated[int, Bounds(3, 200), "fewer are refused"] = 8
@@ -81,7 +81,7 @@ class HandEye:
     """A camera found on the head.
 
     R_head_camera, p_head_camera_m: its pose in the head
-    R_world_board, p_world_board_m: where the board hangs, by the same fit
+    R_world_board, p_world_board_m: pose of the board, by the same fit
     lens: as given, with focal length and centre touched up by the same fit; it belongs to
         this place of the camera
     rms_px: root mean square reprojection error, joints taken at their word; view_rms_px: of
@@ -109,7 +109,7 @@ class HandEye:
     angle_std_deg: Vec3
 
     def mounted(self, params: CameraParams) -> CameraParams:
-        """Return the camera where it was found, rounded to 0.1 mm and 0.01 deg."""
+        """Return the camera at the place found, rounded to 0.1 mm and 0.01 deg."""
         found = mounted_at(params, self.R_head_camera, self.p_head_camera_m)
         x, y, z = (round(mm, 1) for mm in found.position_mm)
         return replace(
@@ -128,7 +128,7 @@ def camera_on_head(
     width_px: int,
     params: HandEyeParams | None = None,
 ) -> HandEye:
-    """Find where the camera sits on the head.
+    """Find the place of the camera on the head.
 
     width_px: of the frames; limits in pixels grow with it
 
@@ -173,8 +173,8 @@ def camera_on_head(
 def turns_deg(R_world_head: Sequence[Mat3]) -> tuple[float, float]:
     """Return the root mean square turn between any two poses about the main axis and the second.
 
-    Where the second is 0, the head turned about one axis only, and how far along it the
-    camera sits cannot be told.
+    If the second is 0, the head turned about one axis only, and the place of the camera
+    along it is unknown.
     """
     R = np.array(R_world_head)
     turns = [

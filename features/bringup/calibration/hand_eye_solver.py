@@ -1,12 +1,12 @@
 """Least squares of hand-eye calibration: camera on the head and board in the world. Pure.
 
 Two rotations and two places are moved until the corners are reprojected best. Corners far off
-count less (Huber). Joints are never quite where they say (steps of 0.088 deg, play of the gears),
+count less (Huber). Joint sensors are not exact (steps of 0.088 deg, play of the gears),
 and a head that is 0.1 deg off shifts a board 0.7 m away by more than all errors of its corners; so
 each view has a small turn of the head as well, held near zero by how far joints are usually off.
 Nor is the lens known exactly: 1 % of its focal length is 7 mm of the camera's place, but a head
 that turns by known angles measures the lens too, so focal length and centre may move as far as a
-calibration is usually off. How sure the result is comes from leaving out one view at a time
+calibration is usually off. The standard deviations come from leaving out one view at a time
 (jackknife), and from how the place follows the lens.
 """
 
@@ -56,12 +56,12 @@ class Pose(NamedTuple):
 
 
 class Guess(NamedTuple):
-    """What is looked for.
+    """Unknowns of the fit.
 
     camera: in the head; board: in the world
     lens_off: (3,) share by which the focal length is longer, pixels by which the centre is
         farther right and lower, than calibrated
-    turns_rad: (views, 3) by how much each head is turned beyond what its joints say
+    turns_rad: (views, 3) turn of each head beyond the measured joint angles
     """
 
     camera: Pose
@@ -173,10 +173,10 @@ class Sights(NamedTuple):
 
 @dataclass(frozen=True)
 class Fit:
-    """What the search ended with.
+    """Result of the fit.
 
     cost: what it made small
-    rms_px, view_rms_px: reprojection errors with the joints as they say they are
+    rms_px, view_rms_px: reprojection errors with the measured joint angles
     corner_px: what is left of them when each head may be turned a little
     joint_error_deg: root mean square of those turns, a joint
     """
@@ -204,7 +204,7 @@ class Fit:
             inner[k] = a.T @ (a * w) - across @ np.linalg.solve(free, across.T)
             pull[k] = a.T @ (errors[mine] * weight[mine])
         try:
-            # Without view k the best place lies this far from the best with all of them.
+            # Without view k the best place is this far from the best with all of them.
             whole = inner.sum(axis=0)
             whole[12:, 12:] += np.diag(1.0 / sights.lens_error**2)
             off = np.linalg.solve(whole - inner, pull[:, :, None])[:, :6, 0]
@@ -212,14 +212,14 @@ class Fit:
             return np.full(6, np.inf)
         off -= off.mean(axis=0)
         views = (sights.views - 1) / sights.views * (off * off).sum(axis=0)
-        # What the lens was calibrated wrong by is the same in all views.
+        # An error of the lens calibration is the same in all views.
         by_lens = np.linalg.inv(whole)[:6, 12:] / sights.lens_error
         found: Floats = np.sqrt(views + (by_lens * by_lens).sum(axis=1))
         return found
 
 
 def start(sights: Sights, camera: Pose, board: Pose) -> Guess:
-    """Return a guess with the lens as calibrated and the heads where the joints say."""
+    """Return an estimate with the lens as calibrated and the measured joint angles."""
     return Guess(camera, board, np.zeros(3), np.zeros((sights.views, 3)))
 
 
@@ -244,7 +244,19 @@ def refined(sights: Sights, guess: Guess) -> Fit:
         guess, cost = guess.moved(found.x), float(found.cost)
         if float(np.abs(found.x[:12]).max()) < _SETTLED:
             break
-    return _ended(sights, guess, cost)
+    errors = sights.errors(guess)
+    plain = sights.errors(guess._replace(turns_rad=np.zeros_like(guess.turns_rad)))
+    squares = (plain * plain).reshape(-1, 2).sum(axis=1)
+    by_view = [np.sqrt(squares[sights.view == k].mean()) for k in range(sights.views)]
+    return Fit(
+        sights,
+        guess,
+        cost,
+        float(np.sqrt(squares.mean())),
+        np.array(by_view),
+        float(np.sqrt((errors * errors).reshape(-1, 2).sum(axis=1).mean())),
+        float(np.degrees(np.sqrt((guess.turns_rad**2).mean()))),
+    )
 
 
 def _huber(bound: float, corners: int) -> Callable[[Floats], Floats]:
@@ -261,23 +273,6 @@ def _huber(bound: float, corners: int) -> Callable[[Floats], Floats]:
         return rho
 
     return loss
-
-
-def _ended(sights: Sights, guess: Guess, cost: float) -> Fit:
-    """Sum up how well it fits."""
-    errors = sights.errors(guess)
-    plain = sights.errors(guess._replace(turns_rad=np.zeros_like(guess.turns_rad)))
-    squares = (plain * plain).reshape(-1, 2).sum(axis=1)
-    by_view = [np.sqrt(squares[sights.view == k].mean()) for k in range(sights.views)]
-    return Fit(
-        sights,
-        guess,
-        cost,
-        float(np.sqrt(squares.mean())),
-        np.array(by_view),
-        float(np.sqrt((errors * errors).reshape(-1, 2).sum(axis=1).mean())),
-        float(np.degrees(np.sqrt((guess.turns_rad**2).mean()))),
-    )
 
 
 def _bound(errors: Floats) -> float:

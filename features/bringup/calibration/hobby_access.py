@@ -1,4 +1,4 @@
-"""One hobby servo on a board by itself, moved slowly by a person who looks at it.
+"""Access to one hobby servo on a board, moved slowly by a person who watches it.
 
 It has no position sensor: its position is the pulse that it gets, as far as nothing holds it back.
 The board knows no watchdog: a guardian stops its pulses when this program is killed.
@@ -39,7 +39,7 @@ class OneHobby:
         port: of the board; opened by ``open``.
         params: how to speak with the board.
         clock: the host's.
-        stopped: asked all the time; returns why to stop, None while there is no reason.
+        stopped: called all the time; returns why to stop, None without a reason.
         pulses_us: it is never sent outside.
         guardian: has one plan, that of this servo; None: nothing stops its pulses.
     """
@@ -74,16 +74,16 @@ class OneHobby:
 
     @property
     def place_us(self) -> float:
-        """Return the pulse that it has been sent to."""
+        """Return the commanded pulse."""
         return self._goal / US_STEPS
 
     @property
     def pulse_us(self) -> float:
-        """Return the pulse that it gets now, on its way to that."""
+        """Return the pulse that it gets now."""
         return self._pulse / US_STEPS
 
     def open(self) -> float | None:
-        """Find board and channel; return the pulse width in us, None where there are no pulses.
+        """Find board and channel; return the pulse width in us, None without pulses.
 
         Raises:
             SetupError: the board or the channel does not answer.
@@ -95,7 +95,7 @@ class OneHobby:
     def begin(self, place_us: float) -> float:
         """Hold the joint at its present pulse, or start with this one; return the pulse in us.
 
-        Where it had no pulses it goes there at once, at its own speed.
+        A servo without pulses goes there at once, at its own speed.
 
         Raises:
             ServoMissing: the channel does not take it.
@@ -110,11 +110,11 @@ class OneHobby:
         return self.place_us
 
     def look(self) -> bool:
-        """Wait a moment and lead it on; return whether it is where it was sent.
+        """Wait a moment and move it on; return whether it is at its goal.
 
         Raises:
             BusLost: the board does not answer any more.
-            CalibrationStopped: a person or the system asked for it.
+            CalibrationStopped: a person or the system requested it.
         """
         why = self._stopped()
         if why is not None:
@@ -125,7 +125,7 @@ class OneHobby:
         return abs(at - self._goal) <= NEAR_STEPS
 
     def arrive(self) -> float:
-        """Lead it to where it was sent; return the pulse in us that it gets in the end.
+        """Move it to its goal; return the pulse in us at the end.
 
         Raises:
             BusLost, CalibrationStopped: see ``look``.
@@ -170,7 +170,7 @@ class OneHobby:
             if not feedback.missing:
                 self._pulse, self._on = int(feedback.position_steps[0]), feedback.torque[0]
                 if feedback.rearmed[0]:
-                    # It stays where the board holds it, whatever the reason.
+                    # It keeps the pulse of the board, whatever the reason.
                     sent_us, self._goal = self.place_us, self._pulse
                     remedy = (
                         ": if it never comes farther, widen the range of its channel in "

@@ -2,7 +2,7 @@
 
 A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
 only the place within the turn, so a joint whose travel holds the seam would wake up a whole
-turn from where it is: such a joint cannot be used and must be built in again.
+turn off: such a joint cannot be used and must be built in again.
 Steps as in gazerig.drivers.bus.servo_models, angles in degrees at the joint.
 """
 
@@ -40,11 +40,11 @@ ENDS = {
 
 
 class CalibrationRefused(SetupError):
-    """The samples do not make a calibration; the message says why and what to do."""
+    """The samples do not make a calibration; the message has the reason and the remedy."""
 
 
 class Marks(NamedTuple):
-    """Where a joint was when a person or a stop said so, in unwrapped steps.
+    """Positions of a joint at its marks, in unwrapped steps.
 
     positive_end: left, upper, open, or right ear down
     zero: straight ahead; a lid half open
@@ -56,7 +56,7 @@ class Marks(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """What the rig file must say of one joint; fields as in ``model.joint.JointParams``."""
+    """Calibrated values of one joint for the rig file; fields as in ``model.joint.JointParams``."""
 
     zero_step: int
     sign: int
@@ -65,7 +65,7 @@ class Calibration(NamedTuple):
 
 
 class LinkageFit(NamedTuple):
-    """What the rig file must say of a joint behind a push rod; fields as in JointParams.
+    """Calibrated values of a joint behind a push rod; fields as in JointParams.
 
     transmission_points: each (joint angle in degrees, servo position in steps or us), angles rising
     """
@@ -83,7 +83,7 @@ class Unwrapped:
     """Follows a position register over the seam.
 
     Some firmware goes on counting past 4095, some starts again at 0: a change is taken as
-    the shorter way round, so both give the same.
+    the shorter turn, so both give the same.
     """
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class Unwrapped:
         """Add one sample; return the unwrapped position.
 
         Raises:
-            CalibrationRefused: it moved so far while it was not watched that its way is unknown.
+            CalibrationRefused: it moved too far between two samples to know its direction.
         """
         if self._at is None:
             self._at = position_steps % STEPS_PER_TURN
@@ -152,7 +152,7 @@ def lid_keys(joint_name: str) -> tuple[str, str]:
 
 
 def middle(marks: Marks) -> Marks:
-    """Set the zero half-way between the ends."""
+    """Set the zero in the middle between the ends."""
     return marks._replace(zero=(marks.positive_end + marks.negative_end) // 2)
 
 
@@ -166,7 +166,7 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
     """
     steps_per_deg = joint.ratio * STEPS_PER_TURN / 360.0
     low, high = sorted((marks.positive_end, marks.negative_end))
-    at_end = name not in GAZE_JOINTS  # a jaw rests where it is shut, at one of its ends
+    at_end = name not in GAZE_JOINTS  # a jaw rests shut, at one of its ends
     if at_end and low - steps_per_deg <= marks.zero <= high + steps_per_deg:
         marks = marks._replace(zero=min(max(marks.zero, low), high))
     travel_deg = (high - low) / steps_per_deg
@@ -201,7 +201,7 @@ def inwards(angle_deg: float) -> float:
 def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable: bool) -> None:
     """Refuse a travel that leaves the turn 0..4095 in which a restarted servo counts.
 
-    settable: the servo can be told to call any place its middle, and keeps to it
+    settable: any position of the servo can be set as its middle, lastingly
     """
     if low // STEPS_PER_TURN == high // STEPS_PER_TURN:
         return

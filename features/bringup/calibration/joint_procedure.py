@@ -1,4 +1,4 @@
-"""Calibrating one joint, step by step: a hand or gentle motion turns it, a person judges.
+"""Calibration of one joint, step by step: a hand or gentle motion turns it, a person judges.
 
 Nothing is printed or written here: questions go to ``Operator``, the result is a value.
 """
@@ -25,17 +25,17 @@ ZeroBy = Literal["middle", "person"]
 
 
 class Operator(Protocol):
-    """Who is asked; ``live`` is called more than 20 times a second while they think."""
+    """A person who answers; ``live`` is called more than 20 times a second meanwhile."""
 
     def tell(self, line: str) -> None:
         """Show what is going on."""
         ...
 
     def wait(self, question: str, live: Callable[[], str]) -> None:
-        """Return when they have done what is asked; ``live`` gives the line to show meanwhile.
+        """Return when they have done it; ``live`` returns the line to show meanwhile.
 
         Raises:
-            CalibrationStopped: the user asked to end.
+            CalibrationStopped: the user requested the end.
         """
         ...
 
@@ -101,7 +101,7 @@ def by_motion(
     params: StopSearchParams,
     zero_by: ZeroBy,
 ) -> Calibration:
-    """Drive the joint slowly and weakly to both stops; the zero is half-way, or a person's.
+    """Drive the joint slowly and weakly to both stops; the zero is in the middle, or a person's.
 
     Raises:
         CalibrationRefused: what was found makes no
@@ -124,7 +124,7 @@ def by_motion(
 
 
 def _find_stops(single: SingleJoint, person: Operator, params: StopSearchParams) -> Marks:
-    """Return both stops, the zero still open; the person says which way it went."""
+    """Return both stops without the zero; the person confirms the direction."""
     positive, negative = ends_of(single.name)
     way = single.joint.sign
     single.enable_torque(params)

@@ -34,7 +34,7 @@ def angle_now(joint: JointParams, position: float) -> float:
 
 
 def between(one: float, other: float, count: int) -> list[float]:
-    """Return so many positions spread evenly between two, in whole units."""
+    """Return ``count`` positions spread evenly between two, in whole units."""
     return [float(round(one + (other - one) * i / (count + 1))) for i in range(1, count + 1)]
 
 
@@ -66,7 +66,7 @@ def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: f
     kept = 0.0 if is_lid(name) else margin_deg
     low, high = -inwards(-(linkage[0][0] + kept)), inwards(linkage[-1][0] - kept)
     if name not in GAZE_JOINTS and linkage[0][0] <= 0.0 <= linkage[-1][0]:
-        low, high = min(low, 0.0), max(high, 0.0)  # a jaw rests where it is shut, at one end
+        low, high = min(low, 0.0), max(high, 0.0)  # a jaw rests shut, at one end
     if not low <= 0.0 <= high:
         raise CalibrationRefused(
             f"{name}: 0 deg must lie within its range, which is {low:g}..{high:g} deg: "
@@ -120,29 +120,29 @@ class Steered(Protocol):
 
 
 class Steerer(Operator, Protocol):
-    """Who moves a servo by small steps, and reads angles off."""
+    """A person who moves a servo by small steps, and reads angles off."""
 
     def steer(self, question: str, servo: Steered) -> None:
-        """Return when the servo is where it is wanted.
+        """Return when the servo has the desired position.
 
         Raises:
-            CalibrationStopped: the user asked to end.
+            CalibrationStopped: the user requested the end.
         """
         ...
 
     def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Return the number they say, or the proposed one where they agree to it."""
+        """Return their number, or the proposed one if they agree to it."""
         ...
 
 
 class Placer(Protocol):
-    """Brings a joint to places, and tells them in the unit of its servo's model."""
+    """Brings a joint to places, and measures them in the unit of its servo's model."""
 
     name: str
     joint: JointParams
 
     def begin(self) -> None:
-        """Begin: hold it where it is, or switch its torque off."""
+        """Begin: hold it at its position, or switch its torque off."""
         ...
 
     def mark(self, where: str) -> float:
@@ -150,11 +150,11 @@ class Placer(Protocol):
         ...
 
     def bring(self, place: float) -> float:
-        """Bring it to about that place; return where it is."""
+        """Bring it to about that place; return the place reached."""
         ...
 
     def leave(self, place: float) -> None:
-        """Bring it to a place and leave it there, where it moves by itself."""
+        """Bring it to a place and leave it there, if it has a motor."""
         ...
 
     def live(self) -> str:
@@ -163,14 +163,14 @@ class Placer(Protocol):
 
 
 class HobbyPlacer:
-    """Moves a hobby servo as a person says; implements Placer."""
+    """Moves a hobby servo as a person steers it; implements Placer."""
 
     def __init__(self, hobby: OneHobby, person: Steerer) -> None:
         self.name, self.joint = hobby.name, hobby.joint
         self._hobby, self._person = hobby, person
 
     def begin(self) -> None:
-        """Hold the joint at its present pulse, or where the user lets the pulses start."""
+        """Hold the joint at its present pulse, or at the first pulse that the user chooses."""
         hobby, person = self._hobby, self._person
         at_us = hobby.open()
         if at_us is None:
@@ -208,12 +208,12 @@ class HobbyPlacer:
         self._hobby.aim(us)
 
     def bring(self, place: float) -> float:
-        """Lead it slowly to a pulse width in us; return the one that it gets."""
+        """Move it slowly to a pulse width in us; return the width reached."""
         self._hobby.aim(place)
         return self._arrived()
 
     def leave(self, place: float) -> None:
-        """Lead it slowly to where friction shall hold it."""
+        """Move it slowly to a place at which friction shall hold it."""
         self.bring(place)
 
     def _arrived(self) -> float:
@@ -222,7 +222,7 @@ class HobbyPlacer:
         return at_us
 
     def live(self) -> str:
-        """Lead it on; return pulse width and angle in words."""
+        """Move it on; return pulse width and angle as text."""
         self._hobby.look()
         self._tell_events()
         at_us = self._hobby.place_us
@@ -252,11 +252,11 @@ class HandPlacer:
         return float(self._watched.steps())
 
     def bring(self, place: float) -> float:
-        """Let the user turn the joint to about a position in steps; return where it is."""
+        """Let the user turn the joint to about a position in steps; return the position reached."""
         return self.mark(f"until it reads about step {place:.0f}")
 
     def leave(self, place: float) -> None:
-        """Leave it where it is: its torque is off."""
+        """Do nothing: its torque is off."""
 
     def live(self) -> str:
         """Return the position in words."""
@@ -264,7 +264,7 @@ class HandPlacer:
 
 
 def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> LinkageFit:
-    """Mark the places of a joint and say their angles.
+    """Mark the places of a joint and ask for their angles.
 
     more: places between each two that are marked; margin_deg: kept from the ends, but for lids
 

@@ -1,8 +1,8 @@
-"""One smart servo by itself, for calibrating: the others of its line are left as they are.
+"""Access to one smart servo for calibration: the others of its line stay as they are.
 
-Where it has a bus watchdog that is armed while the torque is on, so a servo that is left alone
-stops. Where its memory has a lock its limits are opened with the lock shut: the servo obeys and
-its EEPROM keeps the old ones, so switching it off and on puts back what a killed program left.
+A bus watchdog, if it has one, is armed while the torque is on, so a servo without a program stops.
+If its memory has a lock, its limits are opened with the lock shut: the servo obeys and its EEPROM
+keeps the old ones, so switching it off and on restores them after a killed program.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ LIMITS = ("min_position_limit", "max_position_limit")
 
 
 class ServoCheck(NamedTuple):
-    """What a servo tells of itself before it is calibrated; limits are those of its goals."""
+    """Values of a servo before it is calibrated; limits are those of its goals."""
 
     firmware: int
     limits: tuple[int, int]
@@ -41,8 +41,8 @@ class ServoCheck(NamedTuple):
 class SingleServo:
     """The servo of one joint.
 
-    What it changes in the servo it puts back. Every method raises BusLost where the servo does
-    not answer any more.
+    Changes in the servo are restored. Every method raises BusLost if the servo does not answer
+    any more.
 
     Args:
         name: the joint's.
@@ -53,8 +53,7 @@ class SingleServo:
             servo, and the port calls its ``beat``. None: nothing does but the servo's watchdog.
 
     who: what messages call it, "neck_yaw (servo 7)"
-    alone: what becomes of it when this program dies while it is driven, "" where it stops by
-        itself
+    alone: effect on it if this program dies while it moves, "" if its watchdog stops it
     """
 
     def __init__(
@@ -92,7 +91,7 @@ class SingleServo:
         """Check that it is the right servo, sound, and in position mode.
 
         Raises:
-            ServoMissing: it does not answer, is another model, or is set up in another way.
+            ServoMissing: it does not answer, is another model, or has other settings.
             ServoFault: it reports an error.
         """
         # A servo may be set to answer questions alone; this takes no answer and ends that.
@@ -184,14 +183,14 @@ class SingleServo:
         return self._driving.load(self._model, self._value("present_current"))
 
     def enable_torque(self, strength: float, speed_steps_s: float) -> None:
-        """Switch the torque on where it is, weak and slow; goals may lead anywhere in the turn.
+        """Switch the torque on at its position, weak and slow; goals may be anywhere in the turn.
 
         Args:
             strength: share of full drive.
             speed_steps_s: top speed.
 
         Raises:
-            ServoMissing: the position does not lie within one turn.
+            ServoMissing: the position is not within one turn.
             ServoFault: the torque does not come on, or the position jumped.
             SetupError: the guardian does not start.
         """
@@ -294,18 +293,18 @@ PERIOD_S = 0.02
 
 
 class CalibrationStopped(DriverError):
-    """The user or the system asked to end: torque off. The message says which."""
+    """The user or the system requested the end: torque off. The message names which."""
 
 
 class SingleJoint:
-    """The servo of one joint. Where it does not answer any more, methods raise BusLost.
+    """The servo of one joint. If it does not answer any more, methods raise BusLost.
 
     Args:
         name: the joint's.
         joint: as configured.
         servo: its servo.
         clock: the host's.
-        stopped: asked all the time; returns why to stop, None while there is no reason.
+        stopped: called all the time; returns why to stop, None without a reason.
     """
 
     def __init__(
@@ -334,16 +333,16 @@ class SingleJoint:
     # --- driven gently
 
     def enable_torque(self, params: StopSearchParams) -> None:
-        """Switch the torque on where the joint is, weak and slow; see SingleServo."""
+        """Switch the torque on at its position, weak and slow; see SingleServo."""
         self.servo.enable_torque(params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG)
 
     def find_stop(self, params: StopSearchParams, direction: int) -> EndStop:
-        """Lead it to its stop towards more (1) or fewer (-1) steps, and a little back.
+        """Move it to its stop towards more (1) or fewer (-1) steps, and a little back.
 
         Raises:
             BusLost: it does not answer any more.
-            ServoFault: it let go on the way, so where it stood was no stop.
-            CalibrationStopped: a person or the system asked for it.
+            ServoFault: it let go during the search, so it was not at a stop.
+            CalibrationStopped: a person or the system requested it.
         """
         stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
         if not self.servo.torque_is_on():
@@ -354,7 +353,7 @@ class SingleJoint:
         return stop
 
     def go(self, params: StopSearchParams, goal_steps: int) -> bool:
-        """Lead it slowly to a position; return whether it came there unhindered."""
+        """Move it slowly to a position; return whether it came there unhindered."""
         return go(goal_steps, params, self._exchange)
 
     def _exchange(self, goal: int | None) -> tuple[int, float, float]:

@@ -64,7 +64,7 @@ class Keys(Protocol):
         ...
 
     def next(self, ready: bool) -> Key | None:
-        """Return the next key, None where there is none; ``ready``: the last one has been done."""
+        """Return the next key, None without one; ``ready``: the last one has taken effect."""
         ...
 
 
@@ -100,7 +100,7 @@ class LineKeys:
         """Leave nothing behind."""
 
     def next(self, ready: bool) -> Key | None:
-        """Return the next key where the eyes are ready for it.
+        """Return the next key if the eyes are ready for it.
 
         Raises:
             SetupError: a line is no key, or there are no more.

@@ -104,7 +104,7 @@ def examine_detector(params: FaceDetectorParams) -> Diagnostic:
 
 
 def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:
-    """Examine every bus, and tell what was found; return the findings by bus."""
+    """Examine every bus, and print the findings; return them by bus."""
     findings = {}
     for bus, line in lines.items():
         config, setups = rig.bus_named(bus), setups_on(rig, bus)
@@ -133,7 +133,7 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[
 
 
 def _tell(line: str) -> None:
-    """Print a line of the doctor's; all of it goes the same way, so that its order stays."""
+    """Print a line of the doctor's; all lines go to one stream, so that their order stays."""
     level, space, rest = completed(line).partition(" ")
     out = console()
     if level in STYLES:
@@ -149,7 +149,7 @@ def _fix(
     findings: Mapping[str, Sequence[Diagnostic]],
     tell: Tell,
 ) -> None:
-    """Mend what can be, and say each thing."""
+    """Apply all fixes, and print each of them."""
     done = []
     for bus, line in lines.items():
         done += checkup.fix_latency(line.port_name, bench.host)

@@ -1,16 +1,15 @@
-"""A person at the terminal who moves a servo by small steps, and says numbers."""
+"""Input of a person at the terminal who moves a servo by small steps, and types numbers."""
 
 import select
 import sys
 from collections.abc import Callable
 from math import isfinite
 
-from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.linkage_calibration import Steered
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import TerminalKeys
 from gazerig.features.bringup.cli.prompts import LOOK_S, TerminalPerson
-from gazerig.robot.cli.terminal import say, status
+from gazerig.robot.cli.terminal import say
 
 STEPS_US = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 FIRST_STEP = 3
@@ -25,11 +24,11 @@ LINES_HELP = "+20 or -20 moves it by so many us, 1480 to that width, Enter: it i
 class SteeringPerson(TerminalPerson):
     """Asks on the terminal; implements Steerer.
 
-    Keys are taken as they are pressed where a terminal answers, lines from a file or a pipe.
+    Keys of a terminal act as they are pressed, lines of a file or a pipe one by one.
     """
 
     def steer(self, question: str, servo: Steered) -> None:
-        """Return when the servo is where it is wanted; see Steerer."""
+        """Return when the servo has the desired position; see Steerer."""
         say(question)
         if self._lines.scripted or not sys.stdin.isatty():
             self._by_lines(question, servo)
@@ -37,7 +36,7 @@ class SteeringPerson(TerminalPerson):
             self._by_keys(servo)
 
     def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Return the number they say, Enter is the proposed one; see Steerer."""
+        """Return the typed number, Enter is the proposed one; see Steerer."""
         asked = f"{question} [{proposed:g}]"
         say(asked)
         while True:
@@ -49,35 +48,6 @@ class SteeringPerson(TerminalPerson):
             if isfinite(number):
                 return number
             say(f"{line!r} is no number: a number, or Enter for {proposed:g}; q ends")
-
-    def _line(self, asked: str, live: Callable[[], str]) -> str:
-        """Wait for a line while something is looked after.
-
-        Raises:
-            CalibrationStopped: the user asked to end.
-            SetupError: there are no more lines.
-        """
-        while True:
-            self._look(live)
-            try:
-                line = self._lines.next(LOOK_S)
-            except EOFError:
-                raise SetupError(
-                    f"no answer left to: {asked}: answer on the terminal, or give a file with "
-                    "one line an answer (--answers; an empty line is Enter)"
-                ) from None
-            if line in ("q", "quit"):
-                raise CalibrationStopped("q")
-            if line is not None:
-                return line
-
-    def _look(self, live: Callable[[], str], more: str = "") -> None:
-        why = self._stopped()
-        if why is not None:
-            raise CalibrationStopped(why)
-        shown = live()
-        if self._live_line:
-            status(f"{shown}{more}")
 
     def _by_lines(self, question: str, servo: Steered) -> None:
         while line := self._line(question, servo.live):

@@ -1,4 +1,4 @@
-"""A rig that holds where it is while a command moves it; whatever happens, it ends torque off."""
+"""A rig that holds its pose while a command moves it; whatever happens, it ends torque off."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
@@ -38,7 +38,7 @@ def holding_rig(
     park: bool = True,
     watch: Callable[[Step], None] | None = None,
 ) -> Iterator[ManualControl]:
-    """Switch torque on where the joints are; at the end of the block park, torque off, close.
+    """Switch torque on at the present pose; at the end of the block park, torque off, close.
 
     Args:
         rig: to move.

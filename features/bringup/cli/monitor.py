@@ -2,7 +2,7 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import inf
 from typing import Annotated
 
@@ -146,7 +146,10 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
     )
     table.add_column("joint", no_wrap=True)
     table.add_column("id", justify="right", no_wrap=True)
-    for name in _columns(joints.values()):
+    # The place of a hobby servo is its pulse width in us.
+    units = dict.fromkeys("step" if joint.facts.measured else "us" for joint in joints.values())
+    goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
+    for name in (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("torque", no_wrap=True)
     table.add_column("errors")
@@ -154,13 +157,6 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
         bus, servo_id = joints[name].bus, joints[name].id
         table.add_row(name, f"{bus}:{servo_id}" if bus else f"{servo_id}", *_row(look))
     return table
-
-
-def _columns(joints: Collection[JointParams]) -> tuple[str, ...]:
-    """Return the headings; a hobby servo's place is its pulse width in us."""
-    units = dict.fromkeys("step" if joint.facts.measured else "us" for joint in joints)
-    goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
-    return (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V")
 
 
 def _row(look: Telemetry | None) -> tuple[str, ...]:
@@ -171,10 +167,13 @@ def _row(look: Telemetry | None) -> tuple[str, ...]:
     else:
         errors = "none" if look.measured else _UNTOLD
     at = _number(look.position_deg, 1)
+    place = _UNTOLD if look.position_steps is None else str(look.position_steps)
+    if look.pulse_us is not None:
+        place = f"{look.pulse_us:g}" if look.pulse_us else "none"
     return (
         _number(look.goal_deg, 1),
         at if look.measured or at == _UNTOLD else f"~{at}",
-        _place(look),
+        place,
         _number(look.velocity_deg_s, 0),
         _number(None if look.load is None else 100.0 * look.load, 0),
         _number(look.temperature_c, 0),
@@ -184,13 +183,6 @@ def _row(look: Telemetry | None) -> tuple[str, ...]:
     )
 
 
-def _place(look: Telemetry) -> str:
-    """Write the servo's own position, or the pulse that it gets."""
-    if look.pulse_us is not None:
-        return f"{look.pulse_us:g}" if look.pulse_us else "none"
-    return _UNTOLD if look.position_steps is None else str(look.position_steps)
-
-
 def _number(value: float | None, digits: int) -> str:
-    """Write a number, zero without a sign, and "-" where there is none."""
+    """Write a number, zero without a sign, and "-" for None."""
     return _UNTOLD if value is None else f"{round(value, digits) + 0.0:.{digits}f}"

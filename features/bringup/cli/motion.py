@@ -5,15 +5,14 @@ import select
 import sys
 from collections.abc import Iterable, Iterator
 from math import degrees, inf
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.cli.manual_session import holding, holding_rig
-from gazerig.features.bringup.cli.ports import MockOption, PortOption, rig_ports
+from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
 from gazerig.features.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, refuse_beyond
 from gazerig.features.bringup.move_result import PASSING, MoveResult, Step
@@ -59,7 +58,7 @@ def jog(
     with clear_errors(rig, port, mock):
         loaded = load_rig(rig)
         refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
-    with _commanded(loaded, _Way(mock, port, yes, rig), speed, hold, not no_park) as control:
+    with _commanded(loaded, rig, mock, port, yes, speed, hold, not no_park) as control:
         moved = control.jog(joint, deg)
         _report(moved, (joint,))
         _stay(control, seconds, hold)
@@ -80,7 +79,7 @@ def home(
         loaded = load_rig(rig)
     centre = dict.fromkeys(loaded.names, 0.0)
     centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
-    with _commanded(loaded, _Way(mock, port, yes, rig), speed, hold, False) as control:
+    with _commanded(loaded, rig, mock, port, yes, speed, hold, False) as control:
         moved = control.pose(centre)
         _report(moved, loaded.names)
         _stay(control, 0.0, hold)
@@ -111,80 +110,58 @@ def look_at_command(
         from gazerig.robot.app.gaze_models import gaze_parts
 
         kinematics, oculomotor = gaze_parts(loaded, seed)
-    with _commanded(loaded, _Way(mock, port, yes, rig), 20.0, hold, not no_park) as control:
+    with _commanded(loaded, rig, mock, port, yes, 20.0, hold, not no_park) as control:
         looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
         good = _report_look(looked, loaded)
         _stay(control, 0.0, hold)
     _exit_unless(good)
 
 
-class _Way(NamedTuple):
-    """The way to the servos, as asked on the command line.
-
-    yes: no hand is in them
-    rig: as it was named, for the commands that messages suggest
-    """
-
-    mock: bool
-    port: str | None
-    yes: bool
-    rig: str
-
-
 @contextlib.contextmanager
 def _commanded(
-    rig: Rig, way: _Way, speed: float, hold: bool, park: bool
+    rig: Rig,
+    name: str,
+    mock: bool,
+    port: str | None,
+    yes: bool,
+    speed: float,
+    hold: bool,
+    park: bool,
 ) -> Iterator[ManualControl]:
-    """Return a rig that holds where it is; whatever happens, it ends with the torque off."""
-    if not way.mock:
-        with clear_errors(way.rig, way.port):  # before Ctrl-C is only noted
-            _ask_for_fingers(rig, way.yes)
+    """Return a rig that holds its pose; whatever happens, it ends with the torque off.
+
+    name: the rig as the user named it, for the commands that messages suggest
+    """
+    without_feedback = [name for name in rig.names if not rig.joints[name].facts.measured]
+    if without_feedback and not mock:
+        with clear_errors(name, port):  # before Ctrl-C is only noted
+            confirm_safe(
+                f"{', '.join(without_feedback)}: hobby servos without pulses go to their parking "
+                "place at once, at their own full speed",
+                "take your hands out of the mechanism",
+                "Is no hand in the mechanism?",
+                yes,
+            )
     with (
-        clear_errors(way.rig, way.port, way.mock),
+        clear_errors(name, port, mock),
         signals() as stopped,
-        rig_ports(rig, way.mock, way.port) as wire,
+        rig_ports(rig, mock, port) as wire,
     ):
-        enter = enter_pressed if hold and sys.stdin.isatty() else _never
-        params = JogParams(speed_deg_s=_gentle(rig, speed))
+        gentle = rig.guard.soft_start_speed_deg_s
+        if speed > gentle:
+            say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
+        params = JogParams(speed_deg_s=min(speed, gentle))
         watch = _StatusLine().show if sys.stderr.isatty() else None
-        end = lambda: stopped() or enter()  # noqa: E731
+        by_key = hold and sys.stdin.isatty()
+        end = lambda: stopped() or (enter_pressed() if by_key else None)  # noqa: E731
         with holding_rig(rig, wire.paths, params, end, stopped, park, watch) as control:
             _tell(control.body.bus.events())
             say(f"{holding(rig)}; Ctrl-C switches it off")
             yield control
 
 
-def _ask_for_fingers(rig: Rig, yes: bool) -> None:
-    """Ask for confirmation before servos jump whose positions are not known.
-
-    Raises:
-        SetupError: no user is there to ask.
-        typer.Abort: the answer was no.
-    """
-    without_feedback = [name for name in rig.names if not rig.joints[name].facts.measured]
-    if not without_feedback:
-        return
-    why = (
-        f"{', '.join(without_feedback)}: hobby servos without pulses go to their parking place at once, at "
-        "their own full speed"
-    )
-    if not yes and not sys.stdin.isatty():
-        raise SetupError(f"{why}: take your hands out of the mechanism and say --yes")
-    say(why)
-    if not yes:
-        typer.confirm("Is no hand in the mechanism?", abort=True)
-
-
-def _gentle(rig: Rig, speed: float) -> float:
-    """Return a speed that the guard's gentle speed allows."""
-    gentle = rig.guard.soft_start_speed_deg_s
-    if speed > gentle:
-        say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
-    return min(speed, gentle)
-
-
 class _StatusLine:
-    """Shows what stands in the way; written only when it changes."""
+    """Shows the reasons that limit a motion; written only when they change."""
 
     def __init__(self) -> None:
         self._shown = ""
@@ -195,10 +172,6 @@ class _StatusLine:
         if line != self._shown:
             self._shown = line
             status(line)
-
-
-def _never() -> str | None:
-    return None
 
 
 def enter_pressed() -> str | None:

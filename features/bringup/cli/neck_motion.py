@@ -34,7 +34,7 @@ class JoggedNeck:
         self._angles: Angles3 = (0.0, 0.0, 0.0)
 
     def turn(self, head_rad: Angles3) -> None:
-        """Move gently; where the guard holds it back, what is measured counts."""
+        """Move gently; if the guard holds it back, the measured angles count."""
         go_on(self._stopped)
         there = self._control.body.names
         axes = zip(NECK, head_rad, strict=True)
@@ -45,7 +45,7 @@ class JoggedNeck:
         self.rest(_SETTLE_S)
 
     def rest(self, seconds: float) -> None:
-        """Hold still, and record where the head is."""
+        """Hold still, and measure the head."""
         moved = self._control.hold(seconds)
         go_on(self._stopped)
         at = dict(zip(self._control.body.names, moved.last.joints.position_rad, strict=True))
@@ -91,7 +91,7 @@ def moving_neck(
 
 
 def go_on(stopped: StopReason) -> None:
-    """Refuse to go on where there is a reason to stop.
+    """Refuse to continue if there is a reason to stop.
 
     Raises:
         CameraCalibrationRefused: with the reason.

@@ -1,4 +1,4 @@
-"""The way to the servos that commands share: a rig, its ports, other ports, or emulated buses."""
+"""Access to servos that commands share: a rig, its ports, other ports, or emulated buses."""
 
 import contextlib
 import sys
@@ -18,7 +18,7 @@ from gazerig.drivers.serial.port_owner import check_owner, usb_id_of
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
 from gazerig.robot.app.emulation import emulated_lines
-from gazerig.robot.cli.terminal import status
+from gazerig.robot.cli.terminal import say, status
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
@@ -36,7 +36,7 @@ def ports_here() -> tuple[SerialPort, ...]:
 
 
 def usb_id(path: str) -> str:
-    """Return the USB vendor and product id of a port, "" where it has none."""
+    """Return the USB vendor and product id of a port, "" if it has none."""
     return usb_id_of(path, ports_here())
 
 
@@ -91,15 +91,6 @@ class RigPorts(NamedTuple):
         """Return the ports, not opened yet."""
         return {name: port_of(path) for name, path in self.paths.items()}
 
-    def command(self, text: str, bus: str) -> None:
-        """Send a command to the emulator of a bus; without effect on real ports.
-
-        Raises:
-            ValueError: names the word that is wrong and what would be right.
-        """
-        if self.buses is not None:
-            self.buses.command(text, bus)
-
 
 def refuse_packages(rig: Rig, command: str) -> None:
     """Refuse a command that speaks to servos of our kinds alone.
@@ -140,7 +131,7 @@ def rig_ports(
 
 
 def bus_label(rig: Rig, name: str) -> str:
-    """Call a bus by its name where a rig has several: "the bus", "bus lids"."""
+    """Return the name of a bus: "the bus" if it is the only one, or "bus lids"."""
     if len(bus_names(rig)) == 1:
         return "the bus"
     return f"bus {name}" if name else "the main bus"
@@ -168,3 +159,23 @@ def opened(
         if not port.setBaudRate(baud):
             raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose another")
         yield port
+
+
+def confirm_safe(why: str, remedy: str, question: str, yes: bool) -> None:
+    """Warn of a movement, and ask for a confirmation.
+
+    Args:
+        why: what will move.
+        remedy: what the user must do first.
+        question: for a yes or no.
+        yes: the answer is known.
+
+    Raises:
+        SetupError: no user is there to ask.
+        typer.Abort: the answer was no.
+    """
+    if not yes and not sys.stdin.isatty():
+        raise SetupError(f"{why}: {remedy} and say --yes")
+    say(why)
+    if not yes:
+        typer.confirm(question, abort=True)

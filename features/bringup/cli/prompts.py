@@ -111,13 +111,32 @@ class TerminalPerson:
 
     def _ask(self, question: str, live: Callable[[], str], accepted: tuple[str, ...]) -> str:
         say(question)
+        while (line := self._line(question, live)) not in accepted:
+            self._other(line, live, accepted)
+        return line
+
+    def _look(self, live: Callable[[], str], more: str = "") -> None:
+        """Watch the joint once, and show it.
+
+        Raises:
+            CalibrationStopped: there is a reason to end.
+        """
+        why = self._stopped()
+        if why is not None:
+            raise CalibrationStopped(why)
+        shown = live()
+        if self._live_line:
+            status(f"{shown}{more}")
+
+    def _line(self, question: str, live: Callable[[], str]) -> str:
+        """Wait for a line while the joint is watched.
+
+        Raises:
+            CalibrationStopped: the user ended it, or there is another reason.
+            SetupError: there are no more lines.
+        """
         while True:
-            why = self._stopped()
-            if why is not None:
-                raise CalibrationStopped(why)
-            shown = live()
-            if self._live_line:
-                status(shown)
+            self._look(live)
             try:
                 line = self._lines.next(LOOK_S)
             except EOFError:
@@ -125,16 +144,13 @@ class TerminalPerson:
                     f"no answer left to: {question}: answer on the terminal, or give a file with "
                     "one line an answer (--answers; an empty line is Enter)"
                 ) from None
-            if line is None:
-                continue
-            if line in accepted:
+            if line in ("q", "quit"):
+                raise CalibrationStopped("q")
+            if line is not None:
                 return line
-            self._other(line, live, accepted)
 
     def _other(self, line: str, live: Callable[[], str], accepted: tuple[str, ...]) -> None:
-        """Obey what is no answer: q, and turning an emulated joint."""
-        if line in ("q", "quit"):
-            raise CalibrationStopped("q")
+        """Turn an emulated joint, or explain that the line is no answer."""
         word, _, number = line.partition(" ")
         if word == "turn" and self.hand is not None and number.lstrip("+-").isdecimal():
             left = int(number)

@@ -13,7 +13,13 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.features.bringup.cli.motion import enter_pressed
-from gazerig.features.bringup.cli.ports import MockOption, PortOption, opened, rig_ports
+from gazerig.features.bringup.cli.ports import (
+    MockOption,
+    PortOption,
+    confirm_safe,
+    opened,
+    rig_ports,
+)
 from gazerig.features.bringup.hand_recording import LONGEST_S, HandRecording, record, switch_off
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
@@ -60,7 +66,12 @@ def record_gesture(
             )
         gesture_name(f"{name}.yaml")
         refuse_existing(folder / f"{name}.yaml", force=force)
-        _ask_to_let_go(yes)
+        confirm_safe(
+            "the torque of all servos goes off and stays off: a heavy head drops",
+            "hold it",
+            "Is the head held, and no finger between its parts?",
+            yes,
+        )
         recorded = _recorded(loaded, measured, seconds, mock, port)
         if recorded is None:
             say("ended by Ctrl-C: the torque is off, nothing is written")
@@ -71,25 +82,10 @@ def record_gesture(
         say_written(loaded.name, *write_gesture(loaded, name, text, folder, force))
 
 
-def _ask_to_let_go(yes: bool) -> None:
-    """Warn that the head drops, and ask whether it is held.
-
-    Raises:
-        SetupError: no user is there to ask.
-        typer.Abort: the answer was no.
-    """
-    why = "the torque of all servos goes off and stays off: a heavy head drops"
-    if not yes and not sys.stdin.isatty():
-        raise SetupError(f"{why}: hold it and say --yes")
-    say(why)
-    if not yes:
-        typer.confirm("Is the head held, and no finger between its parts?", abort=True)
-
-
 def _recorded(
     rig: Rig, joints: list[str], seconds: float, mock: bool, port: str | None
 ) -> HandRecording | None:
-    """Switch the torque off and record; None where it was ended by a signal."""
+    """Switch the torque off and record; None if a signal ended it."""
     clock, there = RealClock(), {name: rig.joints[name] for name in joints}
     with signals() as stopped, rig_ports(rig, mock, port) as wire, ExitStack() as ports:
         readers = {}

@@ -1,4 +1,4 @@
-"""What a calibration found, written into the rig's YAML after a yes; comments are kept."""
+"""Writing of calibrated values into the rig's YAML after a yes; comments are kept."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -40,13 +40,13 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
 def write_found(
     rig: str, values: Mapping[str, Any], out: Path | None, person: TerminalPerson
 ) -> None:
-    """Write values after a yes, and say where the old file is.
+    """Write values after a yes, and print the path of the old file.
 
     Args:
         rig: as it was named.
         values: by the dotted keys of the rig file.
         out: a copy of a shipped rig to write instead, None for the rig itself.
-        person: is asked.
+        person: answers.
     """
     if not values:
         say("everything is as the rig file says: nothing to write")

@@ -22,7 +22,6 @@ from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
-from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.features.bringup.bus_search import (
     RATES,
     SearchRound,
@@ -113,7 +112,7 @@ def _paths(
 def _boards(path: str, as_json: bool) -> bool:
     """Search one I2C bus and show what was found; return whether any board answered.
 
-    Of a serial port it is asked only where that was named: to a Maestro such bytes are commands.
+    A serial port is searched only if the user named it: to a Maestro such bytes are commands.
     """
     with bench.to_open(path) as line:
         found = [f"{address:#x}" for address in probe(line, Pca9685Params())]
@@ -194,7 +193,7 @@ def _one(
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
         if not thorough and not any(one.answered for one in rounds):
-            # Ids that lie far apart answer after a long silence; some not a ping to all.
+            # Ids that are far apart answer after a long silence; some not a ping to all.
             servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
             rounds = [*boards, *_search(line, usb, servos, True, named == "all")]
@@ -238,8 +237,8 @@ def _show(
     if as_json:
         answer: dict[str, object] = {
             "port": where,
-            "servos": [servo_plain(kind, servo) for kind, servo in found],
-            "boards": [board_plain(one) for one in boards],
+            "servos": [{"kind": kind, **servo._asdict()} for kind, servo in found],
+            "boards": [_board_plain(one) for one in boards],
         }
         print(json.dumps(answer))
         return
@@ -252,25 +251,13 @@ def _show(
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
     for one in boards:
-        for line in board_text(one):
+        for line in _board_text(one):
             out.print(f"{where}: {line}", markup=False)
     for line in remarks(rounds, where, requested):
         out.print(completed(line), markup=False)
 
 
-def servo_plain(kind: BusKind, servo: FoundServo) -> dict[str, object]:
-    """Return a servo as JSON can hold it."""
-    return {
-        "kind": kind,
-        "id": servo.id,
-        "number": servo.number,
-        "firmware": servo.firmware,
-        "baud": servo.baud,
-        "model": servo.model,
-    }
-
-
-def board_plain(looked: SearchRound) -> dict[str, object]:
+def _board_plain(looked: SearchRound) -> dict[str, object]:
     """Return a Maestro as JSON can hold it; pulses in us, 0 for none."""
     board = looked.board
     if board is None:
@@ -279,7 +266,7 @@ def board_plain(looked: SearchRound) -> dict[str, object]:
     return {**board._asdict(), "channels": looked.channels, "baud": looked.baud, "pulses": pulses}
 
 
-def board_text(looked: SearchRound) -> Iterator[str]:
+def _board_text(looked: SearchRound) -> Iterator[str]:
     """Return a description of what a board reported."""
     board = looked.board
     if board is None:
@@ -303,13 +290,18 @@ def remarks(
 ) -> Iterator[str]:
     """Return remarks on a scan beyond its tables of servos and boards.
 
-    requested: kinds that were to be asked, unless one before them answered
+    requested: kinds to search, unless one before them answered
     """
     found = found_of(rounds)
     boards = sum(1 for one in rounds if one.board is not None)
     if not boards or found:
         count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
-        yield f"{count} on {where}; {_asked(rounds)}"
+        rates: dict[BusKind, list[str]] = {}
+        for one in rounds:
+            if one.possible:
+                rates.setdefault(one.kind, []).append(str(one.baud))
+        named = (f"asked {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
+        yield f"{count} on {where}; {'; '.join(named)}"
     unasked = [kind for kind in requested if kind not in {one.kind for one in rounds}]
     if unasked and boards:
         yield "nothing else was sent: packets for servos would move what hangs on the board"
@@ -324,15 +316,6 @@ def remarks(
             "using the port? a Maestro on USB: is it set to 'USB Dual Port', and is this the "
             "first of its two ports?"
         )
-
-
-def _asked(rounds: Sequence[SearchRound]) -> str:
-    """Return a text: which kinds were searched at which baud rates."""
-    rates: dict[BusKind, list[str]] = {}
-    for one in rounds:
-        if one.possible:
-            rates.setdefault(one.kind, []).append(str(one.baud))
-    return "; ".join(f"asked {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
 
 
 def _odd(one: SearchRound, heard: Container[int]) -> Iterator[str]:

@@ -1,12 +1,11 @@
-"""The command ``gazerig setup``: each servo gets its id, each channel is tried."""
+"""The command ``gazerig setup``: each servo gets its id, each channel is tested."""
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import typer
 
-from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, SetupError
@@ -17,7 +16,6 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     YesOption,
-    bus_label,
     progress,
     refuse_packages,
     rig_ports,
@@ -25,12 +23,16 @@ from gazerig.features.bringup.cli.ports import (
     to_open,
     wipe,
 )
-from gazerig.features.bringup.cli.setup_boards import set_up_board, set_up_boards, write_settings
+from gazerig.features.bringup.cli.setup_boards import (
+    SetupTask,
+    press_enter,
+    set_up_maestro,
+    set_up_pca9685,
+)
 from gazerig.features.bringup.servo_families import ServoKind, kind_of
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import CHAINS
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
-from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 app = typer.Typer()
@@ -56,63 +58,30 @@ def setup(
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         refuse_packages(model, "setup")
-        wanted = _known_joints(joint or list(model.names), model.names)
+        wanted = joint or list(model.names)
+        for name in wanted:
+            if name not in model.names:
+                named = ", ".join(model.names)
+                raise SetupError(f"--joint {name}: unknown; joints are {named}")
         left: list[str] = []
         for bus in bus_names(model):
             mine = [one for one in setups_on(model, bus) if one.name in wanted]
-            if not mine:
-                continue
-            task = _Task(model, rig, bus, mine, port, mock, yes, settings)
-            left += BOARDS.get(model.bus_named(bus).kind, _chain)(task)
+            if mine:
+                task = SetupTask(model, rig, bus, mine, port, mock, yes, settings)
+                left += BOARDS.get(model.bus_named(bus).kind, _set_up_chain)(task)
         if left:
             say(f"skipped: {', '.join(left)}")
         say(f"done: {len(wanted) - len(left)} of {len(wanted)}. Next: gazerig doctor")
 
 
-class _Task(NamedTuple):
-    """Setting up the servos of one bus, as asked on the command line.
-
-    named: the rig as it was named; setups: of the servos that are meant
-    settings: file for what a Maestro must be set to
-    """
-
-    rig: Rig
-    named: str
-    bus: str
-    setups: list[ServoConfig]
-    port: str | None
-    mock: bool
-    yes: bool
-    settings: Path | None
-
-    @property
-    def title(self) -> str:
-        """Return the rig as it was named, with its bus where there are several."""
-        several = len(bus_names(self.rig)) > 1
-        return f"{self.named}, {bus_label(self.rig, self.bus)}" if several else self.named
-
-    @property
-    def joints(self) -> dict[str, JointParams]:
-        """Return the joints of the servos that are meant."""
-        return {one.name: self.rig.joints[one.name] for one in self.setups}
-
-    @property
-    def config(self) -> BusConfig:
-        """Return the bus as the rig describes it."""
-        return self.rig.bus_named(self.bus)
+BOARDS: dict[str, Callable[[SetupTask], list[str]]] = {
+    "maestro": set_up_maestro,
+    "pca9685": set_up_pca9685,
+}
+"""Kinds of bus whose servos have no ids."""
 
 
-def _known_joints(names: list[str], known: tuple[str, ...]) -> tuple[str, ...]:
-    for name in names:
-        if name not in known:
-            raise SetupError(f"--joint {name}: unknown; joints are {', '.join(known)}")
-    return tuple(names)
-
-
-# --- servos with ids
-
-
-def _chain(task: _Task) -> list[str]:
+def _set_up_chain(task: SetupTask) -> list[str]:
     """Set the servos of one bus up; return the joints that were skipped."""
     count = len(task.setups)
     say(
@@ -122,33 +91,35 @@ def _chain(task: _Task) -> list[str]:
     left = []
     for n, one in enumerate(task.setups, 1):
         say(f"{n} of {count}: connect the {one.model} of {servo_label(one)}, and no other servo")
-        if not _step(task, one):
+        if not _set_up_joint(task, one):
             left.append(one.name)
     return left
 
 
-def _step(task: _Task, one: ServoConfig) -> bool:
+def _set_up_joint(task: SetupTask, one: ServoConfig) -> bool:
     """Set one joint's servo up, again and again until it is done or skipped."""
-    bus, kind, yes = task.bus, kind_of(one.model), task.yes
+    kind = kind_of(one.model)
     # As it comes from the factory.
     spec = ServoSpec(FACTORY_ID, one.model, task.rig.joints[one.name].zero)
-    fresh = {bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
+    fresh = {task.bus: CHAINS[kind.name]((spec,), kind.family.factory_baud)}
+    question = "   Enter: it is connected; s: skip this one; Ctrl-C: end "
     while True:
-        if not yes and not _go_on("   Enter: it is connected; s: skip this one; Ctrl-C: end "):
+        if not task.yes and press_enter(question).lower().startswith("s"):
             return False
         try:
             with (
                 rig_ports(task.rig, task.mock, task.port, fresh) as wired,
-                to_open(wired.paths[bus]) as line,
+                to_open(wired.paths[task.bus]) as line,
             ):
-                return _set_up(line, kind, one, task.config.baud, yes)
+                return _set_up(line, kind, one, task.config.baud, task.yes)
         except DriverError as error:
-            if yes:
+            if task.yes:
                 raise
             say(f"   {error}")
 
 
 def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes: bool) -> bool:
+    """Give the connected servo its id and baud rate; return False if the user skips it."""
     found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
     wipe()
     firmware = kind.family.version(found.firmware)
@@ -165,39 +136,3 @@ def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes:
         f"{result.now.baud} bit/s"
     )
     return True
-
-
-def _go_on(question: str) -> bool:
-    """Wait for Enter; False where the person skips."""
-    return (
-        not typer.prompt(question, default="", show_default=False, prompt_suffix="", err=True)
-        .lower()
-        .startswith("s")
-    )
-
-
-# --- channels of a board
-
-
-def _maestro(task: _Task) -> list[str]:
-    """Print what to set on a board and test its channels; return the joints that were skipped."""
-    params, setups = task.config.maestro, task.setups
-    say(f"{task.title}: a Pololu Maestro; {len(setups)} of its channels to try.")
-    with rig_ports(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
-        if task.settings is not None:
-            every = setups_on(task.rig, task.bus)
-            write_settings(task.settings, params, every, line.port_name)
-        return set_up_board(line, params, setups, task.joints, task.yes)
-
-
-def _pca9685(task: _Task) -> list[str]:
-    """Print how boards are wired and test their channels; return the joints that were skipped."""
-    params, setups, every = task.config.pca9685, task.setups, setups_on(task.rig, task.bus)
-    key = f"buses.{task.bus}.pca9685" if task.bus else "bus.pca9685"
-    say(f"{task.title}: PCA9685; {len(setups)} of its channels to try.")
-    with rig_ports(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
-        return set_up_boards(line, params, setups, task.joints, every, task.named, key, task.yes)
-
-
-BOARDS: dict[str, Callable[[_Task], list[str]]] = {"maestro": _maestro, "pca9685": _pca9685}
-"""Kinds of bus whose servos have no ids."""

@@ -1,16 +1,25 @@
-"""Which servo hangs on which channel of a board: each is moved a little, and a person says."""
+"""Setting up boards of hobby servos: settings, the clock of a PCA9685, then channel by channel.
+
+Nothing of a Maestro can be set over its serial line, and no channel's range can be read: ranges
+are tested with the servo supply off, when nothing moves. A PCA9685 keeps nothing without power:
+the program sets it up at every start; its oscillator has 25 MHz by the data sheet, and boards of
+23 to 27 MHz are reported, which changes every pulse by the same share. A person reports which
+servo is connected to which channel: each is moved a little.
+"""
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
 from math import radians
 from pathlib import Path
+from typing import NamedTuple
 
 import typer
 
 from gazerig.config.faults import ConfigError
+from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.save import save_rig
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing
@@ -19,7 +28,6 @@ from gazerig.drivers.files.file_output import write_file
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.maestro.board import MaestroBoard
-from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
@@ -30,27 +38,66 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.channel_test import FINE_STEPS, ChannelPosition, given, walk
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.maestro_settings import clipped, instructions, settings_file
+from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.cli.terminal import say, signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.joint import JointParams
 
 WIGGLE_DEG = 5.0
 
+QUICK_STEPS_S = 90.0 / 360.0 * 16_000.0
+"""Speed of a range test without servo supply, in case it is on after all."""
+
+PULSE_STEPS = 1500 * US_STEPS
+LOW_HZ, HIGH_HZ = 22e6, 28e6
+"""No board has been seen outside; also the bounds of oscillator_hz."""
+
+_MEASURED = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(hz|us)\s*", re.IGNORECASE)
+
 Explain = Callable[[ServoConfig, ChannelPosition], str]
-"""Says why a board's pulse is not where it was sent, and the cure."""
+"""Returns why a board's pulse is not as commanded, and the remedy."""
 
 
-def try_channels(
-    board: Board,
-    setups: Sequence[ServoConfig],
-    joints: Mapping[str, JointParams],
-    yes: bool,
-    explain: Explain,
-) -> list[str]:
+class SetupTask(NamedTuple):
+    """Setting up the servos of one bus, as requested on the command line.
+
+    rig_name: the rig as the user named it; setups: of the chosen servos
+    settings: file for the settings of a Maestro
+    """
+
+    rig: Rig
+    rig_name: str
+    bus: str
+    setups: list[ServoConfig]
+    port: str | None
+    mock: bool
+    yes: bool
+    settings: Path | None
+
+    @property
+    def title(self) -> str:
+        """Return the rig's name, with its bus if it has several."""
+        if len(bus_names(self.rig)) == 1:
+            return self.rig_name
+        return f"{self.rig_name}, {bench.bus_label(self.rig, self.bus)}"
+
+    @property
+    def config(self) -> BusConfig:
+        """Return the bus as the rig describes it."""
+        return self.rig.bus_named(self.bus)
+
+
+def press_enter(question: str) -> str:
+    """Wait for Enter; return what was typed before it."""
+    answer = typer.prompt(question, default="", show_default=False, prompt_suffix="", err=True)
+    return str(answer)
+
+
+def _try_channels(board: Board, task: SetupTask, explain: Explain) -> list[str]:
     """Move one channel after the other; return the joints that were skipped.
 
     Raises:
-        ServoMissing: the board does not answer, and no user is asked (``yes``).
+        ServoMissing: the board does not answer, and no user can answer (``yes``).
         ServoFault: pulses could not be stopped.
         BusLost: the port is gone.
     """
@@ -59,20 +106,20 @@ def try_channels(
         "it goes to its rest place at once, wherever it is."
     )
     left = []
-    for n, setup in enumerate(setups, 1):
-        say(f"{n} of {len(setups)}: {servo_label(setup)}")
-        if not _channel(board, setup, joints[setup.name], yes, explain):
+    for n, setup in enumerate(task.setups, 1):
+        say(f"{n} of {len(task.setups)}: {servo_label(setup)}")
+        if not _channel(board, setup, task.rig.joints[setup.name], task.yes, explain):
             left.append(setup.name)
     return left
 
 
-def walked(
+def _walked(
     board: Board, setup: ServoConfig, places: Sequence[int], *speed_steps_s: float
 ) -> tuple[ChannelPosition, ...]:
-    """Lead a channel over places; a request to end is obeyed with pulses off.
+    """Move a channel over places; a request to end is obeyed with pulses off.
 
     Raises:
-        KeyboardInterrupt: the user asked for the end.
+        KeyboardInterrupt: the user requested the end.
     """
     clock = RealClock()
     with signals() as stopped:
@@ -85,7 +132,7 @@ def walked(
         return walk(board, setup, places, sleep_until, *speed_steps_s)
 
 
-def rest_steps(setup: ServoConfig) -> int:
+def _rest_steps(setup: ServoConfig) -> int:
     """Return the pulse at which a joint rests, within its range."""
     middle = (setup.min_steps + setup.max_steps) // 2
     rest = middle if setup.rest_steps is None else setup.rest_steps
@@ -95,14 +142,20 @@ def rest_steps(setup: ServoConfig) -> int:
 def _channel(
     board: Board, setup: ServoConfig, joint: JointParams, yes: bool, explain: Explain
 ) -> bool:
-    """Move one channel's servo until the person knows it, or skips it."""
-    rest, low, high = wiggle(setup, joint)
+    """Move one channel's servo until the person recognises it, or skips it."""
+    made, rest = joint.made(), _rest_steps(setup)
+    angle, wiggle = made.angle_rad(rest), radians(WIGGLE_DEG)
+    ends = (
+        max(radians(joint.min_deg), angle - wiggle),
+        min(radians(joint.max_deg), angle + wiggle),
+    )
+    low, high = (min(max(round(made.steps(end)), setup.min_steps), setup.max_steps) for end in ends)
     while True:
         at = f"it goes to {rest / US_STEPS:g} us at once, then {WIGGLE_DEG:g} deg to and fro"
         if not yes and not typer.confirm(f"   move it? {at}", default=False, err=True):
             return False
         try:
-            gone = walked(board, setup, (rest, low, high, rest))
+            gone = _walked(board, setup, (rest, low, high, rest))
         except ServoFault:
             raise
         except DriverError as error:
@@ -123,93 +176,67 @@ def _channel(
         )
 
 
-def wiggle(setup: ServoConfig, joint: JointParams) -> tuple[int, int, int]:
-    """Return the rest place and two places about it, in steps, all within the joint's range."""
-    made, rest = joint.made(), rest_steps(setup)
-    angle = made.angle_rad(rest)
-    least, most = radians(joint.min_deg), radians(joint.max_deg)
-    ends = (max(least, angle - radians(WIGGLE_DEG)), min(most, angle + radians(WIGGLE_DEG)))
-    low, high = (min(max(round(made.steps(end)), setup.min_steps), setup.max_steps) for end in ends)
-    return rest, low, high
+# --- Maestro
 
 
-QUICK_STEPS_S = 90.0 / 360.0 * 16_000.0
-"""Speed of a range that is tried out without servo supply, should that be on after all."""
-
-
-def set_up_board(
-    line: BusPort,
-    params: MaestroParams,
-    setups: Sequence[ServoConfig],
-    joints: Mapping[str, JointParams],
-    yes: bool,
-) -> list[str]:
-    """Go through a board's settings and channels; return the joints that were skipped.
+def set_up_maestro(task: SetupTask) -> list[str]:
+    """Print what to set on a board and test its channels; return the joints that were skipped.
 
     Raises:
+        SetupError: the file of settings cannot be written.
         PortError: the port cannot be opened, or no board answers.
         ServoFault: pulses could not be stopped.
         BusLost: the port is gone.
     """
-    for text in instructions(params, setups, on_usb(line.port_name)):
-        say(f"   {text}")
-    if not yes:
-        typer.prompt(
-            "   Enter: it is set, and Pololu's program is closed; Ctrl-C: end ",
-            default="", show_default=False, prompt_suffix="", err=True,
-        )  # fmt: skip
-    _refuse_size(setups, bench.usb_id(line.port_name), line.port_name)
-    line.setBaudRate(params.baud)
-    board, log = MaestroBoard(line, params), EventLog()
-    board.find((), log)
-    board.prepare(log)
-    for event in log.drain():
-        say(f"   {event}")
-    _ranges(board, setups, yes)
-    return try_channels(board, setups, joints, yes, _explain)
+    params, setups = task.config.maestro, task.setups
+    say(f"{task.title}: a Pololu Maestro; {len(setups)} of its channels to try.")
+    with (
+        bench.rig_ports(task.rig, task.mock, task.port) as wired,
+        bench.to_open(wired.paths[task.bus]) as line,
+    ):
+        path, usb = line.port_name, bench.usb_id(line.port_name)
+        # Its own USB port, and not one of an adaptor at its serial pins.
+        on_usb = usb.startswith(POLOLU)
+        if not usb:
+            on_usb = not os.path.realpath(path).startswith(("/dev/ttyS", "/dev/ttyAMA"))
+        if task.settings is not None:
+            text = settings_file(params, bench.setups_on(task.rig, task.bus), on_usb)
+            write_file(task.settings, text, force=True)
+            say(
+                f"   all that is to be set is in {task.settings}: in Pololu's Maestro Control "
+                "Center File, Open"
+            )
+            say(
+                "   settings file, then Apply Settings; or without it: UscCmd --configure "
+                f"{task.settings}"
+            )
+        for text in instructions(params, setups, on_usb):
+            say(f"   {text}")
+        if not task.yes:
+            press_enter("   Enter: it is set, and Pololu's program is closed; Ctrl-C: end ")
+        size = USB_CHANNELS.get(usb)
+        beyond = [servo_label(setup) for setup in setups if size is not None and setup.id >= size]
+        if beyond:
+            raise ServoMissing(
+                f"{path}: this board has channels 0..{(size or 0) - 1}, not those of "
+                f"{', '.join(beyond)}: correct their ids in the YAML"
+            )
+        line.setBaudRate(params.baud)
+        board, log = MaestroBoard(line, params), EventLog()
+        board.find((), log)
+        board.prepare(log)
+        for event in log.drain():
+            say(f"   {event}")
+        _test_ranges(board, setups, task.yes)
+        return _try_channels(board, task, _explain_maestro)
 
 
-def _explain(setup: ServoConfig, place: ChannelPosition) -> str:
+def _explain_maestro(setup: ServoConfig, place: ChannelPosition) -> str:
     return clipped(setup, place.asked, place.got)
 
 
-def write_settings(
-    file: Path, params: MaestroParams, setups: Sequence[ServoConfig], port: str
-) -> None:
-    """Write what to set on a board as a file of Pololu's programs, and say how it is loaded.
-
-    Raises:
-        SetupError: the file cannot be written.
-    """
-    write_file(file, settings_file(params, setups, on_usb(port)), force=True)
-    say(f"   all that is to be set is in {file}: in Pololu's Maestro Control Center File, Open")
-    say(f"   settings file, then Apply Settings; or without it: UscCmd --configure {file}")
-
-
-def _refuse_size(setups: Sequence[ServoConfig], usb: str, where: str) -> None:
-    """See that a board whose size its USB product tells has all the channels."""
-    size = USB_CHANNELS.get(usb)
-    beyond = [servo_label(setup) for setup in setups if size is not None and setup.id >= size]
-    if beyond:
-        raise ServoMissing(
-            f"{where}: this board has channels 0..{(size or 0) - 1}, not those of "
-            f"{', '.join(beyond)}: correct their ids in the YAML"
-        )
-
-
-def on_usb(path: str) -> bool:
-    """Return whether a port is a board's own on USB, and not one of adaptor and serial pins."""
-    usb = bench.usb_id(path)
-    if usb:
-        return usb.startswith(POLOLU)
-    return not os.path.realpath(path).startswith(("/dev/ttyS", "/dev/ttyAMA"))
-
-
-# --- ranges
-
-
-def _ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) -> None:
-    """Try out every channel's range, where the person says that nothing can move."""
+def _test_ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) -> None:
+    """Move every channel from end to end if the person confirms that no servo can move."""
     if yes:
         say("   the channels' ranges are not tried out: --yes cannot know that the supply is off")
         return
@@ -220,46 +247,25 @@ def _ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) -> No
     if not typer.confirm(question, default=False, err=True):
         say("   the channels' ranges are not tried out")
         return
-    cut = [text for setup in setups for text in _range(board, setup)]
+    cut: dict[str, None] = {}
+    for setup in setups:
+        rest = _rest_steps(setup)
+        places = (rest, setup.min_steps, setup.max_steps, rest)
+        for one in _walked(board, setup, places, QUICK_STEPS_S):
+            if abs(one.asked - one.got) > FINE_STEPS:
+                cut[_explain_maestro(setup, one)] = None
     for text in cut:
         say(f"   {text}")
     if not cut:
         say(f"   all {len(setups)} channels reach both ends of their joints' ranges")
-    typer.prompt(
-        "   Enter: the servo supply is on again; Ctrl-C: end ",
-        default="", show_default=False, prompt_suffix="", err=True,
-    )  # fmt: skip
+    press_enter("   Enter: the servo supply is on again; Ctrl-C: end ")
 
 
-def _range(board: MaestroBoard, setup: ServoConfig) -> list[str]:
-    """Lead a channel from end to end of its joint's range; return what cuts it."""
-    places = (rest_steps(setup), setup.min_steps, setup.max_steps, rest_steps(setup))
-    gone = walked(board, setup, places, QUICK_STEPS_S)
-    wrong = [one for one in gone if abs(one.asked - one.got) > FINE_STEPS]
-    return list(dict.fromkeys(_explain(setup, one) for one in wrong))
+# --- PCA9685
 
 
-def set_up_boards(
-    line: BusPort,
-    params: Pca9685Params,
-    setups: Sequence[ServoConfig],
-    joints: Mapping[str, JointParams],
-    every: Sequence[ServoConfig],
-    rig: str,
-    key: str,
-    yes: bool,
-) -> list[str]:
-    """Go through the boards of one bus and their channels; return the joints that were skipped.
-
-    Args:
-        line: its port.
-        params: how to reach them.
-        setups: the servos to try.
-        joints: theirs.
-        every: all servos of the bus.
-        rig: name or file, into which measured clocks are written.
-        key: of the section of the boards in it, "bus.pca9685".
-        yes: nothing is asked.
+def set_up_pca9685(task: SetupTask) -> list[str]:
+    """Print how boards are wired and test their channels; return the joints that were skipped.
 
     Raises:
         PortError: the port cannot be opened.
@@ -267,18 +273,27 @@ def set_up_boards(
         ServoFault: pulses could not be stopped.
         BusLost: the port is gone.
     """
-    line.setBaudRate(params.baud)
-    for address in params.addresses:
-        closed = [f"A{bit}" for bit in range(6) if address >> bit & 1]
-        say(f"   board {address:#x}: jumpers {', '.join(closed) or 'none'} closed")
-    for one in setups:
-        board, channel = divmod(one.id, CHANNELS)
-        say(f"   {one.name}: channel {channel} of board {params.addresses[board]:#x}")
-    if yes:
-        say("   the boards' clocks are not measured: --yes has no meter")
-    else:
-        params = _measured(line, params, frozenset(one.id for one in every), rig, key)
-    return try_channels(Pca9685Board(line, params), setups, joints, yes, _explain_pca9685)
+    params, setups = task.config.pca9685, task.setups
+    say(f"{task.title}: PCA9685; {len(setups)} of its channels to try.")
+    with (
+        bench.rig_ports(task.rig, task.mock, task.port) as wired,
+        bench.to_open(wired.paths[task.bus]) as line,
+    ):
+        line.setBaudRate(params.baud)
+        for address in params.addresses:
+            closed = [f"A{bit}" for bit in range(6) if address >> bit & 1]
+            say(f"   board {address:#x}: jumpers {', '.join(closed) or 'none'} closed")
+        for one in setups:
+            board, channel = divmod(one.id, CHANNELS)
+            say(f"   {one.name}: channel {channel} of board {params.addresses[board]:#x}")
+        if task.yes:
+            say("   the boards' clocks are not measured: --yes has no meter")
+        else:
+            measured = _measure_clocks(line, params, task)
+            if measured.clocks != params.clocks:
+                _write_clocks(measured, task)
+                params = measured
+        return _try_channels(Pca9685Board(line, params), task, _explain_pca9685)
 
 
 def _explain_pca9685(setup: ServoConfig, place: ChannelPosition) -> str:
@@ -289,43 +304,35 @@ def _explain_pca9685(setup: ServoConfig, place: ChannelPosition) -> str:
     )
 
 
-# --- the clock
-
-
-def _measured(
-    line: BusPort, params: Pca9685Params, used: frozenset[int], rig: str, key: str
-) -> Pca9685Params:
+def _measure_clocks(line: BusPort, params: Pca9685Params, task: SetupTask) -> Pca9685Params:
     """Let the user measure every board's clock; return the params with the measured values."""
     say(
         "   A board's clock is up to 8 % off, and so are all its pulses: 4 deg of a servo at 3 %. "
         "With a meter that shows Hz, an oscilloscope or a logic analyser it is known for good."
     )
+    used = {one.id for one in bench.setups_on(task.rig, task.bus)}
     found = [clock.oscillator_hz for clock in params.clocks.values()]
     for n, address in enumerate(params.addresses):
-        channel = free_channel(params, address, used)
-        if channel is None:
+        free = [one for one in range(CHANNELS * n, CHANNELS * (n + 1)) if one not in used]
+        if not free:
             say(f"   board {address:#x}: all channels have joints, none is free to be measured")
             continue
-        with given(Pca9685Board(line, params), free_pulse(channel)):
-            found[n] = _asked(params, address, channel % CHANNELS, found[n])
-    changed = replace(params, oscillator_hz=found[0], further_oscillators_hz=tuple(found[1:]))
-    if changed.clocks == params.clocks:
-        return params
-    _write(changed, rig, key)
-    return changed
+        pulse = ServoConfig(
+            free[-1], "hobby", PULSE_STEPS, PULSE_STEPS, 1.0, "no joint", rest_steps=PULSE_STEPS
+        )
+        with given(Pca9685Board(line, params), pulse):
+            found[n] = _measured_hz(params, address, free[-1] % CHANNELS, found[n])
+    return replace(params, oscillator_hz=found[0], further_oscillators_hz=tuple(found[1:]))
 
 
-def _asked(params: Pca9685Params, address: int, channel: int, known_hz: float) -> float:
+def _measured_hz(params: Pca9685Params, address: int, channel: int, known_hz: float) -> float:
     """Ask for the meter's reading until it is plausible; Enter keeps the known value."""
     question = (
         f"   board {address:#x}: channel {channel}, where no joint is, gives 1500 us at "
         f"{params.frequency_hz:g} Hz. What is measured at its signal pin, in Hz or us? "
         "Enter: skip "
     )
-    while True:
-        typed = typer.prompt(question, default="", show_default=False, prompt_suffix="", err=True)
-        if not typed:
-            return known_hz
+    while typed := press_enter(question):
         try:
             hz = oscillator_hz(params.clocks[address], typed)
         except ValueError as error:
@@ -337,55 +344,18 @@ def _asked(params: Pca9685Params, address: int, channel: int, known_hz: float) -
             f"{'long' if off > 0 else 'short'}"
         )
         return hz
-
-
-def _write(params: Pca9685Params, rig: str, key: str) -> None:
-    """Write the clocks into the rig's file after a yes; say them where that cannot be."""
-    wanted: dict[str, float | tuple[float, ...]] = {f"{key}.oscillator_hz": params.oscillator_hz}
-    if params.further_oscillators_hz:
-        wanted[f"{key}.further_oscillators_hz"] = params.further_oscillators_hz
-    named = ", ".join(f"{name}: {value}" for name, value in wanted.items())
-    if not typer.confirm(f"   write {named} into {rig}?", default=True, err=True):
-        return
-    try:
-        saved = save_rig(rig, wanted, datetime.now())
-    except ConfigError as error:
-        say(f"   not written: {error}")
-        say(f"   write it yourself: {named}")
-        return
-    say(f"   written into {saved.path}; as it was: {saved.backup}")
-
-
-PULSE_STEPS = 1500 * US_STEPS
-LOW_HZ, HIGH_HZ = 22e6, 28e6
-"""No board has been seen outside; bounds of oscillator_hz, too."""
-
-_MEASURED = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(hz|us)\s*", re.IGNORECASE)
-
-
-def free_channel(params: Pca9685Params, address: int, used: frozenset[int]) -> int | None:
-    """Return the last id of a board on which there is no joint, None where all have one."""
-    first = CHANNELS * params.addresses.index(address)
-    free = [one for one in range(first, first + CHANNELS) if one not in used]
-    return free[-1] if free else None
-
-
-def free_pulse(channel: int) -> ServoConfig:
-    """Return the setup of a channel that gives 1500 us, with no servo on it."""
-    return ServoConfig(
-        channel, "hobby", PULSE_STEPS, PULSE_STEPS, 1.0, "no joint", rest_steps=PULSE_STEPS
-    )
+    return known_hz
 
 
 def oscillator_hz(clock: PulseClock, typed: str) -> float:
     """Return the frequency of an oscillator, whole kilohertz.
 
     Args:
-        clock: what it was taken for while the pulses of 1500 us were measured.
+        clock: the assumed clock while the pulses of 1500 us were measured.
         typed: "50.9 Hz" or "1473 us", as the meter shows.
 
     Raises:
-        ValueError: these are no such words, or no PCA9685 could give that.
+        ValueError: the text has another form, or no PCA9685 could have such a clock.
     """
     found = _MEASURED.fullmatch(typed)
     if found is None:
@@ -405,3 +375,21 @@ def oscillator_hz(clock: PulseClock, typed: str) -> float:
             "be expected; measure again"
         )
     return round(hz, -3)
+
+
+def _write_clocks(params: Pca9685Params, task: SetupTask) -> None:
+    """Write the clocks into the rig's file after a yes; print them if that is impossible."""
+    key = f"buses.{task.bus}.pca9685" if task.bus else "bus.pca9685"
+    wanted: dict[str, float | tuple[float, ...]] = {f"{key}.oscillator_hz": params.oscillator_hz}
+    if params.further_oscillators_hz:
+        wanted[f"{key}.further_oscillators_hz"] = params.further_oscillators_hz
+    named = ", ".join(f"{name}: {value}" for name, value in wanted.items())
+    if not typer.confirm(f"   write {named} into {task.rig_name}?", default=True, err=True):
+        return
+    try:
+        saved = save_rig(task.rig_name, wanted, datetime.now())
+    except ConfigError as error:
+        say(f"   not written: {error}")
+        say(f"   write it yourself: {named}")
+        return
+    say(f"   written into {saved.path}; as it was: {saved.backup}")

@@ -1,1 +1,1 @@
-"""What is wrong with a rig, and the remedy."""
+"""Faults of a rig, each with its remedy."""

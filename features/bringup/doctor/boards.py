@@ -1,8 +1,8 @@
-"""What is wrong with a board of hobby servos and the channels of a rig; nothing moves.
+"""Faults of a board of hobby servos and the channels of a rig; nothing moves.
 
-A Maestro clears its error register when it reports it, so what it held is among the findings.
-What cannot be read over its serial line is a note, with what to set in Pololu's program. A
-PCA9685 keeps no errors; its registers are read, nothing is written. Sources: Pololu Maestro
+A Maestro clears its error register when it is read, so the stored errors are among the findings.
+Settings that cannot be read over its serial line are a note with the setting for Pololu's program.
+A PCA9685 keeps no errors; its registers are read, nothing is written. Sources: Pololu Maestro
 User's Guide (0J40), sections 4.b, 4.e, 5.a and 5.e; NXP, PCA9685 data sheet, rev. 4.
 """
 
@@ -248,13 +248,13 @@ def _pulses(
         heard = None if silent or channel >= channels else line.pulses((channel,))
         pulses[channel] = None if heard is None else heard[0]
     if None in pulses.values():
-        # What it did not understand is in its register now, and is no fault.
+        # The unknown channel is an error in its register now, and no fault.
         line.greet()
     return pulses
 
 
 def _spoken(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
-    """Return the protocol of a board that was found, whatever the rig says."""
+    """Return the protocol of a board that was found; the rig file may differ."""
     form = params.protocol if params.protocol in found.forms else found.forms[0]
     return replace(params, protocol=form, crc=found.crc)
 

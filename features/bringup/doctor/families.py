@@ -1,4 +1,4 @@
-"""What the doctor must know of each family of smart servo: registers, correct values and texts.
+"""Properties of each family of smart servo for the doctor: registers, correct values, texts.
 
 Sources: ROBOTIS e-Manual, X series; Feetech, memory table STS3215.
 """
@@ -68,7 +68,7 @@ class Protection(NamedTuple):
 
 @dataclass(frozen=True)
 class ServoChecks:
-    """What rules must know of a kind of servo.
+    """Properties of a kind of servo that the rules depend on.
 
     program: the maker's, for settings that this program cannot write
     manual: the maker's

@@ -1,4 +1,4 @@
-"""What is wrong with a serial port, judged by what the system tells of it. It is not opened.
+"""Faults of a serial port, by what the operating system reports. It is not opened.
 
 Source of the latency timer: ROBOTIS e-Manual, U2D2 (FTDI adaptors wait 16 ms by default).
 """
@@ -50,7 +50,7 @@ ADVICE = {
 
 
 class PortFacts(NamedTuple):
-    """What the system tells of one port.
+    """Report of the operating system on one port.
 
     holders: other programs that hold it; others: the ports there are
     """

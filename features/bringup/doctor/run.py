@@ -54,7 +54,7 @@ ADVICE = {
 
 
 class Presence(NamedTuple):
-    """Who answered at the rig's baud rate, by id, and who not.
+    """Servos that answered at the rig's baud rate, by id, and missing ones.
 
     strangers: answered, but are not in the YAML; elsewhere: answered at other baud rates
     corrupt: how many of six answers came in pieces, by id, where any did
@@ -83,9 +83,9 @@ class AppliedFix:
 def check_all(
     port: BusPort, host: Host, examine: Callable[[], list[Diagnostic]]
 ) -> list[Diagnostic]:
-    """Examine a port and, where it can be used, what is behind it; the port is closed after it.
+    """Examine a port and, if it can be used, its servos; the port is closed at the end.
 
-    What goes wrong on the way is among the findings.
+    A failure of the examination is one of the findings.
 
     examine: asks what is behind it
     """
@@ -187,7 +187,7 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[D
 
 
 def fix_latency(device: str, host: Host) -> list[AppliedFix]:
-    """Set the adaptor's latency timer where it is too long; needs the right to write it."""
+    """Shorten the adaptor's latency timer if it is too long; needs write permission."""
     file = latency_file(device, host)
     was = None if file is None else latency_ms(file)
     if file is None or was is None or was <= RECOMMENDED_LATENCY_MS:
@@ -202,7 +202,7 @@ def apply_fixes(
 ) -> Iterator[AppliedFix]:
     """Write what the findings offer, one after the other.
 
-    write: writes one, where that is safe; return "" or why it was not done
+    write: writes one if that is safe; returns "" or why it was not done
 
     Raises:
         BusLost: the port is gone.

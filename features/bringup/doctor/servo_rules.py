@@ -78,7 +78,7 @@ ADVICE = {
 class ServoState:
     """One servo as found.
 
-    values: registers by name, None where the servo gave no good answer
+    values: registers by name, None without a good answer
     corrupt: how many of six answers came in pieces
     """
 
@@ -97,7 +97,8 @@ class ServoState:
         """Return a finding about this servo.
 
         fixes: registers and their correct values
-        facts: of the advice, beside ``setup``, ``found``, ``checks``, ``model`` and registers
+        facts: of the advice, in addition to ``setup``, ``found``, ``checks``, ``model`` and the
+            registers
         """
         made = (Fix(self.setup.id, name, value, self.values.get(name)) for name, value in fixes)
         known = {"setup": self.setup, "found": self.found, "checks": self.checks}
@@ -112,7 +113,7 @@ Rule = Callable[[ServoState], Iterator[Diagnostic]]
 class RegisterRule:
     """A rule of one condition: a ``Rule``.
 
-    registers: those that it needs; it does not apply where one is missing or was not read
+    registers: those that it needs; it does not apply if any is missing or was not read
     applies: given the servo and their values
     """
 

@@ -71,7 +71,7 @@ class Paper(StrEnum):
 
 
 class What(StrEnum):
-    """What to calibrate."""
+    """Part of the camera to calibrate."""
 
     all = "all"
     lens = "lens"
@@ -138,7 +138,7 @@ def calibrate_camera(
     ] = False,
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:
-    """Measure the lens and where the camera sits, with the printed board, or a face."""
+    """Measure the lens and the place of the camera, with the printed board, or a face."""
     with clear_errors(rig, port, mock), signals() as stopped:
         _refuse_contradictions(what, camera, oak, oak_calibration, mock, face_at)
         loaded = load_rig(rig)
@@ -180,7 +180,7 @@ def _write(
     stopped: Callable[[], str | None],
     yes: bool,
 ) -> None:
-    """Show what was found beside what the rig says, and write it after a yes."""
+    """Show new and old values, and write them after a yes."""
     Console().print(difference_table(rig, loaded, changes))
     if not dry_run:
         write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
@@ -229,7 +229,7 @@ def _field_changes(
         f"{100.0 * field.moved:.1f} %. The printed board measures it to 0.2 %"
     )
     field_deg = round(field.horizontal_deg, 1)
-    # 69 itself stands for a lens that nobody has measured.
+    # Exactly 69 means a lens that has not been measured.
     return {"camera.horizontal_field_deg": field_deg + 0.05 * (field_deg == ASSUMED_FIELD_DEG)}
 
 
@@ -259,7 +259,7 @@ def sure_as(lens: LensCalibration) -> HandEyeParams:
 
 
 class _Job(NamedTuple):
-    """What all steps need."""
+    """Values that all steps need."""
 
     rig: Rig
     board: CharucoBoard
@@ -268,7 +268,7 @@ class _Job(NamedTuple):
 
 
 class _KnownLens(NamedTuple):
-    """What is known of the lens.
+    """The lens as far as it is known.
 
     camera: with it; changes: for the rig's file; good: what may be assumed of it
     """
@@ -279,7 +279,7 @@ class _KnownLens(NamedTuple):
 
 
 class _Eye(NamedTuple):
-    """Where frames come from, and the simulated camera behind it where there is one."""
+    """Source of frames, and the simulated camera behind it, if any."""
 
     look: Callable[[], Shot | None]
     now_s: Callable[[], float]
@@ -354,7 +354,7 @@ def _known_lens(job: _Job, eye: _Eye, source: FrameSource, what: What) -> _Known
 
 
 def _oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
-    """Return the lens of an OAK camera for upright frames, and say what its memory holds."""
+    """Return the lens of an OAK camera for upright frames, and print its memory."""
     found = upright_calibration(delivered, orientation_of(job.rig.camera))
     found = as_seen(found, shot.lens if shot is not None else None)
     say_calibration(found, job.rig.oak)
@@ -450,7 +450,7 @@ def _first(job: _Job, eye: _Eye) -> Shot:
 
 
 def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:
-    """Return the board as asked for and as printed."""
+    """Return the board in its printed size."""
     marker_mm = square_mm * _BOARD.marker_mm / _BOARD.square_mm
     try:
         return BoardParams(columns, rows, square_mm, marker_mm).scaled(ruler_mm / RULER_MM)

@@ -1,4 +1,4 @@
-"""The command calibrate face: where one person's eyes, mouth and all else are on their face."""
+"""The command calibrate face: places of one person's eyes, mouth and other parts."""
 
 import contextlib
 import os
@@ -145,7 +145,7 @@ def _steered(
     begin = begun(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
     made = assemble(rig, options, Substitutes(chooser=lambda own: steering))
-    # What comes through a pipe is a script, too: no user is there to give up.
+    # Input from a pipe is a script, too: no user can end it.
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
     steer = SteeringButtons(BUTTONS, keys.press, lambda: shown(steering))
@@ -227,7 +227,7 @@ class _Sitting:
         return None
 
     def update(self, tick: Tick) -> None:
-        """See what the tick did, and say what a person should know."""
+        """Update from a tick, and print what a person should know."""
         self._observers.update(tick)
         self._door.update(tick)
         self._tell(self._steering.update(tick))
@@ -239,7 +239,7 @@ class _Sitting:
             status(shown(self._steering))
 
     def _say_what_is_due(self, t_s: float) -> None:
-        """Name the part once, and say when no face has been seen for a while."""
+        """Name the part once, and report if no face has been seen for a while."""
         part, seen = self._steering.state.part, self._steering.face is not None
         if seen:
             self._seen_s = t_s
@@ -268,7 +268,7 @@ class _Sitting:
 
 
 def shown(steering: FaceSteering) -> str:
-    """Return the line that shows where a person is: part, how far moved, step."""
+    """Return the status line: part, distance moved, step."""
     state = steering.state
     if state.part is None or steering.face is None:
         return "no face is seen"

@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
-from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
 from gazerig.features.bringup.calibration.hobby_access import OneHobby
@@ -38,21 +36,21 @@ Made = Calibration | LinkageFit
 
 
 class By(StrEnum):
-    """Who turns the joint."""
+    """Source of the motion of a joint."""
 
     hand = "hand"
     motion = "motion"
 
 
 class ZeroBy(StrEnum):
-    """Who says where straight ahead is, after the stops were found by motion."""
+    """Source of the zero after the stops were found by motion."""
 
     middle = "middle"
     person = "person"
 
 
 class CalibrationOptions(NamedTuple):
-    """How to calibrate, as asked on the command line.
+    """Options of a calibration, as on the command line.
 
     pulses_us: hobby servos are never sent outside
     more: places of a linkage between each two that are marked
@@ -68,15 +66,8 @@ class CalibrationOptions(NamedTuple):
     more: int
 
 
-class JointResults(NamedTuple):
-    """What came of it: by joint, and which joints were refused."""
-
-    found: dict[str, Made]
-    refused: tuple[str, ...]
-
-
 class CalibrationJob(NamedTuple):
-    """What calibrating needs beside the joints."""
+    """Context of a calibration, without the joints."""
 
     rig: Rig
     wire: RigPorts
@@ -85,12 +76,12 @@ class CalibrationJob(NamedTuple):
     stopped: Callable[[], str | None]
 
 
-def measure(bench: CalibrationJob, names: Sequence[str]) -> JointResults:
-    """Calibrate one joint after the other, bus by bus.
+def measure(bench: CalibrationJob, names: Sequence[str]) -> tuple[dict[str, Made], tuple[str, ...]]:
+    """Calibrate one joint after the other, bus by bus; return results and refused joints.
 
     Raises:
         SetupError: a port cannot be opened, or there are no answers left.
-        CalibrationStopped: the user or the system asked to end.
+        CalibrationStopped: the user or the system requested the end.
     """
     found: dict[str, Made] = {}
     refused: list[str] = []
@@ -102,14 +93,14 @@ def measure(bench: CalibrationJob, names: Sequence[str]) -> JointResults:
                 refused.append(name)
                 say(f"refused: {error}")
     # In the order of the rig, whatever the buses are called.
-    return JointResults({name: found[name] for name in names if name in found}, tuple(refused))
+    return {name: found[name] for name in names if name in found}, tuple(refused)
 
 
 def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -> None:
     """Refuse what the servos of these joints cannot do.
 
     Raises:
-        SetupError: says which, and what can be done.
+        SetupError: names the joints, and what can be done.
     """
     without_feedback = [name for name in names if not rig.joints[name].facts.measured]
     if how.by is By.motion and len(without_feedback) == len(names):
@@ -145,7 +136,13 @@ def _one(bench: CalibrationJob, name: str, bus: str) -> Made:
         joint = bench.rig.joints[name]
         servo = SingleServo(name, joint.id, joint.model, port, guardian)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
-        bench.person.hand = _hand(bench.wire, bus, joint.id)
+        bench.person.hand = None
+        if (buses := bench.wire.buses) is not None:
+
+            def turn(steps: int) -> None:
+                buses.command(f"turn {joint.id} {steps}", bus)
+
+            bench.person.hand = turn
         with _off_after(single.who, servo.disable_torque, bench.stopped):
             return _smart(bench, single)
 
@@ -164,7 +161,12 @@ def _smart(bench: CalibrationJob, single: SingleJoint) -> Made:
             say(f"{single.who}: its offset {was} -> 0; {_VOID}")
     single.servo.check()
     if how.set_middle:
-        _set_middle(single, person)
+        single.servo.disable_torque()
+        person.wait(
+            f"turn {single.name} to the middle of its travel, then press Enter",
+            lambda: f"{single.name}: step {single.position()[0]}",
+        )
+        say(f"{single.who}: its place is 2048 now (offset {single.servo.set_middle()}); {_VOID}")
     if single.joint.transmission_points:
         if how.by is By.motion:
             raise CalibrationRefused(
@@ -174,20 +176,17 @@ def _smart(bench: CalibrationJob, single: SingleJoint) -> Made:
         return by_places(HandPlacer(single, person), person, how.margin_deg, how.more)
     if how.by is By.hand:
         return by_hand(single, person, how.margin_deg)
-    _warn_of_neck(single.name, person)
+    # A heavy head must not move on its own without a confirmation.
+    asked = (
+        f"{single.name} will move by itself, and sink when the torque goes off: hold the head. "
+        "Go on?"
+    )
+    if "neck" in single.name.split("_") and not person.agrees(asked):
+        raise CalibrationRefused(f"{single.name}: left out as you asked")
     return by_motion(single, person, how.margin_deg, how.search, how.zero.value)
 
 
 _VOID = "until this calibration is written the rig file's zero is wrong by that"
-
-
-def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
-    single.servo.disable_torque()
-    person.wait(
-        f"turn {single.name} to the middle of its travel, then press Enter",
-        lambda: f"{single.name}: step {single.position()[0]}",
-    )
-    say(f"{single.who}: its place is 2048 now (offset {single.servo.set_middle()}); {_VOID}")
 
 
 def _hobby(bench: CalibrationJob, name: str, bus: str) -> Made:
@@ -195,25 +194,11 @@ def _hobby(bench: CalibrationJob, name: str, bus: str) -> Made:
     guardian = _guardian(bench, name, bus)
     port = port_of(bench.wire.paths[bus], on_traffic=guardian.beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
-    boards: dict[str, MaestroParams | Pca9685Params]
-    boards = {"maestro": config.maestro, "pca9685": config.pca9685}
-    hobby = OneHobby(
-        name, joint, port, boards[config.kind], RealClock(), bench.stopped, how.pulses_us, guardian
-    )
+    params = config.maestro if config.kind == "maestro" else config.pca9685
+    hobby = OneHobby(name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian)
     person.hand = None
     with _off_after(hobby.who, hobby.disable, bench.stopped):
         return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)
-
-
-def _hand(wire: RigPorts, bus: str, servo_id: int) -> Callable[[int], None] | None:
-    """Return what turns an emulated servo by some steps; None on real wires."""
-    if wire.buses is None:
-        return None
-
-    def turn(steps: int) -> None:
-        wire.command(f"turn {servo_id} {steps}", bus)
-
-    return turn
 
 
 @contextlib.contextmanager
@@ -221,30 +206,13 @@ def _off_after(
     who: str, torque_off: Callable[[], None], stopped: Callable[[], str | None]
 ) -> Iterator[None]:
     """Switch the torque off however the block ends; nothing is printed if that works."""
-
-    def report_line(line: str) -> None:
-        say(f"{who}: {line}")
-
     with PowerDown(
         None,
         torque_off,
-        report_line,
+        lambda line: say(f"{who}: {line}"),
         Interrupts.of(stopped),
         left=": cut the servo power",
         quiet=True,
     ) as way_out:
         way_out.switch_on(lambda: None)  # what follows does it, at a time of its own
         yield
-
-
-def _warn_of_neck(name: str, person: SteeringPerson) -> None:
-    """Ask for confirmation before something as heavy as a head moves by itself.
-
-    Raises:
-        CalibrationRefused: the answer was no.
-    """
-    if "neck" not in name.split("_"):
-        return
-    asked = f"{name} will move by itself, and sink when the torque goes off: hold the head. Go on?"
-    if not person.agrees(asked):
-        raise CalibrationRefused(f"{name}: left out as you asked")

@@ -54,7 +54,7 @@ def calibrate_joints(
 ) -> None:
     """Find zero, sign and range of each joint and write them into the rig's YAML.
 
-    Hobby servos tell no place: you steer them by eye, and say the angles of some places.
+    Hobby servos report no position: you steer them by eye, and type the angles of some places.
     """
     with clear_errors(rig, port, mock), signals() as stopped:
         loaded = load_rig(rig)
@@ -112,7 +112,7 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
 
 
 def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:
-    """Find out before anything moves that places could not be written where they stand.
+    """Refuse before anything moves if places could not be written into the file.
 
     Raises:
         gazerig.config.load.ConfigError: a linkage is spread over several lines, which are kept.

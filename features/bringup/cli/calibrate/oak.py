@@ -1,4 +1,4 @@
-"""Calibrating by what an OAK camera's own memory says: gazerig calibrate camera --oak."""
+"""Calibration from the memory of an OAK camera: gazerig calibrate camera --oak."""
 
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -46,7 +46,7 @@ def upright_calibration(found: OakCalibration, orientation: FrameOrientation) ->
 
 
 def as_seen(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibration:
-    """Return the calibration with the lens that a frame itself carries; a difference is said."""
+    """Return the calibration with the lens of a frame; a difference is printed."""
     if frame_lens is None:
         return found
     a, b = found.lens, frame_lens

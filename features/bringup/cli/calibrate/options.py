@@ -1,4 +1,4 @@
-"""The options of the command calibrate joints: what each takes, and what --help says of it."""
+"""The options of the command calibrate joints: values and help texts."""
 
 from pathlib import Path
 from typing import Annotated
