@@ -180,8 +180,8 @@ class Target(NamedTuple):
     shift:    increases whenever another object or part is chosen: the saccade's event flag
     why:      the reason in words
     centre_world_m: goal of the head, e.g. the face's centre; None: the point itself
-    plan:     choice of the action planner (gazerig.gaze.attention.action_planner) and its reason; ""
-        without one
+    plan:     choice of the action planner (gazerig.gaze.attention.action_planner) with its reason;
+        "" without one
     saliences: of the winner and of the next three, highest first
     """
 

@@ -22,14 +22,14 @@ def test_e88_of_people_unlike_the_nearer_get_more_and_nobody_nothing() -> None:
     assert figures["six unlike: correlation of share and salience"] > 0.7
 
 
-def test_leads_grow_with_the_looks_and_are_those_over_the_one_looked_at_least() -> None:
+def test_surpluses_grow_with_the_looks_and_are_those_over_the_one_looked_at_least() -> None:
     shared = SharedAttention()
     assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 0.0) == [0.0, 0.0, 0.0]
     assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], 2, 0.5) == pytest.approx([0.0, 0.5, 0.0])
     # Who joins is behind nobody; the heaviest of those who are alike comes first.
     assert shared.step([2, 4], [0.5, 1.0], 4, 0.5)[1] == 0.0
-    leads = shared.step([1, 2, 4], [1.0, 0.5, 1.0], 1, 0.9)
-    assert leads[2] == 0.0 and leads[0] == pytest.approx(0.4) and 0.45 < leads[1] < 0.5
+    surpluses = shared.step([1, 2, 4], [1.0, 0.5, 1.0], 1, 0.9)
+    assert surpluses[2] == 0.0 and surpluses[0] == pytest.approx(0.4) and 0.45 < surpluses[1] < 0.5
 
 
 def test_a_look_at_a_body_of_half_the_weight_counts_twice() -> None:
@@ -39,14 +39,14 @@ def test_a_look_at_a_body_of_half_the_weight_counts_twice() -> None:
     assert shared.step([1, 2], [1.0, 0.5], 2, 1.5)[0] == pytest.approx(0.0, abs=0.1)
 
 
-def test_leads_are_bounded_fade_and_are_forgotten() -> None:
+def test_surpluses_are_bounded_fade_and_are_forgotten() -> None:
     shared = SharedAttention()
     for k in range(100):
-        leads = shared.step([1, 2, 3], [1.0, 1.0, 1.0], 1, 0.5 * k)
-    assert leads == [5.0, 0.0, 0.0]
+        surpluses = shared.step([1, 2, 3], [1.0, 1.0, 1.0], 1, 0.5 * k)
+    assert surpluses == [5.0, 0.0, 0.0]
     assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 60.0)[0] < 2.0
     for t_s in (130.0, 131.0):
         shared.step([5, 6], [1.0, 1.0], -1, t_s)
-    assert sorted(shared._leads) == [5, 6]
+    assert sorted(shared._surpluses) == [5, 6]
     shared.reset(0.0)
-    assert shared._leads == {}
+    assert shared._surpluses == {}
