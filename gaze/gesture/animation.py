@@ -1,7 +1,7 @@
-"""Motion laid over gaze: what gestures, expressions and levels add to the pose of the head.
+"""Motion added to gaze: gestures, expressions and levels as offsets of the head's pose.
 
-Gaze goes on beneath: what is added to the head's angles is compensated by the eyes, which stay
-on their target (the vestibulo-ocular reflex of ``gazerig.gaze.oculomotor.oculomotor``).
+Gaze continues: the eyes compensate offsets of the head's angles and stay on their target (the
+vestibulo-ocular reflex of ``gazerig.gaze.oculomotor.oculomotor``).
 """
 
 from collections.abc import Mapping
@@ -15,9 +15,9 @@ from gazerig.gaze.gesture.pose_offset import PoseOffset as PoseOffset
 
 
 class AnimationTables(NamedTuple):
-    """What a rig's tables come to.
+    """Tables of a rig's animations.
 
-    expressions: what each adds at full strength; blend_s: time from one to another
+    expressions: offset of each at full strength; blend_s: time from one to another
     """
 
     expressions: Mapping[str, PoseOffset]
@@ -29,9 +29,9 @@ NO_TABLES = AnimationTables({}, 0.5, {})
 
 
 class Animation:
-    """Everything that moves beside gaze, as one offset a tick.
+    """Sum of all motions besides gaze, as one offset per tick.
 
-    expressions, levels, gestures: take what is asked for
+    expressions, levels, gestures: take the commands
     """
 
     def __init__(self, joints: tuple[str, ...] = (), tables: AnimationTables = NO_TABLES) -> None:
@@ -53,12 +53,12 @@ class Animation:
         self.gestures.reset()
 
     def retune(self, tables: AnimationTables) -> None:
-        """Change the tables; what moves goes on without a jump."""
+        """Change the tables; motions continue without a jump."""
         self.expressions.retune(tables.expressions, tables.blend_s)
         self.levels.retune(tables.levels)
 
     def step(self, t_s: float) -> PoseOffset:
-        """Return what is added to the pose in this tick."""
+        """Return the offset of the pose in this tick."""
         expressions, levels, gestures = self.expressions, self.levels, self.gestures
         if expressions.moves or levels.moves or gestures.moves:
             face = expressions.step(t_s).plus(levels.step(t_s))

@@ -1,8 +1,8 @@
-"""Breathing: a slow sway of the neck, as of a living person at rest.
+"""Breathing: a slow sway of the neck, like that of a person at rest.
 
-Pitch of 0.5 to 1.5 deg at 0.2 to 0.3 Hz; heads that breathe slowly while idle are
-judged more alive. The sway is added to the head model's angles, and as the eyes
-take whatever the head does not, they compensate it and the gaze stays where it is.
+Pitch of 0.5 to 1.5 deg at 0.2 to 0.3 Hz; heads that breathe slowly while idle are judged more
+alive. The sway is added to the head model's angles, and the eyes compensate it, so the gaze stays
+on its target.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from gazerig.gaze.types import Angles3
 from gazerig.params import Bounds
 
 _STILL: Angles3 = (0.0, 0.0, 0.0)
-_GLIDE_S = 1.0  # time in which a breath that is retuned falls into its new depth
+_GLIDE_S = 1.0  # time in which a retuned breath reaches its new depth
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Breathing:
         """Return the (yaw, pitch, roll) to add to the head's; yaw is always 0."""
         self._t_s = t_s
         self._shown = self._sway(t_s)
-        if self._left != _STILL:  # what a retune has left over, going within a second
+        if self._left != _STILL:  # remainder of a retune, which decays within a second
             kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
             _, pitch, roll = self._shown
             self._shown = (0.0, pitch + kept * self._left[1], roll + kept * self._left[2])

@@ -1,4 +1,4 @@
-"""Facial expressions: named poses that are laid over gaze and blended over time."""
+"""Facial expressions: named pose offsets that are added to gaze and blended over time."""
 
 from collections.abc import Mapping
 
@@ -6,13 +6,13 @@ from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.minimum_jerk import MinimumJerkBlend
 
 NEUTRAL = "neutral"
-"""The expression at the start. It is always there; without an entry all its offsets are 0."""
+"""The initial expression. It always exists; without an entry all its offsets are 0."""
 
 
 class Expressions:
-    """The expression in force, and the way to it.
+    """The present expression, and the transition to it.
 
-    name, strength: in force; strength 1 is the expression as written, 0 none of it
+    name, strength: of the present one; strength 1 is the expression as written, 0 none of it
     moves: ``step`` may return another offset than the last time
 
     Args:
@@ -29,12 +29,12 @@ class Expressions:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the expressions there are, neutral first; none where the rig has no table."""
+        """Return the known expressions, neutral first; empty if the rig has no table."""
         others = [name for name in self._offsets if name != NEUTRAL]
         return (NEUTRAL, *others) if len(self._offsets) > 1 else ()
 
     def reset(self) -> None:
-        """Be neutral at once."""
+        """Become neutral immediately."""
         self.name, self.strength = NEUTRAL, 1.0
         self._blend.reset(self._goal())
         self._flat = self._goal()
@@ -42,7 +42,7 @@ class Expressions:
         self.moves = True
 
     def retune(self, offsets: Mapping[str, PoseOffset], blend_s: float) -> None:
-        """Change the table; the face moves to what its expression is now, without a jump."""
+        """Change the table; the face moves to its changed expression without a jump."""
         self._offsets = self._with_neutral(offsets)
         self._blend.duration_s = blend_s
         if self.name not in self._offsets:
@@ -54,7 +54,7 @@ class Expressions:
         """Move to an expression, from the next step on.
 
         Raises:
-            ValueError: there is no such expression; the message lists those there are.
+            ValueError: the expression is unknown; the message lists the known ones.
         """
         self.require(name)
         self.name, self.strength = name, strength
@@ -62,7 +62,7 @@ class Expressions:
         self.moves = True
 
     def require(self, name: str) -> None:
-        """Raise ValueError if there is no such expression; the message lists those there are."""
+        """Raise ValueError for an unknown expression; the message lists the known ones."""
         if name not in self._offsets:
             there = ", ".join(self.names) or "none: add a table expressions to the rig"
             raise ValueError(f"no expression {name!r}; there is {there}")

@@ -1,7 +1,7 @@
-"""Gestures as data: key frames of what is laid over gaze, such as a nod.
+"""Gestures as data: key frames of motion that is added to gaze, such as a nod.
 
-A frame says where head, eyes, lids and further joints are at a time, relative to where gaze has
-them. What a frame does not name goes on to the next frame that does. Between the frames
+A frame sets head, eyes, lids and further joints at a time, relative to their positions by gaze. A
+track without a value in a frame continues to the next frame that has one. Between the frames
 everything moves with least jerk (``gazerig.gaze.gesture.minimum_jerk_curve``), from rest and back
 to rest.
 """
@@ -15,11 +15,11 @@ from typing import Annotated, Literal, NamedTuple
 from gazerig.params import Bounds
 
 MIN_SPEED, MAX_SPEED = 0.1, 4.0
-"""Factors on the speed of a gesture as written."""
+"""Range of factors on the speed of a gesture as written."""
 MAX_COUNT = 20
-"""A gesture is not repeated more often by one command."""
+"""Largest number of repetitions of a gesture by one command."""
 MAX_FRAMES = 2000
-"""Of a gesture as written: 33 a second for a minute."""
+"""Largest number of frames of a gesture as written: 33 per second for a minute."""
 HEAD_TRACKS = ("head_yaw", "head_pitch", "head_roll")
 EYE_TRACKS = ("eyes_yaw", "eyes_pitch")
 LID_TRACKS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
@@ -33,12 +33,12 @@ LID_GROUPS: Mapping[str, tuple[str, ...]] = {
     "right": LID_TRACKS[1::2],
     **{name: (name,) for name in LID_TRACKS},
 }
-"""What a frame may say of lids, the general before the particular."""
+"""Lids that a frame may name, the general before the particular."""
 
 
 @dataclass(frozen=True)
 class KeyFrame:
-    """Where everything is at one time of a gesture; what is left out is not moved by it."""
+    """Positions at one time of a gesture; it does not move what it leaves out."""
 
     # fmt: off
     time_s: Annotated[float, Bounds(0.02, 60), "time since the beginning"]
@@ -59,10 +59,10 @@ class KeyFrame:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that the frame says something.
+        """Check that the frame has valid contents.
 
         Raises:
-            ValueError: it names nothing, or lids there cannot be.
+            ValueError: it names nothing, or lids out of range.
         """
         unknown = [name for name in self.lids if name not in LID_GROUPS]
         if unknown:
@@ -103,7 +103,7 @@ class Gesture:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that there is something to play.
+        """Check the number of frames.
 
         Raises:
             ValueError: there are no frames, or too many.
@@ -117,7 +117,7 @@ class Gesture:
 
 @dataclass(frozen=True)
 class GestureParams:
-    """How gestures fit in with everything else that moves the joints."""
+    """Interaction of gestures with other motion of the joints."""
 
     # fmt: off
     limit_share: Annotated[float, Bounds(0.1, 1),
@@ -135,12 +135,12 @@ class TrackKeys(NamedTuple):
 
 
 def rest_of(track: str) -> float:
-    """Return the value at which a track moves nothing."""
+    """Return the neutral value of a track."""
     return 1.0 if track in LID_TRACKS else 0.0
 
 
 def faults_of(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
-    """Return what is wrong between frames: index of the frame, and the rule."""
+    """Return the faults between frames: index of the frame, and the rule."""
     return [
         (i + 1, f"must be later than the frame before, which is at {one.time_s:g} s")
         for i, (one, other) in enumerate(pairwise(frames))
@@ -149,7 +149,7 @@ def faults_of(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
 
 
 def loop_fault(gesture: Gesture) -> str:
-    """Return what is wrong with the times of a loop, "" where nothing is."""
+    """Return the fault of the times of a loop, "" without one."""
     if gesture.loop_s is None:
         return ""
     begin_s, end_s = gesture.loop_s
@@ -168,9 +168,9 @@ def keys_of(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[
     """Return the keys of every track with its loop repeated, ending at rest.
 
     Args:
-        gesture: says what repeats.
+        gesture: defines the loop.
         frames: those of its frames that are played.
-        count: how often.
+        count: number of repetitions.
     """
     tracks: dict[str, list[tuple[float, float]]] = {}
     for time_s, values in _repeated(frames, gesture.loop_s, count):
@@ -182,7 +182,7 @@ def keys_of(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[
 def _repeated(
     frames: tuple[KeyFrame, ...], loop_s: tuple[float, float] | None, count: int
 ) -> list[tuple[float, dict[str, float]]]:
-    """Return the times and the values of all frames, those of the loop as often as it is done."""
+    """Return the times and the values of all frames, with those of the loop repeated."""
     begin_s, end_s = loop_s or (0.0, frames[-1].time_s)
     keys = [(frame.time_s, frame.values()) for frame in frames]
     before = [key for key in keys if key[0] <= begin_s]

@@ -1,4 +1,4 @@
-"""One gesture as smooth curves, and as samples that limits are checked on."""
+"""Motion of one gesture as smooth curves, and as samples for the check of limits."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -26,7 +26,7 @@ class MotionSamples(NamedTuple):
     acceleration: Floats
 
     def scaled(self, size: Floats, rate: float) -> "MotionSamples":
-        """Return the samples of the same motion done smaller and faster.
+        """Return the samples of the same motion, scaled in size and speed.
 
         Args:
             size: (channels,) factors.
@@ -41,15 +41,15 @@ class MotionSamples(NamedTuple):
 
 
 class GestureMotion:
-    """The curves of one gesture on one rig, at the speed and size at which it was written.
+    """Curves of one gesture on one rig, at its original speed and size.
 
-    duration_s: until everything is at rest again
+    duration_s: time until everything is at rest again
     samples: of all channels
 
     Args:
         tracks: keys by track; at least one track.
         joints: the rig's further joints, the channels after those of every rig.
-        eyes_follow_head: the eyes keep their place in the head, instead of on their target.
+        eyes_follow_head: the eyes keep their angles in the head, instead of their target.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class GestureMotion:
     def _sampled(self) -> MotionSamples:
         count = min(_MOST_SAMPLES, int(self.duration_s / _SAMPLE_S) + 2)
         even = np.linspace(0.0, self.duration_s, count)
-        # The farthest points are keys, which an even row of moments may miss.
+        # The extremes are keys, which evenly spaced samples may miss.
         return self.sampled(np.unique(np.concatenate((even, *self._keys_s))))
 
     def sampled(self, times_s: Floats) -> MotionSamples:

@@ -1,8 +1,8 @@
-"""Plays gestures one at a time; whatever begins, ends or interrupts one, nothing jumps.
+"""Player of gestures, one at a time, without jumps at a start, an end or an interruption.
 
-A gesture begins from rest and returns to rest. When another takes its place, or it is ended
-early, what it has moved returns to rest on a fifth-order polynomial that begins with the
-present offset, speed and acceleration, and the next gesture is added to that.
+A gesture begins from rest and returns to rest. When another one replaces it, or it ends early, its
+offset returns to rest on a fifth-order polynomial that begins with the present offset, speed and
+acceleration, and the next gesture is added to that.
 """
 
 from typing import NamedTuple
@@ -17,9 +17,9 @@ from gazerig.gaze.types import Floats
 
 
 class PlayedGesture(NamedTuple):
-    """A gesture as it is played.
+    """A gesture with its speed and sizes of play.
 
-    speed: factor on the speed at which it was written; sizes: factor of every channel
+    speed: factor on its original speed; sizes: factor of every channel
     """
 
     name: str
@@ -29,12 +29,12 @@ class PlayedGesture(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """Return the time from its beginning until all is at rest again."""
+        """Return the time from its start until everything is at rest again."""
         return self.motion.duration_s / self.speed
 
 
 class OffsetState(NamedTuple):
-    """Where the offset is and how it moves: (channels,) each, relative to rest."""
+    """Offset, speed and acceleration: (channels,) each, relative to rest."""
 
     value: Floats
     speed: Floats
@@ -42,7 +42,7 @@ class OffsetState(NamedTuple):
 
 
 class GesturePlayer:
-    """The gesture under way.
+    """Player of the present gesture.
 
     moves: ``step`` may return another offset than the last time
 
@@ -56,7 +56,7 @@ class GesturePlayer:
         self.reset()
 
     def reset(self) -> None:
-        """Be at rest at once, for a head whose joints are led or switched off."""
+        """Rest immediately, for a head whose joints are hand-guided or switched off."""
         self._played: PlayedGesture | None = None
         self._begins_s = 0.0
         self._fades: list[tuple[int, Quintic]] = []
@@ -65,16 +65,16 @@ class GesturePlayer:
 
     @property
     def playing(self) -> str:
-        """Return the name of the gesture under way, "" where there is none."""
+        """Return the name of the present gesture, "" without one."""
         return self._played.name if self._played is not None else ""
 
     def play(self, played: PlayedGesture | None, t_s: float, fade_s: float, wait_s: float) -> None:
-        """Begin a gesture, or none; one under way returns to rest meanwhile.
+        """Begin a gesture, or none; the present one returns to rest meanwhile.
 
         Args:
-            played: the next; None: there is none.
+            played: the next gesture; None: no gesture.
             t_s: now.
-            fade_s: time in which what is under way returns to rest.
+            fade_s: time in which the present gesture returns to rest.
             wait_s: time until the next begins.
         """
         states = zip(*self.state(t_s), strict=True)

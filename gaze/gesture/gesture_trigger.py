@@ -1,4 +1,4 @@
-"""When the rule in force makes the head gesture: once, as the gaze comes to what it names."""
+"""Trigger of the present rule's gesture: once, as the gaze reaches the rule's target."""
 
 from math import inf
 
@@ -7,13 +7,13 @@ from gazerig.gaze.types import Target
 
 
 class GestureTrigger:
-    """Finds the onsets at which rules play their gestures."""
+    """Trigger of the gestures of rules."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was looked at and when a gesture was played."""
+        """Forget the last target and the time of the last gesture."""
         self._named_by: str | None = None
         self._played_s: dict[str, float] = {}
 
@@ -28,11 +28,11 @@ class GestureTrigger:
         """Return the gesture to play now, "" for none.
 
         Args:
-            behaviour: in force.
+            behaviour: the present one.
             rule: of this behaviour.
-            target: what the gaze goes to.
+            target: of the gaze.
             t_s: now.
-            named_ids: the people who do what the rule names, where it names persons.
+            named_ids: the people with the rule's trait, if it names persons.
         """
         if not rule.gesture:
             return ""
@@ -49,7 +49,7 @@ class GestureTrigger:
 
 
 def _is_named(rule: Rule, target: Target, named_ids: frozenset[int]) -> bool:
-    """Return whether a target is what makes the rule's gesture."""
+    """Return whether a target triggers the rule's gesture."""
     if rule.gesture_at:
         return target.kind == rule.gesture_at
     if rule.person is not None:

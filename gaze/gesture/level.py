@@ -10,12 +10,12 @@ from gazerig.gaze.minimum_jerk import MinimumJerkBlend
 from gazerig.params import Bounds
 
 HOLD_S = 0.5
-"""A level that was not set for so long falls back to 0: the program that set it may be dead."""
+"""A level that was not set for this time returns to 0, as its program may be dead."""
 
 
 @dataclass(frozen=True)
 class LevelParams:
-    """What one level moves."""
+    """Motion of one level."""
 
     # fmt: off
     joint: Annotated[str, "joint that the level moves: any but those of the eyes"]
@@ -26,20 +26,20 @@ class LevelParams:
 
 
 class LevelRange(NamedTuple):
-    """What a level adds to the pose at 0 and at 1; it follows a step within ``smoothing_s``."""
+    """Offsets of a level at 0 and at 1; it follows a step within ``smoothing_s``."""
 
     low: PoseOffset
     high: PoseOffset
     smoothing_s: float
 
     def at(self, value: float) -> tuple[float, ...]:
-        """Return what a value comes to, flat."""
+        """Return the offset of a value, flat."""
         low, high = self.low.flat(), self.high.flat()
         return tuple([a + value * (b - a) for a, b in zip(low, high, strict=True)])
 
 
 class _Level:
-    """One level on its way."""
+    """Motion of one level to its value."""
 
     def __init__(self, span: LevelRange, start: tuple[float, ...]) -> None:
         self.value = 0.0
@@ -64,7 +64,7 @@ class Levels:
     moves: ``step`` may return another offset than the last time
 
     Args:
-        ranges: what each level moves.
+        ranges: offsets of each level.
         joints: number of joints that gaze does not move.
     """
 
@@ -75,11 +75,11 @@ class Levels:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the levels there are."""
+        """Return the names of the levels."""
         return tuple(self._levels)
 
     def reset(self) -> None:
-        """Put all levels to 0 at once."""
+        """Set all levels to 0 immediately."""
         self._levels = {name: _Level(span, span.at(0.0)) for name, span in self._ranges.items()}
         self._gone: list[_Level] = []
         self._flats: tuple[tuple[float, ...], ...] = ()
@@ -88,7 +88,7 @@ class Levels:
         self.lapses_s = inf
 
     def retune(self, ranges: Mapping[str, LevelRange]) -> None:
-        """Change what the levels move; joints move there without a jump."""
+        """Change the offsets of the levels; joints move there without a jump."""
         rest = LevelRange(self._rest, self._rest, 0.0)
         for name in self._levels.keys() - ranges.keys():
             level = self._levels.pop(name)
@@ -106,7 +106,7 @@ class Levels:
         """Set a level to a value 0..1, from the next step on.
 
         Raises:
-            ValueError: there is no such level; the message lists those there are.
+            ValueError: the level is unknown; the message lists the known ones.
         """
         self.require(name)
         self._levels[name].set(value, t_s + HOLD_S)
@@ -114,13 +114,13 @@ class Levels:
         self.lapses_s = min(self.lapses_s, t_s + HOLD_S)
 
     def require(self, name: str) -> None:
-        """Raise ValueError if there is no such level; the message lists those there are."""
+        """Raise ValueError for an unknown level; the message lists the known ones."""
         if name not in self._levels:
             there = ", ".join(self._levels) or "none: add a table levels to the rig"
             raise ValueError(f"no level {name!r}; there is {there}")
 
     def lapsed(self, t_s: float) -> tuple[str, ...]:
-        """Let levels fall to 0 that were not set for ``HOLD_S``; return those that were above."""
+        """Drop levels to 0 that were not set for ``HOLD_S``; return those that were above."""
         fallen = []
         for name, level in self._levels.items():
             if t_s >= level.until_s:
@@ -132,7 +132,7 @@ class Levels:
         return tuple(fallen)
 
     def step(self, t_s: float) -> PoseOffset:
-        """Return what all levels add at a time; at rest it is the same object."""
+        """Return the offset of all levels at a time; at rest it is the same object."""
         if not self.moves:
             return self._offset
         if self._gone:

@@ -1,11 +1,10 @@
-"""Smooth curves through key values: of all that pass them at their times, those of least jerk.
+"""Smooth curves of least jerk through key values at their times.
 
-A curve of least integrated squared jerk through given values is a fifth-order spline whose
-jerk and snap are continuous at every value it passes (Flash and Hogan 1985; Todorov and
-Jordan 1998). Where the direction turns back or a value is held, the curve comes to rest (speed
-and acceleration 0), so that it does not swing past the values that somebody has chosen as its
-extremes; where the curve of least jerk would swing back on its way from one to the next, it goes
-slower through the values in between. Any unit; speed and acceleration are per second.
+A curve of least integrated squared jerk through given values is a fifth-order spline whose jerk and
+snap are continuous at every value it passes (Flash and Hogan 1985; Todorov and Jordan 1998). At a
+reversal or a held value, the curve comes to rest (speed and acceleration 0), so that it does not
+swing past the chosen extremes. If the curve of least jerk would swing back between two of them, it
+passes the values in between more slowly. Any unit; speed and acceleration are per second.
 """
 
 from bisect import bisect_right
@@ -85,13 +84,13 @@ class MinimumJerkCurve:
 
 
 def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
-    """Return speed and acceleration at every key: 0 where the curve turns or holds."""
+    """Return speed and acceleration at every key: 0 at reversals and held values."""
     speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
     step = np.diff(position)
     passed = np.flatnonzero(step[:-1] * step[1:] > 0.0) + 1
     for run in np.split(passed, np.flatnonzero(np.diff(passed) > 1) + 1):
         if len(run):
-            # From the stop before the keys that are passed to the stop after them.
+            # From the stop before the passed keys to the stop after them.
             keys = slice(run[0] - 1, run[-1] + 2)
             speed[run], acceleration[run] = _passing(position[keys], span[run[0] - 1 : run[-1] + 1])
     return speed, acceleration
@@ -100,8 +99,8 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
 def _passing(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     """Return speed and acceleration at the keys between two stops.
 
-    Those of least jerk, unless the curve would swing back on its way: then the slower of the
-    mean speeds before and after each key, at which it cannot.
+    Those of least jerk, unless the curve would swing back in between: then the slower of the mean
+    speeds before and after each key, which prevents it.
     """
     speed, acceleration = _least_jerk(position, span)
     table = _coefficients(span, *_ends(position, speed, acceleration))
@@ -123,7 +122,7 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
 
     def gaps(unknown: Floats) -> Floats:
-        """Return by how much jerk and snap jump at the inner keys; linear in the unknowns."""
+        """Return the jumps of jerk and snap at the inner keys; linear in the unknowns."""
         speed[inner], acceleration[inner] = unknown[:count], unknown[count:]
         _, _, _, c3, c4, c5 = _coefficients(span, *_ends(position, speed, acceleration)).T
         jerk = 6.0 * c3 + span * (24.0 * c4 + span * 60.0 * c5)
@@ -132,7 +131,7 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
 
     at_zero = gaps(np.zeros(2 * count))
     keys = np.arange(count)
-    # Of each key's gaps: what the key before, itself and the key behind add to them.
+    # Contributions of the key before, the key itself and the key behind to each key's gaps.
     before, own, behind = blocks = np.zeros((3, count, 2, 2))
     for first in range(3):
         moved = keys[first::3]  # no two of them move the same gap
@@ -161,7 +160,7 @@ def _solved(before: Floats, own: Floats, behind: Floats, right: Floats) -> Float
     """
     if len(own) == 1:
         return np.asarray(np.linalg.solve(own, right)[..., 0], dtype=np.float64)
-    if len(own) % 2 == 0:  # one more that is 0, so that every second one has two neighbours
+    if len(own) % 2 == 0:  # one more of 0, so that every second one has two neighbours
         zero, one = np.zeros((1, 2, 2)), np.eye(2)[None]
         before, behind = np.concatenate((before, zero)), np.concatenate((behind, zero))
         own, right = np.concatenate((own, one)), np.concatenate((right, np.zeros((1, 2, 1))))

@@ -1,4 +1,4 @@
-"""What is added to the pose that gaze asks for, as one value."""
+"""Offset that is added to the pose by gaze, as one value."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from gazerig.gaze.types import Angles2, Angles3
 
 
 class PoseOffset(NamedTuple):
-    """What is added to the pose that gaze asks for.
+    """Offset that is added to the pose by gaze.
 
     head_rad: added to the head's (yaw, pitch, roll); the eyes compensate it
     eyes_rad: added to both eyes' (yaw, pitch) in the head
@@ -20,7 +20,7 @@ class PoseOffset(NamedTuple):
     joints_rad: tuple[float, ...] = ()
 
     def plus(self, other: "PoseOffset") -> "PoseOffset":
-        """Return both at once: angles are added, factors of the lids multiplied."""
+        """Return both combined: angles are added, factors of the lids multiplied."""
         if not any(self.joints_rad) and self[:3] == NO_OFFSET[:3]:
             return other
         if not any(other.joints_rad) and other[:3] == NO_OFFSET[:3]:
@@ -36,7 +36,7 @@ class PoseOffset(NamedTuple):
 
     @classmethod
     def from_flat(cls, values: tuple[float, ...]) -> "PoseOffset":
-        """Return what ``flat`` wrote."""
+        """Return the offset from the result of ``flat``."""
         yaw, pitch, roll, eye_yaw, eye_pitch, a, b, c, d, *joints = values
         return cls((yaw, pitch, roll), (eye_yaw, eye_pitch), (a, b, c, d), tuple(joints))
 

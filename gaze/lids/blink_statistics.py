@@ -7,7 +7,7 @@ import numpy as np
 from gazerig.gaze.lids.lid_params import LidParams
 
 _NEARLY_SHUT = 0.95
-"""Beyond this a blink counts as complete."""
+"""Depth above which a blink counts as complete."""
 
 
 def blink_pause_s(
@@ -15,7 +15,7 @@ def blink_pause_s(
 ) -> float:
     """Draw the pause from the end of a blink until the next spontaneous one.
 
-    per_min: blinks wanted in a minute, 0 is never; length_s: of a blink
+    per_min: wanted rate of blinks, 1/min, 0 is never; length_s: of a blink
     """
     if per_min == 0.0:
         return inf
@@ -26,17 +26,17 @@ def blink_pause_s(
         return shortest + mean
     if params.interval_distribution == "exponential":
         return shortest + mean * float(rng.standard_exponential())
-    # A log-normal part on top of the shortest pause, with mean and spread such that
-    # the whole pause has those asked for.
+    # A log-normal part on top of the shortest pause, with mean and spread such that the whole pause
+    # has the wanted ones.
     sigma2 = log(1.0 + (params.interval_cv * between / mean) ** 2)
     return shortest + mean * exp(sqrt(sigma2) * rng.standard_normal() - 0.5 * sigma2)
 
 
 def evokes_blink(params: LidParams, shift_deg: float, rng: np.random.Generator) -> bool:
-    """Return whether a gaze shift brings a blink with it (Evinger 1994).
+    """Return whether a gaze shift evokes a blink (Evinger 1994).
 
-    The logistic curve through the published points would have one shift in twenty of 3 deg blink;
-    it is lowered such that it begins at ``gaze_evoked_blink_least_deg``, and 1 stays 1.
+    The logistic curve through the published points would evoke a blink in one of twenty shifts of 3
+    deg; it is lowered such that it begins at ``gaze_evoked_blink_least_deg``, and 1 stays 1.
     """
     if params.gaze_evoked_blink_literal:
         return shift_deg > params.gaze_evoked_blink_literal_deg
@@ -49,7 +49,7 @@ def evokes_blink(params: LidParams, shift_deg: float, rng: np.random.Generator) 
 
 def _logistic(params: LidParams, shift_deg: float) -> float:
     beyond = shift_deg - params.gaze_evoked_blink_middle_deg
-    # Of the steepest slope the exponential would be beyond what a number can hold.
+    # At the steepest slope the exponential would overflow.
     return 1.0 / (1.0 + exp(min(700.0, -params.gaze_evoked_blink_steepness_1_deg * beyond)))
 
 
@@ -74,5 +74,5 @@ def blink_depth(params: LidParams, rng: np.random.Generator) -> float:
 
 
 def is_double_blink(params: LidParams, rng: np.random.Generator) -> bool:
-    """Return whether a second blink comes right after this one."""
+    """Return whether a second blink follows immediately."""
     return float(rng.random()) < params.double_share

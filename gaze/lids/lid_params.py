@@ -1,18 +1,18 @@
 """Parameters of the lids, with the sources of their values.
 
-Rates are those of Bentivoglio 1997: 17 a minute at rest, 26 in conversation, with
-log-normal intervals. Closing is about twice as fast as opening (VanderWerf 2003; Kwon
-2013). Half of all blinks are incomplete. Large gaze shifts bring a blink with them (Evinger
-1994: 97 % of those beyond 33 deg), once for each shift, about when eyes and head set off; these
-are among the published rates, not besides them. Upper lids follow the gaze with a gain of about
-1 (Becker & Fuchs 1988), lower lids the same way by a quarter of that (Leite 2006: 2.2 mm and
-9.1 mm in the same saccades of people of 20 to 30; a third at 60 and more), up and down alike.
+Rates are those of Bentivoglio 1997: 17 a minute at rest, 26 in conversation, with log-normal
+intervals. Closing is about twice as fast as opening (VanderWerf 2003; Kwon 2013). Half of all
+blinks are incomplete. Large gaze shifts evoke a blink (Evinger 1994: 97 % of those beyond 33 deg),
+once for each shift, about when eyes and head start; the published rates include these. Upper lids
+follow the gaze with a gain of about 1 (Becker & Fuchs 1988), lower lids in the same direction by a
+quarter of that (Leite 2006: 2.2 mm and 9.1 mm in the same saccades of people of 20 to 30; a third
+at 60 and more), up and down alike.
 
-People's lower lids hardly rise in a blink, they move towards the nose (Doane 1980), and the
-upper lid comes down to them. A mechanism cannot do as they do: the shut points of its lids
-are calibrated where upper and lower meet, half way perhaps, so a lower lid that stays leaves
-a gap. Therefore ``lower_close_share`` is 1. Calibrated the other way, with the upper lid's
-shut point at the edge of a resting lower lid, a rig may blink as people do: share 0 to 0.2.
+People's lower lids hardly rise in a blink, they move towards the nose (Doane 1980), and the upper
+lid comes down to them. A mechanism cannot do this: the shut points of its lids are calibrated to
+meet, perhaps in the middle, so a lower lid at rest would leave a gap. Therefore
+``lower_close_share`` is 1. If the upper lid's shut point is calibrated at the edge of a resting
+lower lid, a rig can blink as people do: share 0 to 0.2.
 
 No measurement of the lower lid in sleepiness is known; the muscle that lifts it
 tires with the others, so it rises by little.
@@ -26,7 +26,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class LidParams:
-    """Rates, shapes and what the lids do at rest; lids without a name are the upper ones."""
+    """Rates, shapes and rest positions of the lids; an unnamed lid is an upper one."""
 
     # fmt: off
     blinks_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks at rest; 0: never"] = 17.0

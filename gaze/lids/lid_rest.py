@@ -1,15 +1,15 @@
 """Lid openings between blinks: lid saccades with vertical gaze, and sleepiness.
 
-Eyes that turn down take both lids down with them: the upper lid shuts by that, the lower
-one opens, by less. So the middle of the fissure goes where the eye goes, and the fissure
-narrows (Read 2006: from 9.7 to 6.4 mm at 40 deg down). Nothing here is random.
+Eyes that turn down take both lids down: the upper lid shuts, the lower one opens, by less. So the
+middle of the fissure follows the eye, and the fissure narrows (Read 2006: from 9.7 to 6.4 mm at 40
+deg down). Nothing here is random.
 """
 
 from gazerig.gaze.lids.lid_params import LidParams
 from gazerig.gaze.minimum_jerk import min_jerk
 
-_DROOP_S = 1.0  # time in which lids sink or rise when the sleepiness changes
-_GLIDE_S = 0.3  # and when what they do at rest is retuned
+_DROOP_S = 1.0  # duration of a change of the lids with the sleepiness
+_GLIDE_S = 0.3  # duration of a change of their rest positions
 
 
 LidPair = tuple[float, float]
@@ -19,7 +19,7 @@ _NOTHING: LidPair = (0.0, 0.0)
 
 
 def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> LidPair:
-    """Return what goes with a vertical gaze, + is up, and a sleepiness of 0..1."""
+    """Return the openings for a vertical gaze, + is up, and a sleepiness of 0..1."""
     share = params.follow_up_share if eye_pitch_deg > 0.0 else 1.0
     upper = _bounded(params.rest_opening + params.follow_per_deg * share * eye_pitch_deg)
     lower = _bounded(params.lower_rest_opening - params.lower_follow_per_deg * eye_pitch_deg)
@@ -44,7 +44,7 @@ class LidsAtRest:
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
-        """Set the sleepiness of the start, at once."""
+        """Set the initial sleepiness immediately."""
         level = self._params.sleepy_level
         self._droop_from, self._droop_to, self._droop_since_s = level, level, t_s
         self._pitch_deg = 0.0
@@ -74,7 +74,7 @@ class LidsAtRest:
         self._droop_to, self._droop_since_s = level, t_s
 
     def sleepiness(self, t_s: float) -> float:
-        """Return how sleepy the lids look by now, 0..1."""
+        """Return the present sleepiness of the lids, 0..1."""
         if self._droop_from == self._droop_to:
             return self._droop_from
         way = min_jerk((t_s - self._droop_since_s) / _DROOP_S)

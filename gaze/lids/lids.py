@@ -1,10 +1,10 @@
 """Lids: spontaneous and gaze-evoked blinks, winks, sleepiness, lids that follow the gaze.
 
-Rates and their sources: gaze.lid_params. Nakamoto & Tsuruno 3.6 print the rule of the blinks
-that come with large gaze shifts as a level, eye and head more than 20 deg apart, which would
-blink for ever with the head held aside; here it is the event that the text before it
-describes. Opening 0 is shut, where upper and lower lid meet; 1 is fully open. A blink leads
-both lids from wherever the gaze has them to 0, so they meet whatever the gaze direction.
+Rates and their sources: gaze.lid_params. Nakamoto & Tsuruno 3.6 print the rule of gaze-evoked
+blinks as a level, eye and head more than 20 deg apart, which would blink for ever with the head
+turned aside; here it is the event that the text before it describes. Opening 0 is shut, with upper
+and lower lid in contact; 1 is fully open. A blink moves both lids from their present openings to 0,
+so they meet at any gaze direction.
 """
 
 from math import degrees, inf, tanh
@@ -29,11 +29,11 @@ LidMode = Literal["rest", "conversation"]
 _NOT_SHUT: LidPair = (0.0, 0.0)
 _ROUNDING_S = 1e-6
 _MOST_INTERVALS = 3.0
-"""A spontaneous blink is put off for at most so many mean intervals by gaze-evoked ones."""
+"""Largest delay of a spontaneous blink by gaze-evoked ones, in mean intervals."""
 
 
 class LidOpenings(NamedTuple):
-    """How far the lids are open, 0 shut .. 1 open, and whether a blink is under way.
+    """Openings of the lids, 0 shut .. 1 open, and whether a blink is in progress.
 
     left, right: upper lids; lower_left, lower_right: lower lids
     """
@@ -60,7 +60,7 @@ class LidOpenings(NamedTuple):
 
 
 def _times(opening: float, factor: float) -> float:
-    """Return an opening times a factor; a lid that opens does not stop at once when it is open.
+    """Return an opening times a factor, with a smooth limit at fully open.
 
     Beyond factor 1 it approaches 1 as tanh does, with the same slope and no bend at 1.
     """
@@ -94,9 +94,9 @@ class Lids:
         self._next_s = t_s + self._pause_s(self._length_s())
 
     def retune(self, params: LidParams) -> None:
-        """Change rates and shapes; a blink under way ends as it began, without a jump.
+        """Change rates and shapes; a blink in progress ends unchanged, without a jump.
 
-        The pause under way becomes longer or shorter as the mean pause does.
+        The present pause is scaled like the mean pause.
         """
         before_per_min = self._per_min()
         self._params = params
@@ -116,14 +116,14 @@ class Lids:
         """
         if name not in ("rest", "conversation"):
             raise ValueError(f"no lid mode {name!r}; modes: rest, conversation")
-        # The interval under way was drawn for the other rate, perhaps for "never".
+        # The present interval was drawn for the other rate, perhaps for "never".
         self._redraw = self._redraw or name != self._mode
         self._mode = name
 
     def wink(self, side: Side, t_s: float) -> None:
-        """Shut and open the lids of one eye; a wink under way goes on.
+        """Shut and open the lids of one eye; a wink in progress continues.
 
-        t_s: when, at the soonest at the last step
+        t_s: start, no earlier than the last step
 
         Raises:
             ValueError: there is no such side.
@@ -145,13 +145,13 @@ class Lids:
         self._rest.sleepy(level, self._t_s)
 
     def announce(self, shift_rad: float, onset_s: float, t_s: float) -> float:
-        """Draw the blink of a gaze shift that is about to begin; return how long it has to wait.
+        """Draw the blink of a gaze shift that is about to begin; return the wait of the shift.
 
-        A blink that comes before its shift begins now at the soonest, and the shift after it.
+        A blink that precedes its shift begins now at the earliest, and the shift after it.
 
         Args:
             shift_rad: size of the shift.
-            onset_s: when it is to begin.
+            onset_s: its planned start.
             t_s: now.
         """
         par, blink = self._params, self._blink
@@ -166,10 +166,10 @@ class Lids:
         return max(0.0, t_s - blinks_s)
 
     def step(self, t_s: float, eye_pitch_rad: float, shift_rad: float | None) -> LidOpenings:
-        """Return the openings of the lids and whether a blink is under way.
+        """Return the openings of the lids and whether a blink is in progress.
 
-        shift_rad: size of a gaze shift that begins in this very tick, else None; one that was
-            announced has its blink already
+        shift_rad: size of a gaze shift that begins in this tick, else None; an announced one has
+            its blink already
         """
         self._t_s = t_s
         if self._redraw:
@@ -193,12 +193,12 @@ class Lids:
         )
 
     def closure(self, since_onset_s: float) -> float:
-        """Return how far a full blink has shut the upper lid, 0..1, a time after its onset."""
+        """Return the closure of the upper lid by a full blink, 0..1, at a time after its onset."""
         _, close_s, hold_s, open_s, *_ = self._closing(0.0, self._params.hold_ms)
         return closure(since_onset_s, close_s, hold_s, open_s)
 
     def _due(self, t_s: float, shift_rad: float | None) -> bool:
-        """Return whether a blink begins now; each gaze shift is drawn for once."""
+        """Return whether a blink begins now; each gaze shift has one draw."""
         par, blink = self._params, self._blink
         if shift_rad is not None:
             announced, self._announced = self._announced, False
@@ -206,7 +206,7 @@ class Lids:
                 after_s = abs(evoked_offset_s(par, self._rng))
                 self._evoked_s = min(self._evoked_s, t_s + after_s)
         if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
-            # Both eyes would shut, and the wink be lost in it.
+            # Both eyes would shut, and hide the wink.
             self._evoked_s = inf
             self._next_s = max(self._next_s, t_s + par.min_interval_ms / 1e3)
             return False
@@ -215,7 +215,7 @@ class Lids:
             if since_s >= self._pause_after_s():
                 return True
             self._evoked_s = inf
-        # A rate that was just raised may want the next one before this one is over.
+        # A raised rate may require the next blink before this one is over.
         return t_s >= self._next_s and (blink is None or not blink.under_way(t_s))
 
     def _begin_blink(self, t_s: float) -> None:
@@ -232,7 +232,7 @@ class Lids:
         pause_s = par.double_gap_ms / 1e3 if double else self._pause_s(blink.length_s)
         after_s, ends_s = blink.length_s + pause_s, t_s + blink.length_s
         if t_s >= self._evoked_s and par.gaze_evoked_blink_replaces and not double:
-            # The spontaneous blink that was due next is left out, the one after it comes.
+            # The next spontaneous blink is skipped, the one after it stays.
             most_s = ends_s + _MOST_INTERVALS * self._mean_s()
             soonest_s = ends_s + par.min_interval_ms / 1e3
             self._next_s = max(min(self._next_s + after_s, most_s), soonest_s)
@@ -241,7 +241,7 @@ class Lids:
         self._evoked_s = inf
 
     def _expect(self, closing: LidClosure) -> None:
-        """Record until when lids are not at rest, for a blink or wink that begins."""
+        """Record the end of the lids' motion, for a blink or wink that begins."""
         ends_s = closing.onset_s + closing.length_s + _ROUNDING_S
         self._shut_until_s = max(self._shut_until_s, ends_s)
 
@@ -267,7 +267,7 @@ class Lids:
         return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min
 
     def _mean_s(self) -> float:
-        """Return the mean interval between blinks, inf where there are none."""
+        """Return the mean interval between blinks, inf without any."""
         per_min = self._per_min()
         return 60.0 / per_min if per_min else inf
 
@@ -276,7 +276,7 @@ class Lids:
 
 
 def _shut(closing: LidClosure | None, t_s: float) -> LidPair:
-    """Return how far a blink or wink has shut the upper and the lower lid, 0..1."""
+    """Return the closure of the upper and the lower lid by a blink or wink, 0..1."""
     shut = 0.0 if closing is None else closing.at(t_s)
     if closing is None or shut == 0.0:
         return _NOT_SHUT

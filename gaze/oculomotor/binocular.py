@@ -1,12 +1,12 @@
-"""Eyes between shifts by models of two papers: binocular controller, and opposite angles.
+"""Eye control between gaze shifts by two papers: binocular controller, and opposite angles.
 
 The binocular controller does pursuit, vergence and vestibulo-ocular reflex of both eyes.
 
-Zhang & Wakamatsu's controller, which Mitake et al. 3.3.5 use and the profile mitake runs; its
-gains are not public, its structure is. The sum of both eyes is controlled by a conjugate channel,
-their difference by a vergence channel with dynamics of its own. A frame tells where in space the
-target was when it was taken (efference copy), which is smoothed and compared with the gaze of
-now, so that no delay remains in the loop:
+Zhang & Wakamatsu's controller, which Mitake et al. 3.3.5 use and the profile mitake runs; its gains
+are not public, its structure is. The sum of both eyes is controlled by a conjugate channel, their
+difference by a vergence channel with dynamics of its own. A frame gives the target's position in
+space at its exposure (efference copy), which is smoothed and compared with the present gaze, so
+that no delay remains in the loop:
 
     w = d(S_f)/dt,  u_c = Gp sat(w) + Kc sat(S_f - G),  u_d = Kd (V_demand - V)
 
@@ -45,13 +45,13 @@ _STRAIGHT: Vec3 = (1.0, 0.0, 0.0)
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 _FARTHEST_M = 100.0
 _LOST_S = 0.04
-"""A moving target without a frame for so long is lost from sight, until the next one."""
+"""A moving target without a frame for this time is out of sight until the next one."""
 
 
 class Version(NamedTuple):
     """Both eyes as one direction in the head and the angle between them.
 
-    ahead: unit vector in the head; vergence_rad: right yaw less left yaw, positive where they meet
+    ahead: unit vector in the head; vergence_rad: right yaw minus left yaw, positive if they meet
     """
 
     ahead: Vec3
@@ -59,7 +59,7 @@ class Version(NamedTuple):
 
 
 class EyeGeometry(NamedTuple):
-    """The head at the time when commands of now take effect, and what its eyes can do.
+    """The head at the time when present commands take effect, and the limits of its eyes.
 
     eyes_on: returns the eye angles that fixate a point from a pose of the head
     nearest_m: nearest distance on which the eyes converge
@@ -79,11 +79,11 @@ class EyeGeometry(NamedTuple):
 
 
 class SaccadeState(Protocol):
-    """What the saccades want meanwhile (gazerig.gaze.oculomotor.saccade_trigger)."""
+    """Pending saccades (gazerig.gaze.oculomotor.saccade_trigger)."""
 
     @property
     def waits(self) -> bool:
-        """Return whether a new target has come and its saccade is still to start."""
+        """Return whether the saccade to a new target has not started yet."""
         ...
 
     @property
@@ -100,7 +100,7 @@ def version_of(eyes: Eyes) -> Version:
 
 
 class DelayedSight:
-    """Where a target was a fixed delay ago, from frames that come now and then and are late."""
+    """Position of a target a fixed delay ago, from irregular and late frames."""
 
     def __init__(self) -> None:
         self.reset()
@@ -111,9 +111,9 @@ class DelayedSight:
         self._shift = -1
 
     def place(self, target: Target, t_s: float) -> Vec3 | None:
-        """Return where the target was at a time in the past; None: lost from sight by then.
+        """Return the target's position at a past time; None: out of sight by then.
 
-        A new target is known at once: that it was chosen shows that it has been seen.
+        A new target is known immediately, as it must have been seen to be chosen.
         """
         frames = self._frames
         if target.shift != self._shift:
@@ -132,8 +132,8 @@ class DelayedSight:
 class BinocularController:
     """Controls both eyes between saccades.
 
-    sight: where the target was a delay ago
-    version: where the eyes are commanded to; started: whether that has been set since the reset
+    sight: position of the target a delay ago
+    version: commanded direction of the eyes; started: whether it has been set since the reset
     """
 
     def __init__(self, params: PursuitParams) -> None:
@@ -142,7 +142,7 @@ class BinocularController:
         self.reset()
 
     def retune(self, params: PursuitParams) -> None:
-        """Change gains and delays; the eyes and what they have seen stay."""
+        """Change gains and delays; the state of eyes and target stays."""
         self._params = params
         self.delay_s = params.delay_ms / 1e3
         self._smooth_s, self._fade_s = params.smooth_ms / 1e3, params.lost_fade_ms / 1e3
@@ -154,7 +154,7 @@ class BinocularController:
         self._widest_rad = radians(params.max_vergence_deg)
 
     def reset(self) -> None:
-        """Forget target and head; the eyes begin where ``hold`` sets them, or straight ahead."""
+        """Forget target and head; the eyes begin at the angles of ``hold``, or straight ahead."""
         self.version = Version(_STRAIGHT, 0.0)
         self.started = False
         self.sight.reset()
@@ -177,7 +177,7 @@ class BinocularController:
         """Return the eye angles for the next period, and the point that they fixate.
 
         gaze: the point fixated so far, or that a saccade prescribes
-        prescribed: eye angles of a saccade; None: no saccade is under way
+        prescribed: eye angles of a saccade; None: no saccade is in flight
         """
         place = self.sight.place(target, t_s - self.delay_s)
         seen = None if place is None else view.eyes_to(place)
@@ -263,7 +263,7 @@ class BinocularController:
         return (before, heads[0][1]) if before is not None else None
 
     def _demand(self, vergence_rad: float, t_s: float) -> float | None:
-        """Return the vergence that the target asked for a delay ago, None before there was one."""
+        """Return the vergence that the target required a delay ago, None before the first."""
         demands = self._demands
         demands.append((t_s, vergence_rad))
         due_s = t_s - self._vergence_delay_s + 1e-9
@@ -272,7 +272,7 @@ class BinocularController:
         return demands[0][1] if demands[0][0] <= due_s else None
 
     def _shift(self, seen: Vec3) -> None:
-        """Adopt a jump of the target, which is no velocity."""
+        """Adopt a jump of the target, which does not count as velocity."""
         moved = _NONE if self._seen is None else sub(seen, self._seen)
         self._smoothed = seen if self._seen is None else add(self._smoothed, moved)
         self._seen, self._known = seen, True
@@ -299,9 +299,9 @@ def _clipped(v: Vec3, most: float) -> Vec3:
 class OppositeAngles:
     """Eyes by the rules of Nakamoto & Tsuruno 3.4: turned in shifts, by opposite angles between.
 
-    An eye turns towards its target in a shift alone. While it stands, a turn of the head by
-    (x, y, z) turns it by (-x, -y, -z), the paper's vestibulo-ocular reflex. An eye that would have
-    to turn beyond its range, 20 deg in the paper, is not turned at all; the reflex goes on.
+    An eye turns towards its target only in a shift. Between shifts, a turn of the head by (x, y, z)
+    turns it by (-x, -y, -z), the paper's vestibulo-ocular reflex. An eye whose target is beyond its
+    range, 20 deg in the paper, does not shift at all; the reflex continues.
 
     Opposite angles are the inverse of a turn about one axis only: of a turn by 20 deg of yaw and
     10 of pitch they leave 0.7 deg. The next shift closes that; nothing else does.
@@ -311,7 +311,7 @@ class OppositeAngles:
         self.reset()
 
     def reset(self) -> None:
-        """Forget where eyes and head were; the eyes begin where they are next asked for."""
+        """Forget eyes and head; the eyes begin at the next fixated point."""
         self._eyes: Eyes | None = None
         self._head_rad: Angles2 = (0.0, 0.0)
 
@@ -328,7 +328,7 @@ class OppositeAngles:
         """Return the eye angles for the next period, and the point that they fixate.
 
         gaze: the point fixated so far, or that a shift prescribes
-        prescribed: eye angles of a shift; None: the eyes stand
+        prescribed: eye angles of a shift; None: no shift
         """
         R, before = view.R_world_head, self._head_rad
         self._head_rad = head = yaw_pitch((R[0][0], R[1][0], R[2][0]))

@@ -1,4 +1,4 @@
-"""The gaze point: saccades bring it to a target, pursuit keeps it there.
+"""The gaze point: saccades move it to a target, pursuit keeps it there.
 
 Points are in the world, in metres.
 """
@@ -37,7 +37,7 @@ _MIDDLE = (0.0, 0.0)
 
 
 class GazePoint:
-    """Where both eyes are meant to point, moved from tick to tick.
+    """Common goal of both eyes, moved from tick to tick.
 
     point_m: in the world
     saccades, fixations: counts since the reset
@@ -50,7 +50,7 @@ class GazePoint:
         rng: random generator of endpoints and re-fixations; None: without re-fixations.
 
     Raises:
-        ValueError: endpoints are to scatter and there is no rng.
+        ValueError: endpoints scatter and rng is None.
     """
 
     def __init__(
@@ -70,10 +70,10 @@ class GazePoint:
         self.reset(0.0, (1.0, 0.0, 0.0))
 
     def retune(self, params: OculomotorParams) -> None:
-        """Change thresholds and times; a saccade under way goes on to its end.
+        """Change thresholds and times; a saccade in flight continues to its end.
 
         Raises:
-            ValueError: endpoints are to scatter and there is no rng.
+            ValueError: endpoints scatter and rng is None.
         """
         if params.scatters and self._rng is None:
             raise ValueError(
@@ -103,12 +103,12 @@ class GazePoint:
 
     @property
     def waits(self) -> bool:
-        """Return whether a new target has come and its saccade is still to start."""
+        """Return whether the saccade to a new target has not started yet."""
         return self._trigger.waits
 
     @property
     def corrects(self) -> bool:
-        """Return whether what the last saccade left waits for a correction."""
+        """Return whether the error of the last saccade waits for a correction."""
         return self._trigger.corrects
 
     @property
@@ -123,7 +123,7 @@ class GazePoint:
 
     @property
     def onset_s(self) -> float:
-        """Return when the last saccade started, or the next one is to."""
+        """Return the start of the last saccade, or the planned start of the next."""
         return self._trigger.onset_s
 
     def record_shift(self, shift: int, wait_s: float, t_s: float, exact: bool = False) -> None:
@@ -131,7 +131,7 @@ class GazePoint:
 
         Args:
             shift: its count of gaze shifts.
-            wait_s: what the eyes wait because the head goes first.
+            wait_s: wait of the eyes because the head goes first.
             t_s: now.
             exact: land on it without undershoot and scatter, and rest there without re-fixations.
         """
@@ -154,10 +154,10 @@ class GazePoint:
             velocity: of the target, m/s.
             p_head: midway between the eyes.
             t_s: now.
-            dt_s: since the tick before.
+            dt_s: time since the last tick.
 
         Returns:
-            The amplitude of the saccade that starts now, radians; None where none does.
+            The amplitude of the saccade that starts now, radians; None without one.
         """
         shift_rad = None
         trigger, trajectory = self._trigger, self._trajectory
@@ -207,24 +207,24 @@ class GazePoint:
     def _redirect(
         self, before: Trajectory, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float
     ) -> None:
-        """Bend the saccade in flight to where the target is now."""
+        """Bend the saccade in flight to the present position of the target."""
         end = self.clear(add(point, scale(velocity, before.ends_s - t_s)), p_head)
         self._trajectory = RedirectedTrajectory(before, self._saccade, end, p_head, t_s)
 
     def _correction_delay_s(self) -> float:
-        """Draw after how long an error of this landing would be corrected."""
+        """Draw the delay of a correction of this landing's error."""
         par, spread = self._params, 0.0
         if self._rng is not None and par.scatters and par.correct_spread_ms > 0.0:
             spread = par.correct_spread_ms * float(self._rng.uniform(-1.0, 1.0))
         return (par.correct_after_ms + spread) / 1e3
 
     def clear(self, point: Vec3, p_head: Vec3) -> Vec3:
-        """Return a point moved away to ``nearest_m`` where it is nearer."""
+        """Return a point, moved away to ``nearest_m`` if it is nearer."""
         return no_nearer(point, p_head, self._params.nearest_m)
 
 
 def _beside(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
-    """Return a point beside another one, as far away, by angles to the left and up."""
+    """Return a point next to another one at its distance, by angles to the left and up."""
     way = sub(point, eye)
     yaw, pitch = yaw_pitch(way)
     return add(eye, scale(direction((yaw + offset[0], pitch + offset[1])), norm(way)))

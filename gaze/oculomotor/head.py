@@ -1,8 +1,8 @@
-"""Head share of a gaze shift: when it starts, how far it goes, how it moves.
+"""The head in a gaze shift: start, goal and motion.
 
-Start: the gaze point lies beyond the trigger angle from the face's front, and 20 ms
-have passed since the eyes set off or the target is top-down (Mitake et al. 3.3.6).
-Goal: how far short of the target the head stops, and its roll (gazerig.gaze.oculomotor.head_share).
+Start: the gaze point is beyond the trigger angle from the face's front, and 20 ms have passed since
+    the eyes started or the target is top-down (Mitake et al. 3.3.6).
+Goal: the angle short of the target, and the roll (gazerig.gaze.oculomotor.head_share).
 Motion: minimum jerk (eq 8), from the present position, speed and acceleration so that a new
 goal in flight makes no step.
 """
@@ -18,22 +18,22 @@ from gazerig.gaze.types import Angles2, Angles3, Target, Vec3
 _NO_ROLL: Angles2 = (0.0, 0.0)
 _AHEAD: Vec3 = (1.0, 0.0, 0.0)
 _BRAKES_S = 0.12
-"""A head in flight goes on for as far as its speed takes it in this time."""
+"""Time constant of the braking distance of a head in flight."""
 
 _ROUNDING_RAD = 1e-6
 _ROLLS_S = 0.5
 _SWINGS = 2.5
-"""A movement longer than so many times the way over the present speed swings past its goal."""
+"""A movement lasting longer than this multiple of distance over speed swings past its goal."""
 
 
 class HeadModel:
     """Start, goal and trajectory of the head's part of a gaze shift.
 
     Args:
-        params: constants of all of that.
+        params: constants of start, goal and motion.
         eye_limit_rad: the smallest limit of the eyes.
         neck_limit_rad: ((yaw low, high), (pitch low, high)) of the neck.
-        roll_limit_rad: (low, high) of its roll; none where the neck has no such joint.
+        roll_limit_rad: (low, high) of its roll; None without such a joint.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class HeadModel:
         neck_limit_rad: tuple[Angles2, Angles2],
         roll_limit_rad: Angles2 = _NO_ROLL,
     ) -> None:
-        """Change constants and ranges; a movement under way goes on as planned."""
+        """Change constants and ranges; a movement in progress continues as planned."""
         self._params = params
         self._neck, self._roll = neck_limit_rad, roll_limit_rad
         self._share = HeadShare(params, eye_limit_rad)
@@ -79,7 +79,7 @@ class HeadModel:
         return self._share.trigger_rad
 
     def offset_rad(self, salience: float) -> float:
-        """Return how far short of the target the head stops (eq 7, sign corrected)."""
+        """Return the angle by which the head stops short of the target (eq 7, sign corrected)."""
         return self._share.offset_rad(salience)
 
     def goal_rad(self, facing_rad: Angles2, offset_rad: float, start: Vec3 = _AHEAD) -> Angles2:
@@ -87,8 +87,8 @@ class HeadModel:
 
         Args:
             facing_rad: neck angles that would point the face straight at the target.
-            offset_rad: how far short of it the head stops.
-            start: direction that the head sets off from; one nearer to the target is its goal.
+            offset_rad: angle by which the head stops short of it.
+            start: direction at the head's start; it is the goal if it is nearer to the target.
         """
         yaw, pitch = yaw_pitch(shortened(direction(facing_rad), offset_rad, start))
         return self.in_range((yaw, pitch, 0.0))[:2]
@@ -107,7 +107,7 @@ class HeadModel:
         return self._neck
 
     def destination_rad(self, target: Target, facing_rad: Angles2) -> Angles3:
-        """Return the yaw, pitch and roll of the head at rest for a point, its own centre.
+        """Return the yaw, pitch and roll of the head at rest for a target, by its centre.
 
         facing_rad: neck angles that would point the face straight at it
         """
@@ -119,7 +119,7 @@ class HeadModel:
         return self._reaching(target, facing_rad, facing_rad, short_rad, start)
 
     def leads_s(self, target: Target, eccentricity_rad: float) -> float:
-        """Return how long the eyes wait because the head goes first."""
+        """Return the time for which the eyes wait because the head goes first."""
         first = target.top_down and eccentricity_rad >= self._share.trigger_rad
         return self._params.lead_ms / 1e3 if first else 0.0
 
@@ -135,16 +135,16 @@ class HeadModel:
         """Return the head's yaw, pitch and roll for this instant.
 
         facing_rad: neck angles that would point the face straight at the target's centre
-        gaze_rad: the same for the point itself that is looked at
+        gaze_rad: the same for the target point itself
         eccentricity_rad: angle of that point from the face's front
-        since_eye_onset_s: time since the eyes set off for it, negative before they do
+        since_eye_onset_s: time since the eyes started towards it, negative before
         """
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         since_s = t_s - self._planned_s
         if since_s >= self._lasts_s:
             return self.in_range(self._goal)
         yaw, pitch, roll = self._plans
-        # A plan made again in full flight may swing past its goal, but not past the neck's range.
+        # A new plan in full flight may swing past its goal, but not past the neck's range.
         return self.in_range(
             (yaw.position(since_s), pitch.position(since_s), roll.position(since_s))
         )
@@ -165,7 +165,7 @@ class HeadModel:
             self._target = target.kind, target.id
             self._aside_since_s = t_s
             self._start = self._facing(t_s) if moving else self._goal_direction
-            # What brought the eyes back from the target before it ends.
+            # A reason that moved the eyes back from the target before it ends.
             self._follows, self._relieves = moving, False
         elif (
             not moving
@@ -194,8 +194,8 @@ class HeadModel:
     ) -> None:
         """Turn towards the target, but never away from it because its salience has fallen.
 
-        A person who steps aside is most salient while moving; a head that then took the larger
-        offset of one who stands would swing back from where it has just turned to.
+        A person who steps aside is most salient while moving; with the larger offset of a still
+        person the head would swing back from its new direction.
         """
         way, to_centre = self._goal_direction, direction(facing)
         to_gaze = to_centre if gaze is facing else direction(gaze)
@@ -206,7 +206,7 @@ class HeadModel:
         if near_enough and in_reach and not (moving and angle_between(start, way) > arc_rad):
             return
         if moving:
-            # From where it can stop, unless that is past the target.
+            # From the point where it can stop, unless that is past the target.
             stop = self._facing(t_s, _BRAKES_S)
             start = stop if angle_between(start, stop) <= arc_rad else to_centre
         self._aim(self._reaching(target, facing, gaze, short_rad, start), t_s)
@@ -214,7 +214,7 @@ class HeadModel:
     def _reaching(
         self, target: Target, facing: Angles2, gaze: Angles2, offset_rad: float, start: Vec3
     ) -> Angles3:
-        """Return the goal for the centre; for the point itself if its eye could not get there."""
+        """Return the goal for the centre; for the point itself if the eyes could not reach it."""
         reach_rad = self._share.reach_rad
         goal = self.goal_rad(facing, offset_rad, start)
         if facing != gaze and not self._params.literal_reach:
@@ -225,7 +225,7 @@ class HeadModel:
         return (*goal, min(max(roll, low), high))
 
     def _facing(self, t_s: float, ahead_s: float = 0.0) -> Vec3:
-        """Return where the head points, or would if it went on at its present speed."""
+        """Return the direction of the head, extrapolated at its present speed by a time."""
         since_s = t_s - self._planned_s
         (yaw, yaw_rate, _), (pitch, pitch_rate, _) = (p.at(since_s) for p in self._plans[:2])
         return direction((yaw + ahead_s * yaw_rate, pitch + ahead_s * pitch_rate))
@@ -238,7 +238,7 @@ class HeadModel:
         starts = [plan.at(t_s - self._planned_s) for plan in self._plans]
         (yaw, yaw_rate, _), (pitch, pitch_rate, _), _ = starts
         duration = self._duration_s(goal[0] - yaw, goal[1] - pitch, yaw_rate, pitch_rate)
-        # A roll under way would swing far in a long turn.
+        # A roll in motion would swing far in a long turn.
         lasts = (duration, duration, min(duration, _ROLLS_S))
         self._plans = tuple(
             Quintic(start, end, each) for start, end, each in zip(starts, goal, lasts, strict=True)
@@ -254,10 +254,10 @@ class HeadModel:
         """Return the time of a head movement: peak speed grows with its size.
 
         Args:
-            yaw: the way to the goal sideways, rad.
+            yaw: the distance to the goal sideways, rad.
             pitch: the same upwards.
-            yaw_rate: the present speed, rad/s; a head that is fast on its way to the goal
-                would swing past it if it took longer.
+            yaw_rate: the present speed, rad/s; a head that is fast towards the goal would swing
+                past it with a longer duration.
             pitch_rate: the same upwards.
         """
         par = self._params

@@ -1,9 +1,9 @@
-"""How far the head goes in a gaze shift, and how it rolls.
+"""Share of the head in a gaze shift, and its roll.
 
-All angles of a shift are measured along the great circle from where the head points when it
-sets off: the head stops short of the target as seen from there and never goes past it. The
-paper's eq 7 says so in words ("30 deg short of the gaze direction"); an offset measured from
-straight ahead would turn a head that comes from 60 deg past a target at 25 deg.
+All angles of a shift are measured along the great circle from the head's direction at the start:
+the head stops short of the target as seen from there and never passes it. The paper describes eq 7
+so in words ("30 deg short of the gaze direction"); an offset measured from straight ahead would
+turn a head that comes from 60 deg past a target at 25 deg.
 """
 
 from math import exp, radians
@@ -22,10 +22,10 @@ def interest(params: HeadParams, salience: float) -> float:
 
 
 class HeadShare:
-    """The share of the head in gaze shifts, by the parameters and the eyes' limit in force.
+    """Share of the head in gaze shifts, by the present parameters and limit of the eyes.
 
     trigger_rad: eccentricity from which the head joins in
-    reach_rad: eccentricity that the eyes can hold
+    reach_rad: largest eccentricity of the eyes
     """
 
     def __init__(self, params: HeadParams, eye_limit_rad: float) -> None:
@@ -33,8 +33,8 @@ class HeadShare:
         printed = radians(params.max_offset_deg)
         reachable = max(0.0, eye_limit_rad - radians(params.eye_margin_deg))
         self._half_range_rad = radians(params.eye_only_range_deg) / 2.0
-        # A head that stops short by more than the eye can cover never brings the gaze
-        # to the target, and a trigger beyond the eye's limit never fires.
+        # If the head stopped short by more than the eye can cover, the gaze would never reach the
+        # target; and a trigger beyond the eye's limit never fires.
         if params.goal_model == "stahl":
             self.trigger_rad = min(self._half_range_rad, reachable)
             self.reach_rad = reachable
@@ -53,7 +53,7 @@ class HeadShare:
 
         Args:
             salience: of the target.
-            arc_rad: angle of the target from where the head points when it sets off.
+            arc_rad: angle of the target from the head's direction at the start.
         """
         par = self._params
         if par.goal_model == "attention":
@@ -64,7 +64,7 @@ class HeadShare:
         return min(short, self.reach_rad)
 
     def roll_rad(self, salience: float, yaw_rad: float) -> float:
-        """Return the roll that goes with a target ``yaw_rad`` aside of straight ahead."""
+        """Return the roll for a target at a yaw of ``yaw_rad``."""
         par = self._params
         lateral = min(1.0, max(-1.0, yaw_rad / _LATERAL_RAD))
         share = _LEAST_ROLL + (1.0 - _LEAST_ROLL) * interest(par, salience)

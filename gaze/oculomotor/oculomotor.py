@@ -1,8 +1,8 @@
-"""Oculomotor control: a target in, head, eye and lid angles out, tick by tick.
+"""Oculomotor control: converts a target to head, eye and lid angles, tick by tick.
 
-Gaze is planned in space and the eyes take what the head does not: E = gaze - head. So
-whatever the head does during or after a gaze shift, planned or pushed, is compensated
-exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own geometry.
+Gaze is planned in space and the eyes take the remainder: E = gaze - head. So every motion of the
+head during or after a gaze shift, planned or pushed, is compensated exactly (the vestibulo-ocular
+reflex), and vergence follows from each eye's own geometry.
 """
 
 from typing import NamedTuple, Protocol
@@ -56,16 +56,16 @@ class Sway(Protocol):
 
 
 _Seen = tuple[Vec3, Vec3, Vec3, Vec3]
-"""The target at this tick: its point and velocity, the point that the head turns to, and the way
-from between the eyes to the first."""
+"""The target at this tick: its point and velocity, the goal point of the head, and the vector from
+midway between the eyes to the first."""
 
 
 class ReachableGaze(NamedTuple):
-    """Where head and eyes come to rest for a point, and the eye angles that it would need.
+    """Final position of head and eyes for a point, and the required eye angles.
 
-    facing_rad, head_rad: (yaw, pitch, roll) that face it, and where the head stops
-    asked_eyes_rad, eyes_rad: left and right (yaw, pitch) from there, and as far as they go
-    too_near: the point is nearer than the eyes converge on
+    facing_rad, head_rad: (yaw, pitch, roll) that face it, and those of the head at rest
+    asked_eyes_rad, eyes_rad: required left and right (yaw, pitch) there, and the clipped ones
+    too_near: the point is nearer than the eyes can converge
     base_rad: (yaw, pitch) of a lower neck meanwhile
     """
 
@@ -88,11 +88,11 @@ class Oculomotor:
         pursuit: the model of pursuit.
         head: the model of head movements.
         lids: the model of lids and blinks.
-        breathing: sways the head; None: it does not.
+        breathing: sways the head; None: no breathing.
         rng: random generator of endpoints and re-fixations; None: without re-fixations.
 
     Raises:
-        ValueError: endpoints are to scatter and there is no rng.
+        ValueError: endpoints scatter and rng is None.
     """
 
     def __init__(
@@ -123,10 +123,10 @@ class Oculomotor:
         params: OculomotorParams,
         eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
     ) -> None:
-        """Change thresholds, durations and ranges; a saccade under way goes on to its end.
+        """Change thresholds, durations and ranges; a saccade in flight continues to its end.
 
         Raises:
-            ValueError: endpoints are to scatter and there is no rng.
+            ValueError: endpoints scatter and rng is None.
         """
         self._gaze.retune(params)
         self._eye_limits, self._lag_s = eye_limits, params.eye_lag_ms / 1e3
@@ -159,8 +159,8 @@ class Oculomotor:
         """Return the command for this tick.
 
         state: head and eyes as measured now
-        dt_s: time since the step before
-        offset: what gestures and expressions add
+        dt_s: time since the last step
+        offset: of gestures and expressions
         """
         if not self._started:
             self.reset(t_s, state)
@@ -199,7 +199,7 @@ class Oculomotor:
             else "pursue" if norm(velocity) > MOVING_M_S
             else "fixate"
         )  # fmt: skip
-        # Without the call of a function written in Python that the class itself would cost.
+        # Built without the call of a Python function that the class itself would cost.
         return tuple.__new__(
             GazeCommand,
             (
@@ -210,7 +210,7 @@ class Oculomotor:
         )  # fmt: skip
 
     def reach(self, target: Target) -> ReachableGaze:
-        """Return where head and eyes come to rest for a point that stands still."""
+        """Return the final position of head and eyes for a fixed point."""
         facing = self._geometry.facing(target.p_world_m, self._base_rad)
         head = self._head.destination_rad(target, facing)
         R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
@@ -234,7 +234,7 @@ class Oculomotor:
     def _record_shift(self, target: Target, aside_rad: float, off_rad: float, t_s: float) -> None:
         """Record a new target; the lids draw the blink that comes with its saccade, or its bend.
 
-        aside_rad, off_rad: how far the target is off the head's facing, and off the gaze
+        aside_rad, off_rad: angles of the target off the head's facing direction, and off the gaze
         """
         gaze = self._gaze
         waits = gaze.waits
@@ -250,7 +250,7 @@ class Oculomotor:
             self._lids.announce(off_rad, t_s, t_s)
 
     def _in_range(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
-        """Return the angles of both eyes clipped to their ranges; the same where nothing is."""
+        """Return the angles of both eyes clipped to their ranges; the same object if unclipped."""
         (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
         left, right = self._eye_limits
         (yaw_low, yaw_high), (pitch_low, pitch_high) = left
@@ -288,7 +288,7 @@ class Oculomotor:
         return self._head.in_range((head[0] + offset[0], head[1] + offset[1], head[2] + offset[2]))
 
     def _foreseen_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
-        """Return the head's pose at the time when an eye command of now takes effect."""
+        """Return the head's pose at the time when a present eye command takes effect."""
         lag = self._lag_s
         (yaw, pitch, roll), (yaw_rate, pitch_rate, roll_rate) = state[:2]
         base, turning = state.base_rad, state.base_rate_rad_s
@@ -299,7 +299,7 @@ class Oculomotor:
         )
 
     def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
-        """Return the target where it is predicted to be now."""
+        """Return the target at its predicted present position."""
         prediction = self._prediction
         prediction.see(target, p_head, self._pursuit.fastest_swing_rad_s)
         moved, velocity = prediction.motion(t_s)

@@ -1,9 +1,9 @@
 """Parameters of eye and head movements, with the sources of their values.
 
-How far the head goes: 0.77 of what exceeds the eye-only range, 35.8 deg wide (Stahl 1999;
-between people the range varies by 31.9 deg, the slope by 0.16), or eq 7 of Mitake et al.,
-or a fixed share. People roll their heads by a few degrees when they turn to somebody beside
-them; which ear goes down, and how much with how much interest, is a choice made here.
+Amplitude of the head: 0.77 of the excess over the eye-only range, 35.8 deg wide (Stahl 1999;
+between people the range varies by 31.9 deg, the slope by 0.16), or eq 7 of Mitake et al., or a
+fixed share. People roll their heads by a few degrees when they turn to a person next to them; the
+direction of the roll and its dependence on interest are choices made here.
 """
 
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class OculomotorParams:
 
     @property
     def errs(self) -> bool:
-        """Return whether saccades land anywhere else than on their targets."""
+        """Return whether saccades miss their targets."""
         return self.undershoot > 0.0 or self.scatters
 
     @property
@@ -67,10 +67,10 @@ class OculomotorParams:
 
 @dataclass(frozen=True)
 class PursuitParams:
-    """Model, gains, delays and limits of the following.
+    """Model, gains, delays and limits of pursuit.
 
-    Gains and limits are of both models, the delays, the reflex and the fading of the binocular
-    controller alone: in gaze space no delay of seeing is left, and the reflex is exact.
+    Gains and limits apply to both models; delays, reflex and fading to the binocular controller
+    alone: in gaze space no visual delay remains, and the reflex is exact.
     """
 
     # fmt: off

@@ -1,13 +1,13 @@
-"""Smooth following of a moving target between saccades, in gaze space.
+"""Smooth pursuit of a moving target between saccades, in gaze space.
 
-Two controls, conjugate and vergence, as in the binocular controller (gaze.binocular, which
-takes the place of this one with ``model: binocular``), on a target that is predicted to where
-it is now (gaze.target_prediction): no delay of seeing is left, a jump of the place never
-enters the speed, and a head that turns or moves changes nothing, near targets included.
+It has two controls, conjugate and vergence, like the binocular controller (binocular.py, which
+replaces it with ``model: binocular``). They act on the predicted present position of the target
+(target_prediction.py): no visual delay remains, a jump of the position never enters the speed, and
+motion of the head changes nothing, near targets included.
 
-The direction takes over the share Gp of the target's angular speed and closes the error
-at the rate Kc, both together no faster than human pursuit; the nearness closes its own
-at Kd, or at the slower Kdiv where it recedes. Larger errors of direction are saccades.
+The direction adopts the share Gp of the target's angular speed and closes the error at the rate Kc,
+both together no faster than human pursuit; the nearness closes its own error at Kd, or at the
+slower Kdiv for a receding target. Saccades close larger errors of direction.
 """
 
 from math import exp, radians, sqrt
@@ -28,12 +28,12 @@ Sight = tuple[float, float, float, float]
 """A point as seen from the eyes: its direction x, y, z, and its nearness, 1 / distance in 1/m."""
 
 _FARTHEST_1_M = 0.01
-"""Nearness below which the lines of sight are as good as parallel (100 m)."""
+"""Nearness below which the lines of sight are practically parallel (100 m)."""
 _NEAREST_1_M = 20.0
-"""Nearness of a point at the eyes themselves (0.05 m); nothing nearer has a direction."""
+"""Nearness of a point at the eyes themselves (0.05 m); a nearer point has no direction."""
 _PEAK_SHARE = 1.2
-"""Peak speed of a swing that is followed, over the fastest pursuit: what is cut off at its middle
-is made up for at its ends."""
+"""Largest peak speed of a followed swing, over the fastest pursuit: its ends compensate for the
+part cut off in its middle."""
 _NEAREST_M = 1.0 / _NEAREST_1_M
 
 
@@ -41,7 +41,7 @@ class Slip(NamedTuple):
     """Position error and retinal slip of the target, as seen from the eyes.
 
     error_rad: from the gaze to the target, as a vector across the line of sight
-    slip_rad_s: speed of the target less that of the following, closing aside
+    slip_rad_s: speed of the target minus that of pursuit, without the closing of the error
     """
 
     error_rad: Vec3
@@ -49,7 +49,7 @@ class Slip(NamedTuple):
 
 
 class EyeController(Protocol):
-    """What moves both eyes between saccades in place of pursuit by the gaze point."""
+    """Controller of both eyes between saccades, in place of pursuit by the gaze point."""
 
     def reset(self) -> None:
         """Forget target, eyes and head."""
@@ -72,7 +72,7 @@ class EyeController(Protocol):
 class Pursuit:
     """Smooth pursuit of a target point by the gaze point.
 
-    controller: what moves the eyes in its place; None: nothing does
+    controller: moves the eyes in its place; None: no controller
     """
 
     def __init__(self, params: PursuitParams) -> None:
@@ -83,7 +83,7 @@ class Pursuit:
         self.reset()
 
     def reset(self) -> None:
-        """Begin with eyes that have seen nothing."""
+        """Begin without a target."""
         self.binocular.reset()
         self._opposite.reset()
 
@@ -112,8 +112,8 @@ class Pursuit:
     ) -> Vec3:
         """Return the gaze point ``dt_s`` later; all points in the world, metres.
 
-        target, v_target: where the target is now and its velocity
-        eye: centre between the eyes, from which directions and nearness are seen
+        target, v_target: the target's present position and velocity
+        eye: midway between the eyes, the origin of directions and nearness
         closing: whether the error of direction is closed; False leaves it to a saccade
         """
         if dt_s <= 0.0:
@@ -132,7 +132,7 @@ class Pursuit:
         dt_s: float,
         closing: bool,
     ) -> Vec3:
-        """Return what ``step`` does, for whom has seen both points already.
+        """Return the result of ``step``, given both points as seen from the eye.
 
         gaze, now: gaze point and target as seen from ``eye``
         dt_s: above 0
@@ -168,7 +168,7 @@ class Pursuit:
             near = min(max(near, _FARTHEST_1_M), _NEAREST_1_M)
         x, y, z = x + move_x, y + move_y, z + move_z
         length, distance = sqrt(x * x + y * y + z * z), 1.0 / near
-        if length == 0.0:  # turned back within one step
+        if length == 0.0:  # reversed within one step
             x = length = 1.0
         return (
             eye[0] + x / length * distance,
@@ -177,7 +177,7 @@ class Pursuit:
         )
 
     def _taken(self, speed_rad_s: Vec3) -> Vec3:
-        """Return the angular velocity that is taken over from a target's."""
+        """Return the angular velocity that is adopted from a target's."""
         x, y, z = speed_rad_s
         size, gain = sqrt(x * x + y * y + z * z), self._params.velocity_gain
         if size > self._reject_rad_s:

@@ -1,8 +1,8 @@
-"""Re-fixations: small saccades within what is looked at, while it is looked at for long.
+"""Re-fixations: small saccades within a target during a long look.
 
-People's eyes never rest for seconds: they make one to two small saccades a second, most of them
+People's eyes never rest for seconds: they make one to two small saccades per second, most of them
 below 1 deg (Otero-Millan et al. 2013). A servo shows those that are larger than its steps and its
-play, so the gaze goes from one point near the middle of a target to another, and holds in between.
+play. So the gaze moves between points near the middle of a target, with rests in between.
 """
 
 from math import cos, hypot, inf, pi, radians, sin, sqrt
@@ -16,9 +16,9 @@ _TRIES = 12
 
 
 class Refixations:
-    """Points beside the middle of a target that are looked at one after the other.
+    """Successive gaze points about the middle of a target.
 
-    offset_rad: of the present one, to the left and up; (0, 0): the middle itself
+    offset_rad: offset of the present one, to the left and up; (0, 0): the middle itself
     """
 
     def __init__(self, params: OculomotorParams, rng: np.random.Generator | None) -> None:
@@ -39,13 +39,13 @@ class Refixations:
         self._due_s = inf
 
     def interrupt(self) -> None:
-        """Start the next rest anew, as the gaze has moved."""
+        """Restart the rest, as the gaze has moved."""
         self._due_s = inf
 
     def due(self, t_s: float, still: bool = True) -> bool:
-        """Return whether another point is chosen now; to be asked in every tick of a rest.
+        """Return whether another point is chosen now; called in every tick of a rest.
 
-        still: whether the target does not move; one that does is followed only
+        still: whether the target is at rest; a moving one is only followed
         """
         if t_s < self._due_s:
             if self._due_s == inf and self._rng is not None and self._most_rad > 0.0:

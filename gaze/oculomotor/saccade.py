@@ -1,11 +1,11 @@
 """Saccade profiles: the angle covered as a function of the time since onset.
 
-Four profiles with one interface. ``human`` has the duration, the peak speed and the early
-peak of human saccades. ``main_sequence`` has one ratio of peak to mean speed instead of a
-measured peak speed. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum jerk with a cap on the
-speed. ``literal_frame`` is the rule of Nakamoto & Tsuruno 3.3, 0.8 of the way in each frame.
-All are closed forms of the time: a late tick lands on the curve instead of stretching it.
-Radians and seconds inside; parameters in degrees and milliseconds.
+Four profiles with one interface. ``human`` has the duration, the peak speed and the early peak of
+human saccades. ``main_sequence`` has one ratio of peak to mean speed instead of a measured peak
+speed. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum jerk with a cap on the speed.
+``literal_frame`` is the rule of Nakamoto & Tsuruno 3.3, 0.8 of the distance in each frame. All are
+closed forms of the time: a late tick lands on the curve instead of stretching it. Radians and
+seconds inside; parameters in degrees and milliseconds.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from gazerig.params import Bounds
 _FLANK_PEAK_ACCELERATION = 1.5396
 """Highest acceleration of half a minimum-jerk movement, times its time, over its speed."""
 _LITERAL_REST_RAD = radians(0.05)
-"""What the 0.8-per-frame rule may leave when its saccade counts as landed."""
+"""Remaining distance at which a saccade of the 0.8-per-frame rule counts as landed."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,11 @@ class HumanProfile:
     The duration is human_base_ms + human_per_deg_ms A and the peak speed
     human_peak_deg_s (1 - exp(-A / human_peak_scale_deg)), as one source measured them.
 
-    The speed rises like the first half of a minimum-jerk movement, stays at its peak
-    for a while, and falls like the second half. Rise and fall share their time .38 to .62
-    up to 10 deg and .14 to .86 from 38 deg on; the time at the peak follows from the ratio
-    of peak to mean speed. Its middle is then at .42 of the duration of small saccades and at
-    .25 of large ones: what Collewijn et al. (1988) measured, less what servos delay it by.
+    The speed rises like the first half of a minimum-jerk movement, stays at its peak for a while,
+    and falls like the second half. Rise and fall share their time .38 to .62 up to 10 deg and .14
+    to .86 from 38 deg on; the time at the peak follows from the ratio of peak to mean speed. Its
+    middle is then at .42 of the duration of small saccades and at .25 of large ones: the values of
+    Collewijn et al. (1988), minus the delay of servos.
     """
 
     def __init__(self, params: SaccadeParams) -> None:
@@ -115,7 +115,7 @@ class HumanProfile:
         self._params = params
 
     def duration_s(self, amplitude_rad: float) -> float:
-        """Return the time from onset to landing, not shorter than the servos can."""
+        """Return the time from onset to landing, no shorter than the servos allow."""
         return self._shape(amplitude_rad)[0]
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
@@ -144,8 +144,8 @@ class HumanProfile:
         if A <= 0.0:
             return D, 0.0, 0.5 * D, D
         share = self._rise_share(A)
-        # A = V (flanks / 1.875 + cruise), flanks + cruise = D. Without a cruise, the speed that
-        # the highest acceleration leads to:
+        # A = V (flanks / 1.875 + cruise), flanks + cruise = D. Without a cruise, the speed at the
+        # highest acceleration:
         reached = sqrt(PEAK_SPEED * A * most * share / _FLANK_PEAK_ACCELERATION)
         V = min(self._peak_rad_s(A, D), self._L, reached)
         # Low speed or acceleration need more time than people do.
@@ -182,9 +182,9 @@ def _flank(peak_rad_s: float, length_s: float, t_s: float) -> float:
 
 
 class LiteralFrameProfile:
-    """0.8 of the remaining way in each frame (Nakamoto & Tsuruno 3.3), at any tick rate.
+    """0.8 of the remaining distance in each frame (Nakamoto & Tsuruno 3.3), at any tick rate.
 
-    Done at 1 - 0.2^(t / frame), which is the rule at whole frames. It has no cap.
+    The covered share is 1 - 0.2^(t / frame), which is the rule at whole frames. It has no cap.
     """
 
     def __init__(self, share: float, frame_s: float) -> None:
@@ -212,7 +212,7 @@ class LiteralFrameProfile:
 class SaccadeModel:
     """Displacement of the eye along the great circle as a function of time.
 
-    max_speed_rad_s, max_acceleration_rad_s2: what a saccade keeps that is bent in flight
+    max_speed_rad_s, max_acceleration_rad_s2: limits of a saccade that is bent in flight
     """
 
     def __init__(self, params: SaccadeParams) -> None:
@@ -226,7 +226,7 @@ class SaccadeModel:
 
     @property
     def profile(self) -> SaccadeProfile:
-        """Return the profile in force, which a saccade under way keeps to its end."""
+        """Return the present profile; a saccade in flight keeps its own to its end."""
         return self._profile
 
     def duration_s(self, amplitude_rad: float) -> float:

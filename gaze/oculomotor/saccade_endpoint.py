@@ -1,4 +1,4 @@
-"""Where a saccade lands: short of a far target, and scattered (Harris & Wolpert 1998)."""
+"""Landing points of saccades: short of a far target, and scattered (Harris & Wolpert 1998)."""
 
 from math import degrees
 
@@ -15,7 +15,7 @@ _FULL_DEG, _NONE_DEG = 10.0, 5.0
 def endpoint(
     end: Vec3, start: Vec3, eye: Vec3, params: OculomotorParams, rng: np.random.Generator | None
 ) -> Vec3:
-    """Return where a saccade from a point to another one lands, all points in the world."""
+    """Return the landing point of a saccade from a point to another one, all in the world."""
     a, b = sub(start, eye), sub(end, eye)
     amplitude = angle_between(a, b)
     far = (degrees(amplitude) - _NONE_DEG) / (_FULL_DEG - _NONE_DEG)

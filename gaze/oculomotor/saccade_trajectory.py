@@ -1,12 +1,12 @@
-"""One saccade under way: the gaze point between take-off and landing.
+"""Trajectory of one saccade: the gaze point between take-off and landing.
 
-The path is the great circle between the two directions, so that both axes start and end
-together, and the points are seen from where the head is at each moment, so that its own
-motion moves neither end; the nearness, and with it vergence, goes by the same profile.
+The path is the great circle between the two directions, so that both axes start and end together.
+The points are seen from the head's position at each moment, so that its own motion moves neither
+end. The nearness, and with it vergence, follows the same profile.
 
 A target that jumps early in flight bends the path (``RedirectedTrajectory``): a second saccade,
-from the old end to the new one, is added to what is left of the first (the superposition of
-Flash and Henis 1991), so that position, speed and acceleration are continuous.
+from the old end to the new one, is added to the remainder of the first (the superposition of Flash
+and Henis 1991), so that position, speed and acceleration are continuous.
 """
 
 import numpy as np
@@ -27,12 +27,12 @@ from gazerig.gaze.types import Floats, Vec3
 
 _FARTHEST_1_M = 0.001
 _SAMPLE_S, _STARTS, _MARGIN = 0.0025, 8, 0.98
-"""The sum of two saccades is looked at in such steps, for so many starts of the second, and kept
-below this share of the limits."""
+"""Step of sampling the sum of two saccades, number of starts of the second that are tried, and
+share of the limits that the sum may use."""
 
 
 class SaccadeTrajectory:
-    """The gaze point on its way from one point in the world to another."""
+    """The gaze point in motion from one point in the world to another."""
 
     onset_s: float
     ends_s: float
@@ -52,8 +52,8 @@ class SaccadeTrajectory:
         share = done / self.amplitude_rad if self.amplitude_rad > 0.0 else 1.0
         a, b = sub(self._start, eye), sub(self.end, eye)
         near_a, near_b = 1.0 / norm(a), 1.0 / norm(b)
-        # The great circle stays that of the onset and both ends' parallax is added: the
-        # plane through two nearly opposite directions would swing with the least of it.
+        # The great circle stays that of the onset and both ends' parallax is added: the plane
+        # through two nearly opposite directions would swing with the smallest parallax.
         way = along_great_circle(self._start_way, self._end_way, share)
         way = add(way, scale(sub(scale(a, near_a), self._start_way), 1.0 - share))
         way = add(way, scale(sub(scale(b, near_b), self._end_way), share))
@@ -65,7 +65,7 @@ class SaccadeTrajectory:
 
 
 class RedirectedTrajectory:
-    """A saccade whose target has jumped: a second one is added to what is left of the first.
+    """A saccade whose target has jumped: a second one is added to the remainder of the first.
 
     Args:
         before: the trajectory so far.
@@ -96,7 +96,7 @@ class RedirectedTrajectory:
     def _earliest(
         self, first: Vec3, then: Vec3, saccade: SaccadeModel, eye: Vec3, t_s: float, lasts_s: float
     ) -> float:
-        """Return when the second saccade may start: both together keep speed and acceleration.
+        """Return the earliest start of the second saccade with both within the limits.
 
         first, then: unit directions of the ends
         lasts_s: duration of the second one

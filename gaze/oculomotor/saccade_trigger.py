@@ -1,14 +1,13 @@
-"""Saccade trigger: when an error is closed by a saccade and when by smooth pursuit.
+"""Saccade trigger: choice between a saccade and smooth pursuit to close an error.
 
-A new object or part of it (the target's event flag) brings a saccade after the latency.
-Without that, an error beyond ``saccade_deg`` does, unless the eye is about to cross the
-target by itself: with the error PE and the retinal slip RV the crossing is T = -PE / RV
-away, and between 40 and 180 ms it is left to smooth following (de Brouwer et al. 2002).
-Where landings err, what one leaves beyond ``correct_deg`` is corrected by another saccade
-some 150 ms later; an exact landing errs only where the target was misjudged, and that is
-closed smoothly. No error brings a saccade sooner after the last than the refractory time,
-nothing at all sooner than ``min_interval_ms`` after its landing. A new target that comes
-early in a saccade redirects it; one that comes later waits for that interval.
+A new object or part of it (the target's event flag) triggers a saccade after the latency. Without
+that, an error beyond ``saccade_deg`` does, unless the eye is about to cross the target anyway: with
+the error PE and the retinal slip RV the crossing is T = -PE / RV away, and between 40 and 180 ms
+smooth pursuit closes it (de Brouwer et al. 2002). If landings scatter, another saccade some 150 ms
+later corrects an error beyond ``correct_deg``; an exact landing has an error only if the target was
+misjudged, and pursuit closes that. No error triggers a saccade within the refractory time after the
+last, and no event within ``min_interval_ms`` after its landing. A new target early in a saccade
+redirects it; a later one waits for that interval.
 """
 
 from math import inf, radians
@@ -19,10 +18,10 @@ from gazerig.gaze.oculomotor.pursuit import Slip
 
 
 class SaccadeTrigger:
-    """State of the events that call for a saccade, and the decision when one is due.
+    """State of the events that require a saccade, and the decision of its start.
 
     shift: the target's count of gaze shifts recorded last, None before the first
-    onset_s: when the last saccade started, or the next one is to
+    onset_s: start of the last saccade, or planned start of the next
     """
 
     def __init__(self, params: OculomotorParams, errs: bool) -> None:
@@ -32,7 +31,7 @@ class SaccadeTrigger:
     def retune(self, params: OculomotorParams, errs: bool) -> None:
         """Change thresholds and times; an event that waits for its saccade still does.
 
-        errs: whether saccades land elsewhere than on their targets
+        errs: whether saccades miss their targets
         """
         self._errs = errs
         self._smallest_rad = radians(params.smallest_shift_deg)
@@ -58,23 +57,23 @@ class SaccadeTrigger:
     def record_shift(self, shift: int, wait_s: float, lands_s: float | None, t_s: float) -> None:
         """Record the target's count of gaze shifts.
 
-        wait_s: what the eyes wait beyond the latency, because the head goes first
-        lands_s: when the saccade in flight lands, None where there is none
+        wait_s: wait of the eyes beyond the latency, because the head goes first
+        lands_s: landing time of the saccade in flight, None without one
         """
         if shift == self.shift:
             return
         self.shift = shift
         self._erred = False
         if self._due_s is None:
-            # The latency counts from the first event that is not answered yet; a later
-            # one changes where the saccade goes.
+            # The latency counts from the first pending event; a later one changes the saccade's
+            # goal.
             due_s, after_s = t_s + self._latency_s + wait_s, self._landed_s
             if lands_s is not None:
                 after_s = -inf if due_s <= lands_s - self._redirect_s else lands_s
             self._due_s = self.onset_s = max(due_s, after_s + self._interval_s)
 
     def postpone(self, wait_s: float) -> None:
-        """Let the saccade that is to come wait for longer."""
+        """Delay the next saccade."""
         if self._due_s is not None:
             self._due_s = self.onset_s = self._due_s + wait_s
 
@@ -91,16 +90,16 @@ class SaccadeTrigger:
             self._due_s = t_s
 
     def record_landing(self, t_s: float, correct_after_s: float = 0.0) -> None:
-        """Record the end of a saccade, and after how long its error would be corrected."""
+        """Record the end of a saccade, and the delay of a correction of its error."""
         self._landed_s, self._correct_s = t_s, max(correct_after_s, self._interval_s)
         self._erred = None if self._errs else False
 
     def rests(self, error_rad: float) -> bool:
-        """Return whether nothing waits and an error calls for nothing: ``due`` would be False."""
+        """Return whether no event is pending and an error requires none: ``due`` would be False."""
         return self._due_s is None and self._erred is False and error_rad <= self._saccade_rad
 
     def due(self, slip: Slip, t_s: float) -> bool:
-        """Return whether a saccade starts now; to be asked only between saccades."""
+        """Return whether a saccade starts now; called only between saccades."""
         error = norm(slip.error_rad)
         if self._erred is None:
             self._erred = error > self._correct_rad
@@ -122,12 +121,12 @@ class SaccadeTrigger:
 
     @property
     def waits(self) -> bool:
-        """Return whether a new target has come and its saccade is still to start."""
+        """Return whether the saccade to a new target has not started yet."""
         return self._due_s is not None
 
     @property
     def corrects(self) -> bool:
-        """Return whether what the last saccade left waits for a correction."""
+        """Return whether the error of the last saccade waits for a correction."""
         return bool(self._erred)
 
     def _go(self, t_s: float) -> bool:

@@ -1,12 +1,12 @@
-"""Where a target is now and will be: prediction over the age of its frame and beyond.
+"""Prediction of a target's motion over the age of its frame and beyond.
 
-A frame is some 75 ms old when it is acted on. Extrapolating its velocity over that time
-overshoots wherever the target turns back: by 10 % of a swing at 1 Hz, by 30 % at 1.5 Hz.
-So the velocity's own rate of change is extrapolated too, and motion that repeats is
-predicted from its period, as people do after one or two cycles (Barnes 2008): a sine is
-fitted to what was seen, and used as long as it agrees with what is seen.
+A frame is some 75 ms old when it is used. Extrapolation of its velocity over that time overshoots
+whenever the target reverses: by 10 % of a swing at 1 Hz, by 30 % at 1.5 Hz. So the velocity's own
+rate of change is extrapolated too, and motion that repeats is predicted from its period, as people
+do after one or two cycles (Barnes 2008): a sine is fitted to the past frames, and used while it
+agrees with new ones.
 
-World frame, metres, seconds; everything a function of the frames given and of the time.
+World frame, metres, seconds; everything is a function of the given frames and of the time.
 """
 
 from collections import deque
@@ -24,28 +24,28 @@ _STILL: Vec3 = (0.0, 0.0, 0.0)
 _SLOPE_FRAMES = 4
 """Frames over which a change of velocity is measured."""
 _BENDS_S = 0.12
-"""Longest time over which a change of velocity is believed to go on."""
+"""Longest time over which a change of velocity is extrapolated."""
 _WINDOWS_S = (0.7, 1.2, 2.2, 4.0)
-"""Stretches of the past in which a period is looked for, the shortest first."""
+"""Windows of the past in which a period is sought, the shortest first."""
 _IN_TURN_S = (0.7, 1.2, 0.7, 2.2, 0.7, 4.0)
 _CYCLES = (0.95, 2.3)
-"""So many cycles must a stretch contain for its period to count."""
+"""Number of cycles in a window for which its period counts."""
 _LEAST_M = 0.015
-"""A smaller swing is not worth a prediction."""
+"""Least amplitude of a predicted swing."""
 _FITS, _STILL_FITS = 0.2, 0.35
-"""Largest deviation from the sine, as a share of its effective value, to begin and to go on."""
+"""Largest deviation from the sine, as a share of its effective value, to begin and to continue."""
 _FITTED_FOR_S = 0.09
-"""A swing is fitted anew after so long, which is every third frame."""
+"""Interval of fits to a swing, which is every third frame."""
 _SPARSE = 4
-"""One frame in so many tells how far a target has been."""
+"""Every n-th frame is used for the extent of a target's motion."""
 _GAP_S = 0.2
-"""Frames farther apart are not one motion."""
+"""Frames farther apart than this do not belong to one motion."""
 _REMEMBERED_S = 2.0
-"""A swing is remembered so long while something else is looked at."""
+"""Time for which a swing is remembered while the gaze is on another target."""
 
 
 _Seen = tuple[float, float, float, float, float, float, float]
-"""Time of a frame, and the target's place and velocity in it."""
+"""Time of a frame, and the target's position and velocity in it."""
 
 
 class Sine(NamedTuple):
@@ -63,7 +63,7 @@ class Sine(NamedTuple):
         return sqrt(norm(self.c) ** 2 + norm(self.s) ** 2)
 
     def offset(self, t_s: float) -> Vec3:
-        """Return the place relative to the middle."""
+        """Return the position relative to the middle."""
         a = self.w_rad_s * (t_s - self.at_s)
         return add(scale(self.c, cos(a)), scale(self.s, sin(a)))
 
@@ -74,16 +74,16 @@ class Sine(NamedTuple):
 
 
 class TargetPrediction:
-    """Prediction of the target in force.
+    """Prediction of the present target.
 
     Args:
-        model: "none" takes the target as its frame showed it, "velocity" extrapolates its
-            velocity, "periodic" bends the path with the change of velocity and recognises swings.
+        model: "none" uses the target's state in its frame, "velocity" extrapolates its velocity,
+            "periodic" also extrapolates the change of velocity and recognises swings.
         horizon_s: longest time over which motion is extrapolated.
         fade_s: time constant with which the motion decays after that.
-        lag_s: delay of the eyes, by which a swing is led: its future is known.
+        lag_s: delay of the eyes, by which a swing is anticipated: its future is known.
 
-    sine: the swing that is recognised, None where there is none
+    sine: the recognised swing, None without one
     """
 
     def __init__(
@@ -95,12 +95,12 @@ class TargetPrediction:
     def retune(
         self, model: PredictionModel, horizon_s: float, fade_s: float, lag_s: float = 0.0
     ) -> None:
-        """Use other parameters; what was seen is kept."""
+        """Use other parameters; the past frames are kept."""
         self._model, self._horizon_s, self._fade_s = model, horizon_s, fade_s
         self._lag_s = lag_s
 
     def reset(self) -> None:
-        """Forget what was seen."""
+        """Forget the past frames."""
         self._id = ("", -1)
         self._at_s, self._p, self._v = 0.0, _STILL, _STILL
         self._past: deque[_Seen] = deque()
@@ -120,10 +120,10 @@ class TargetPrediction:
         self._bend = _STILL
 
     def see(self, target: Target, eye: Vec3, fastest_rad_s: float) -> None:
-        """Record the target; what its frame has already shown changes nothing.
+        """Record the target; a known frame changes nothing.
 
-        eye: from where it is looked at
-        fastest_rad_s: a swing that is faster there is followed with less than its amplitude, and
+        eye: position of the eye
+        fastest_rad_s: a swing that is faster from there is followed with a smaller amplitude, and
             no motion is extrapolated faster
         """
         at_s, centre = target.at_s, target.centre_world_m
@@ -167,7 +167,7 @@ class TargetPrediction:
 
     @property
     def to_middle(self) -> Vec3 | None:
-        """Return the way from where the frame showed the target to the middle of its swing."""
+        """Return the vector from the target's position in its frame to the middle of its swing."""
         return None if self.sine is None else scale(self.sine.offset(self._at_s), -1.0)
 
     def _moved(self, age_s: float) -> Vec3:
@@ -191,7 +191,7 @@ class TargetPrediction:
         bent = min(age_s, _BENDS_S)
         (x, y, z), (a, b, c) = self._v, self._bend
         speed = x + a * bent, y + b * bent, z + c * bent
-        # A change of speed makes nothing faster than it is, or than the eyes can be.
+        # An extrapolated change of speed does not exceed the present speed, or that of the eyes.
         return _no_longer(speed, self._most_m_s)
 
     def _slope(self) -> Vec3:
@@ -209,12 +209,12 @@ class TargetPrediction:
         return x / total, y / total, z / total
 
     def _recognised(self, p: Vec3, at_s: float) -> Sine | None:
-        """Return the swing of the recent past, None where there is none."""
+        """Return the swing of the recent past, None without one."""
         sine = self.sine
         if sine is None:
             if not self._has_moved(2.0 * _LEAST_M):
                 return None
-            # One stretch a frame, in turn.
+            # One window per frame, cyclically.
             self._turn = (self._turn + 1) % len(_IN_TURN_S)
             window_s = _IN_TURN_S[self._turn]
         else:
@@ -231,7 +231,7 @@ class TargetPrediction:
         return fitted(past, at_s, _FITS if sine is None else _STILL_FITS)
 
     def _has_moved(self, least_m: float) -> bool:
-        """Return whether the target's places have been so far apart along any axis."""
+        """Return whether the target's positions span this length along any axis."""
         past = [*islice(self._past, 0, None, _SPARSE)]
         for axis in (1, 2, 3):  # of _Seen
             places = [seen[axis] for seen in past]
@@ -241,21 +241,21 @@ class TargetPrediction:
 
 
 def _no_longer(v: Vec3, most: float) -> Vec3:
-    """Return a vector, shortened where it is longer than that."""
+    """Return a vector, shortened if it is longer than a limit."""
     x, y, z = v
     squares = x * x + y * y + z * z
     return v if squares <= most * most else scale(v, most / sqrt(squares))
 
 
 def fitted(past: Floats, at_s: float, limit: float) -> Sine | None:
-    """Return the sine that a stretch of the past follows, None where it does not.
+    """Return the sine of a window of the past, None if it does not fit.
 
-    The frequency comes from the velocity, which changes by -w^2 times the time integral of
-    the offset: one number for all axes, and no derivative of what is noisy.
+    The frequency comes from the velocity, which changes by -w^2 times the time integral of the
+    offset: one number for all axes, and no derivative of noisy data.
 
     Args:
-        past: (n, 7) time, place and velocity of each frame.
-        at_s: time of the newest.
+        past: (n, 7) time, position and velocity of each frame.
+        at_s: time of the newest frame.
         limit: largest deviation, as a share of the sine's effective value.
     """
     t, p, v = past[:, 0] - at_s, past[:, 1:4], past[:, 4:7]

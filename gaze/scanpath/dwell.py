@@ -1,14 +1,14 @@
-"""How long a look rests: four laws for a measured mean and standard deviation.
+"""Dwell times: four laws for a measured mean and standard deviation.
 
-Nakamoto & Tsuruno (3.2.3) take "mean +- SD" as the dwell time, but in their table 1 every
-SD is above its mean, so that the interval reaches negative times. What each law makes of it:
+Nakamoto & Tsuruno (3.2.3) take "mean +- SD" as the dwell time, but in their table 1 every SD is
+above its mean, so that the interval reaches negative times. Each law treats that differently:
 
 lognormal, gamma   positive, with exactly that mean and SD
-truncated_normal   a normal law cut off at 0. Its SD is always below its mean; where the
-                   measured one is not, the nearest such law is the exponential one, with
-                   the same mean and an SD equal to it
+truncated_normal   a normal law cut off at 0. Its SD is always below its mean; if the measured
+                   one is not, the nearest such law is the exponential one, with the same
+                   mean and an SD equal to it
 uniform            evenly between mean - SD and mean + SD, an interval that is cut off at 0:
-                   where SD > mean, the mean drawn is (mean + SD) / 2
+                   if SD > mean, the mean drawn is (mean + SD) / 2
 """
 
 from collections.abc import Callable
@@ -18,13 +18,13 @@ from statistics import NormalDist
 import numpy as np
 
 Draw = Callable[[np.random.Generator], float]
-"""Gives one dwell time in seconds, above 0."""
+"""Function that draws one dwell time in seconds, above 0."""
 
 LAWS = ("lognormal", "gamma", "truncated_normal", "uniform")
 
 _NORMAL = NormalDist()
 # Cuts between which a truncated normal law is searched, in its own SDs from its own mean:
-# coefficients of variation from 1/30, where nothing is cut off, to .998.
+# coefficients of variation from 1/30, with a negligible cut, to .998.
 _LEAST_CUT, _MOST_CUT = -30.0, 20.0
 
 
@@ -55,7 +55,7 @@ def _lognormal(mean_s: float, sd_s: float) -> Draw:
 
 def _gamma(mean_s: float, sd_s: float) -> Draw:
     shape, scale = (mean_s / sd_s) ** 2, sd_s**2 / mean_s
-    # A shape far below 1 can round to 0, which would be no time at all.
+    # A shape far below 1 can round to 0, which is no valid time.
     return lambda rng: max(rng.gamma(shape, scale), 1e-9)
 
 
@@ -80,13 +80,13 @@ def _truncated_normal(mean_s: float, sd_s: float) -> Draw:
 
 def _above(rng: np.random.Generator, tail: float) -> float:
     """Draw a standard normal number from its upper ``tail`` of more than a half."""
-    # From the other end, so that the probability keeps its digits where the tail is nearly 1.
+    # From the other end, so that the probability keeps its digits if the tail is nearly 1.
     p = (1.0 - tail) + tail * rng.random()
     return _NORMAL.inv_cdf(min(max(p, 1e-300), 1.0 - 1e-16))
 
 
 def _cut(variation: float) -> float | None:
-    """Return where a standard normal law must be cut to have this SD over mean; None: nowhere."""
+    """Return the cut of a standard normal law for this SD over mean; None: no cut."""
     low, high = _LEAST_CUT, _MOST_CUT
     if variation >= _tail(high)[2]:
         return None
@@ -99,7 +99,7 @@ def _cut(variation: float) -> float | None:
 
 
 def _tail(cut: float) -> tuple[float, float, float]:
-    """Return of a standard normal law above ``cut``: probability, mean excess, SD over that."""
+    """Return probability, mean excess and SD over that of a standard normal law above ``cut``."""
     tail = 0.5 * erfc(cut / sqrt(2.0))
     hazard = exp(-0.5 * cut * cut) / sqrt(2.0 * pi) / tail
     excess = hazard - cut

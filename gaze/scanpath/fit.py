@@ -1,9 +1,9 @@
-"""Fixations on a face -> the walk that would have made them: transitions and dwell times.
+"""Fit of a walk to fixations on a face: transitions and dwell times.
 
-Nakamoto & Tsuruno (3.2.2, 3.2.3) count how often a look at one part is followed by a look at
-another, and take mean and SD of the dwell times. So does this, with three choices for cells
-that a recording of finite length fills badly, and with a confidence interval for each number.
-Intervals are percentiles over resampled recordings (Efron's bootstrap).
+Nakamoto & Tsuruno (3.2.2, 3.2.3) count the transitions from one part to another, and take mean and
+SD of the dwell times. So does this fit, with three choices for sparse cells of a finite recording,
+and with a confidence interval for each number. Intervals are percentiles over resampled recordings
+(Efron's bootstrap).
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _OVERLAP_S = 0.005
 
 
 class PartFixation(NamedTuple):
-    """One look: its part, None where it lay outside all parts, its start and duration."""
+    """One look: its part, None if it was outside all parts, its start and duration."""
 
     part: str | None
     start_s: float
@@ -40,7 +40,7 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True)
 class FitParams:
-    """How a walk is fitted."""
+    """Parameters of the fit of a walk."""
 
     # fmt: off
     smoothing: Annotated[str, Choices(*SMOOTHINGS), "plain shares, shares after adding pseudo_count, or mean over resamples"] = "laplace"
@@ -60,7 +60,7 @@ class WalkFit:
     counts:  transitions seen; matrix: their probabilities with intervals
     visits:  fixations per part; outside: fixations on no part
     dwell_mean_s, dwell_sd_s: per part, with intervals
-    pooled:  parts too rarely looked at, whose dwell is that of all parts together
+    pooled:  parts with too few looks, whose dwell is that of all parts together
     start:   part of the first fixation on the face
     """
 
@@ -106,7 +106,7 @@ def fit_walk(
 
 
 def _refuse_untrustworthy(fixations: Sequence[PartFixation], params: FitParams) -> None:
-    """Raise ValueError for what cannot be a recording of looks at a face."""
+    """Raise ValueError for an implausible recording of looks at a face."""
     end_s, start_s = float("-inf"), float("-inf")
     for number, look in enumerate(fixations, 1):
         if look.part is not None and look.part not in PARTS:
@@ -131,7 +131,7 @@ def _refuse_untrustworthy(fixations: Sequence[PartFixation], params: FitParams) 
 
 
 def _transitions(fixations: Sequence[PartFixation], longest_gap_s: float) -> Floats:
-    """Count who follows whom, (8, 8), rows from; a look outside or a long gap breaks the chain."""
+    """Count the transitions, (8, 8), rows from; a look outside or a long gap breaks the chain."""
     counts = np.zeros((len(PARTS), len(PARTS)))
     for before, after in zip(fixations, fixations[1:], strict=False):
         gap_s = after.start_s - before.start_s - before.duration_s
@@ -172,7 +172,7 @@ def _shares(counts: Floats) -> Floats:
 
 
 def _refuse_dead_ends(counts: Floats) -> None:
-    """Refuse parts that the walk would never leave, or would not know how to."""
+    """Refuse parts that the walk would never leave, or that have no known transition."""
     away = counts.sum(axis=1) - np.diag(counts)
     stuck = [PART_NAMES[part] for part, n in zip(PARTS, away, strict=True) if n == 0.0]
     if stuck:
@@ -187,8 +187,8 @@ def _never_and_always(
 ) -> tuple[Floats, Floats]:
     """Widen intervals of cells that resampling cannot move: seen never, or every time.
 
-    Of something not seen in n trials, p <= 1 - (1 - confidence)^(1/n) is sure to that level
-    (the "rule of three" for 95 %).
+    For an event not seen in n trials, p <= 1 - (1 - confidence)^(1/n) is certain to that level (the
+    "rule of three" for 95 %).
     """
     n = counts.sum(axis=1, keepdims=True)
     surprise = np.where(n > 0.0, (1.0 - confidence) ** (1.0 / np.maximum(n, 1.0)), 0.0)

@@ -1,12 +1,12 @@
-"""Four ways to look at a face: the measured walk and the three it is compared with.
+"""Four models of looks at a face: the measured walk and the three it is compared with.
 
 MarkovWalk     the measured walk over eight parts (Nakamoto & Tsuruno 3.2)
 SimpleCycle    face centre, right eye, left eye, again (4.4.2)
 FaceTracking   the face centre, always (4.4.3)
 RandomAngles   eyes to random angles at random intervals (4.4.4)
 
-Time and random generator are arguments of all; ``enter`` is called when a face is looked at that
-was not before, then ``step`` every tick.
+Time and random generator are arguments of all; ``enter`` is called for a new face, then ``step``
+every tick.
 """
 
 from collections.abc import Sequence
@@ -32,12 +32,12 @@ class ScanpathModel(Protocol):
     """The interface of the scanpath models."""
 
     def enter(self, nearest: str | None = None) -> None:
-        """Start on a face; ``nearest``: its part nearest to the gaze, None where not known."""
+        """Start on a face; ``nearest``: its part nearest to the gaze, None if unknown."""
         ...
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Return the part looked at, None where it is none, and when that look ends, if known."""
+        """Return the present part, None without one, and the end of that look, if known."""
         ...
 
     def go_on(self, before: "ScanpathModel") -> bool:
@@ -45,7 +45,7 @@ class ScanpathModel(Protocol):
         ...
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
-        """Return what to look at; ``settled``: the gaze has arrived at the last look."""
+        """Return the next fixation; ``settled``: the gaze has arrived at the last one."""
         ...
 
 
@@ -74,7 +74,7 @@ class MarkovWalk:
         self.enter()
 
     def enter(self, nearest: str | None = None) -> None:
-        """Start at the start part, or at the nearest one where that is asked for and known."""
+        """Start at the start part, or at the nearest one if that is chosen and known."""
         known = nearest is not None and self._enters_nearest
         self._part = self._parts.index(str(nearest)) if known else self._start
         self._face: Face | None = None
@@ -82,7 +82,7 @@ class MarkovWalk:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Return the part looked at and when its dwell ends, None before the gaze is there."""
+        """Return the present part and the end of its dwell, None before the gaze is there."""
         return self._parts[self._part], self._until_s
 
     def go_on(self, before: ScanpathModel) -> bool:
@@ -148,7 +148,7 @@ class SimpleCycle:
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Return the part looked at and when its time is over, None before the gaze is there."""
+        """Return the present part and the end of its time, None before the gaze is there."""
         return self._parts[self._at], self._until_s
 
     def go_on(self, before: ScanpathModel) -> bool:
@@ -186,7 +186,7 @@ class FaceTracking:
         return "N", None
 
     def go_on(self, before: ScanpathModel) -> bool:
-        """Return whether the nose was looked at before."""
+        """Return whether the nose was the last part."""
         return before.dwell[0] == "N"
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
@@ -195,11 +195,11 @@ class FaceTracking:
 
 
 class RandomAngles:
-    """Eyes to random angles at random intervals, whatever the face shows.
+    """Eyes to random angles at random intervals, independent of the face.
 
-    Angles are even within +-angle_deg in yaw and in pitch, and turn about the direction
-    from the head to the face, which is where the head turns to. Intervals run from jump to
-    jump; the paper prints them as 0-3.0 ms, shorter than one of its frames: seconds are meant.
+    Angles are uniform within +-angle_deg in yaw and in pitch about the direction from the head to
+    the face, which is the head's goal. Intervals run from jump to jump; the paper prints them as
+    0-3.0 ms, shorter than one of its frames: seconds are meant.
     """
 
     def __init__(self, angle_deg: float, longest_s: float, rng: np.random.Generator) -> None:
@@ -209,13 +209,13 @@ class RandomAngles:
         self.enter()
 
     def enter(self, nearest: str | None = None) -> None:
-        """Start with angles drawn at once."""
+        """Start with angles drawn immediately."""
         self._offset_rad: Angles2 = self._angles()
         self._until_s: float | None = None
 
     @property
     def dwell(self) -> tuple[str | None, float | None]:
-        """Return no part, and when the interval is over."""
+        """Return no part, and the end of the interval."""
         return None, self._until_s
 
     def go_on(self, before: ScanpathModel) -> bool:

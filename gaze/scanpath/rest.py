@@ -3,8 +3,8 @@
 Table 1 of Nakamoto & Tsuruno times the gaze within the rectangle of a part, so that a visit, with
 its refixations, includes about one shift between parts. Two of the eight parts are visited for no
 longer than a shift and the shortest rest of people together (0.165 and 0.173 s). They get that and
-a little; the other parts give up as much in proportion to what they have above it. So the rate of
-shifts and the mean visit stay those of the table, and no rest is cut off at a shortest one.
+a little; the other parts give up the same total in proportion to their excess over it. So the rate
+of shifts and the mean visit stay those of the table, and no rest is cut off at a shortest one.
 """
 
 import numpy as np
@@ -13,12 +13,12 @@ from gazerig.gaze.scanpath.dwell import Draw, dwell_distribution
 from gazerig.gaze.types import Floats
 
 _LEAST_ABOVE = 0.15
-"""What any rest has above the shortest one on average, as a share of it."""
+"""Least mean excess of a rest over the shortest one, as a share of it."""
 
 
 def stationary(matrix: Floats) -> Floats:
     """Return the share of steps that a chain spends in each of its states, (n,)."""
-    # Staying put every other step changes no share, and lets every chain settle.
+    # A stay at every other step changes no share, and makes every chain converge.
     lazy = 0.5 * (matrix + np.eye(len(matrix)))
     share = np.linalg.matrix_power(lazy, 1 << 20)[0]
     out: Floats = share / share.sum()
@@ -29,7 +29,7 @@ def visits_s(steps: Floats, dwell_s: Floats) -> Floats:
     """Return the mean visit of each part, its refixations included, (n,).
 
     steps: (n, n) transition probabilities of single dwells; a part that is never left for another
-        is visited for one dwell
+        has visits of one dwell
     """
     stays = np.diag(steps)
     visits: Floats = dwell_s / np.where(stays < 1.0, 1.0 - stays, 1.0)
@@ -40,8 +40,8 @@ def rests_s(share: Floats, visit_s: Floats, shift_s: float, shortest_s: float) -
     """Return the mean rest on each part, (n,).
 
     share: (n,) of the visits that go to each part
-    visit_s: (n,) mean visits, shifts included; of all together the mean is kept, unless no rest
-        above the shortest one is left
+    visit_s: (n,) mean visits, shifts included; their overall mean is kept, unless no rest above the
+        shortest one remains
     """
     above, least = visit_s - shift_s - shortest_s, _LEAST_ABOVE * shortest_s
     wanted, low, high = float(share @ above), 0.0, 1.0

@@ -1,9 +1,8 @@
 """Scanpath on a face: a Markov walk over eight parts, or one of three simpler models.
 
-The measured walk is that of Nakamoto & Tsuruno 3.2. Its printed matrix has one decimal, so
-the rows sum to 0.8-1.1 and are normalised; rows are "from", columns "to". Only the point of
-a face target is replaced here; the head is told to turn to the face's centre and not to each
-part (3.5).
+The measured walk is that of Nakamoto & Tsuruno 3.2. Its printed matrix has one decimal, so the rows
+sum to 0.8-1.1 and are normalised; rows are "from", columns "to". Only the point of a face target is
+replaced here; the head turns to the face's centre and not to each part (3.5).
 """
 
 from dataclasses import dataclass
@@ -62,12 +61,12 @@ class Walk:
 
     @property
     def row_sums(self) -> tuple[float, ...]:
-        """Return the sum of every row as it stands, before it is normalised."""
+        """Return the sum of every row before normalisation."""
         return tuple(sum(row) for row in self.matrix)
 
 
 def row_sums_note(walk: Walk) -> str | None:
-    """Return one line on the rows that do not sum to 1 and are normalised; None where all do."""
+    """Return one line on the rows that do not sum to 1 and are normalised; None if all do."""
     sums = zip(walk.order, walk.row_sums, strict=True)
     off = [f"{part} {total:.3g}" for part, total in sums if abs(total - 1.0) > _ROUNDING]
     if not off:
@@ -106,7 +105,7 @@ class ScanpathParams:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check the simple model's round.
+        """Check the simple model's cycle.
 
         Raises:
             ValueError: it is empty, or its parts and times differ in number.
@@ -135,7 +134,7 @@ def without_refixations(matrix: ArrayLike) -> Floats:
 
 
 class _Replaced(NamedTuple):
-    """A target as it was passed on, and what it was made of."""
+    """A replaced target, and the values that it was made of."""
 
     target: Target
     face: Face | None
@@ -144,7 +143,7 @@ class _Replaced(NamedTuple):
     result: Target
 
     def of(self, target: Target, face: Face | None, point: Vec3 | None, shift: int) -> bool:
-        """Return whether the same would be made of these."""
+        """Return whether these values would give the same target."""
         return (
             point is self.point
             and face is self.face
@@ -158,7 +157,7 @@ def _replaced(target: Target, face: Face | None, look: ScanpathStep | None, shif
     if face is None or look is None:
         return target._replace(shift=target.shift + shift) if shift else target
     what = PART_NAMES[look.part] if look.part is not None else "random angles about"
-    # A lost face is waited for where it was heading, its parts with it.
+    # The gaze waits for a lost face at its extrapolated position, with its parts.
     moved = sub(target.p_world_m, face.p_world_m)
     return target._replace(
         p_world_m=add(look.p_world_m, moved),
@@ -170,7 +169,7 @@ def _replaced(target: Target, face: Face | None, look: ScanpathStep | None, shif
 
 
 class Scanpath:
-    """Replaces a face as target by the point of the face that is to be fixated."""
+    """Scanpath: replaces a face as target by the point of the face to fixate."""
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -179,7 +178,7 @@ class Scanpath:
         self.reset(0.0)
 
     def retune(self, params: ScanpathParams, walk: Walk) -> None:
-        """Change the model, walk or rate; the part looked at and its dwell go on.
+        """Change the model, walk or rate; the present part and its dwell continue.
 
         A model that does not know that part begins with its own first look.
         """
@@ -206,10 +205,10 @@ class Scanpath:
         p_world_head_m: Vec3 = (0.0, 0.0, 0.2),
         gaze_world_m: Vec3 | None = None,
     ) -> Target:
-        """Replace a face target by the point of it that is due; pass anything else on.
+        """Replace a face target by its point that is due; return other targets unchanged.
 
-        settled: whether the gaze has arrived at the last target given
-        gaze_world_m: where both eyes point now; None where that is unknown
+        settled: whether the gaze has arrived at the last target
+        gaze_world_m: the present gaze point; None if unknown
         """
         if target.kind != "face":
             self._face = face = None
@@ -217,7 +216,7 @@ class Scanpath:
             face, entered = self._find(target.id, percept)
             if face is not None and entered:
                 self.looks.enter(_nearest(face, p_world_head_m, gaze_world_m))
-                settled = False  # at what was looked at before
+                settled = False  # at the former target
         look = None
         if face is not None:
             look = self.looks.step(face, p_world_head_m, t_s, settled)
@@ -233,9 +232,9 @@ class Scanpath:
 
     @property
     def rests_until_s(self) -> float:
-        """Return until when the gaze rests on a part of a face.
+        """Return the end of the gaze's rest on a part of a face.
 
-        inf while it is on its way there, -inf where no end is drawn or no face looked at.
+        inf while it is moving there, -inf if no end is drawn or the target is no face.
         """
         return self._rests_until_s
 
@@ -266,7 +265,7 @@ class Scanpath:
 
 
 def _nearest(face: Face, p_world_head_m: Vec3, gaze_world_m: Vec3 | None) -> str | None:
-    """Return the part of a face nearest to where the eyes point, None where that is unknown."""
+    """Return the part of a face nearest to the gaze point, None if that is unknown."""
     if gaze_world_m is None:
         return None
     gaze = sub(gaze_world_m, p_world_head_m)
