@@ -1,4 +1,4 @@
-"""The page's own process: take the newest snapshot off the socket and draw it.
+"""Process of the page: receives the newest snapshot from the socket and draws it.
 
 Started by ``gazerig.robot.dashboard.feed.page_process.PageProcess`` as ``python -m
 gazerig.robot.dashboard.page_main FD STOP_FD PARENT HOST PORT``, with the token and a folder of its
@@ -55,8 +55,8 @@ _SILENT_AFTER_S = 1.0
 _BEAT_S = 0.5
 _PORTS_TRIED = 100
 _PORTS = 65536
-_NICENESS = 5  # the control loop comes first where both want the same core
-_MOST_FILES = 8192  # a burst of connections must leave some
+_NICENESS = 5  # the control loop has priority on a shared core
+_MOST_FILES = 8192  # a burst of connections must not use all
 
 
 def free_port(host: str, port: int) -> int:
@@ -81,10 +81,10 @@ def free_port(host: str, port: int) -> int:
 
 
 class Served(NamedTuple):
-    """A page that can be reached: the server behind the door, the door, and where it is.
+    """Open page: the server behind the door, the door and the address.
 
-    outbox: of requests to the rig; pointer: takes where browsers point
-    words: what there is to say to the person in front of the rig, None for nothing
+    outbox: of requests to the rig; pointer: receives pointers of browsers
+    words: message for the terminal, None for none
     """
 
     server: viser.ViserServer
@@ -104,9 +104,9 @@ def serve(
         host: the address
         port: the first to try; a busy one moves on to the next
         token: what browsers must show
-        folder: that only this user can enter, for the server's socket
+        folder: folder that only this user can enter, for the server's socket
         feed: to the rig
-        stop: hands on stops
+        stop: sends stops to the rig
 
     Raises:
         OSError: see ``free_port``.
@@ -121,7 +121,7 @@ def serve(
     )
     pointer = PointerToLook(
         lambda browser: camera_of(server, browser),
-        # Not as the one who leads: that the pointer is there is said by its points alone.
+        # Not as a browser in control: only its points show that a pointer is present.
         lambda point, who: outbox.ask(as_json(LookAt(point, who, pointer=True)), DOOR),
     )
     door = AuthProxy(
@@ -137,16 +137,16 @@ def serve(
 
 
 def _browser(server: viser.ViserServer, client: str) -> str:
-    """Return what the browser of a client is called; client: its number, and maybe more."""
+    """Return the name of a client's browser; client: its number, maybe with a suffix."""
     number = client.partition(":")[0]
     return browser_of(server, int(number)) if number.isdecimal() else ""
 
 
 def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> None:
-    """Draw what comes until the other side is gone.
+    """Draw incoming snapshots until the other side has closed.
 
     Raises:
-        RuntimeError: no browser can connect any more; a page that is started again may help.
+        RuntimeError: no browser can connect any more; a restart of the page may help.
     """
     door, pointer = served.door, served.pointer
     pause, live = threading.Event(), LiveFeed()
@@ -156,7 +156,7 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
         if not door.is_open():
             raise RuntimeError("the page's door has closed by itself")
         if clock.now_s() >= beat_s:
-            # Begun here and sent by the door's thread: both are alive.
+            # Started here and sent by the door's thread, so both are alive.
             beat_s = clock.now_s() + _BEAT_S
             door.soon(served.outbox.beat)
         readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
@@ -179,25 +179,25 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
 
 def _limit_process() -> None:
     """Lower the priority of this process below the loop, and limit the cost of bad input."""
-    if hasattr(os, "nice"):  # Windows has priorities of another kind
+    if hasattr(os, "nice"):  # Windows has other priorities
         os.nice(_NICENESS)
-    with contextlib.suppress(ImportError):  # nor does it bound the files of a process
+    with contextlib.suppress(ImportError):  # nor a limit on open files
         import resource
 
         least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
-    # Standard error is kept in memory, and a client that sends rubbish fills it with complaints.
+    # Standard error is in memory, and a client that sends malformed data fills it with errors.
     logging.disable(logging.CRITICAL)
 
 
 def main(arguments: list[str]) -> int:
-    """Run the page; give the process's exit code."""
+    """Run the page; return the exit code of the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _limit_process()
     fd, stop_fd, parent, host, port = arguments
     token = os.environ.pop(TOKEN_VARIABLE)
-    # Not closed by hand: its end tells the other side to read this process's last words,
-    # and those of an exception are written only after a ``with`` has been left.
+    # Not closed explicitly: its end makes the other side read this process's last messages,
+    # and those of an exception are written only after the end of a ``with`` block.
     shown = os.environ.pop(message_link.TOKEN_VARIABLE, "")
     feed = message_link.open_link(fd, shown)
     stop = StopSender(message_link.open_link(stop_fd, shown))
@@ -216,7 +216,7 @@ def _show(
     folder: Path,
     parent: int,
 ) -> int:
-    """Serve the page until the rig is gone; give the process's exit code."""
+    """Serve the page until the rig ends; return the exit code of the process."""
     try:
         served = serve(*address, token, folder, feed, stop)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The scene and the panels that browsers see, drawn from what the rig sends."""
+"""Scene and panels of the browsers, drawn from the rig's snapshots."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -40,7 +40,7 @@ _REFUSED = "refused: "
 class PageView:
     """Scene and panels of one server.
 
-    emulated: the rig's servos are, so that no harm is done by a pointer that leads unasked
+    emulated: whether the rig's servos are emulated, so that pointer control is on from the start
     """
 
     def __init__(
@@ -50,9 +50,9 @@ class PageView:
         outbox: Outbox,
         tell: Callable[[Mapping[str, object]], None],
     ) -> None:
-        """Build the empty room.
+        """Create the empty scene.
 
-        outbox: takes what people do to the rig; tell: shows what the stop button must know
+        outbox: sends requests of users to the rig; tell: sends state to the stop buttons
         """
         self._server, self._widgets = server, widgets
         self._outbox = outbox
@@ -79,7 +79,7 @@ class PageView:
 
     @property
     def choices(self) -> OverlayChoices:
-        """Return what the users want to see drawn; it changes as they choose."""
+        """Return the selected layers; users change them."""
         return self._panel.layers
 
     def watched(self) -> bool:
@@ -98,7 +98,7 @@ class PageView:
         self._viewpoints.choose(self._widgets.browser(client), name)
 
     def show(self, news: News) -> None:
-        """Draw the newest of what came; without a spectator it is kept until one comes."""
+        """Draw the newest data; without a browser it is kept until one connects."""
         for kind, data in news.others:
             self._take(kind, data)
         self._panel.update(news.snapshots)
@@ -110,18 +110,18 @@ class PageView:
         self._world_now = news.world
         self._head.shape = news.shape or self._head.shape
         watched = self.watched()
-        if watched and not self._watched:  # who comes late may find a rig that stands still
+        if watched and not self._watched:  # a new browser may find a rig that sends nothing
             self._panel.draw_all()
         self._watched = watched
         if watched or not self._drawn:
-            # A browser never sees half of a snapshot.
+            # Browsers receive a snapshot as a whole.
             with self._server.atomic(), self._widgets.hold():
                 self._draw()
 
     def _stop_state(self) -> dict[str, object]:
-        """Return what the stop button must know: a recording can neither be stopped nor resumed.
+        """Return the state for the stop button; a recording can neither be stopped nor resumed.
 
-        without_feedback: joints without feedback, which do not take hold where they are but jump
+        without_feedback: number of joints without feedback, which jump when torque is switched on
         """
         shot = self._newest
         if self._replay is not None:
@@ -153,7 +153,7 @@ class PageView:
                 self._show_replay(data)
 
     def _answered(self, who: str, text: str | None) -> None:
-        """Show the rig's reply to who asked; other messages go to all users."""
+        """Show the rig's reply to its client; other messages go to all users."""
         self._controls.answered(who)
         if text:
             client = who.partition(":")[0]
@@ -199,7 +199,7 @@ class PageView:
         self._newest = self._jpeg = self._image = None
 
     def _show_world(self) -> None:
-        """Draw the room and the people that there are; what the rig believes is only marked."""
+        """Draw the simulated room and people; detections of the rig are only marked."""
         there = self._world_now is not None
         if self._world_now is not None:
             self._world.show(*self._world_now)
@@ -207,19 +207,19 @@ class PageView:
         self._people.mark_only(there)
 
     def silent(self) -> None:
-        """Show that no data arrives any more, with the last that arrived."""
+        """Show that no data arrives any more, with the last data."""
         self.show(News((), None, ended=False))
-        if self._drawn and self._replay is None:  # a recording may stand still
+        if self._drawn and self._replay is None:  # a recording may be paused
             self._panel.silent()
             self._tell({"stopped": "", "silent": True})
 
 
 def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
-    """Return who leads and what the head does, as the page's frame shows it.
+    """Return the source of control and the activity of the head, for the page's headline.
 
     Args:
-        leader: who leads.
-        shot: the newest look at the rig; None before the first.
+        leader: Source of control.
+        shot: Newest snapshot; None before the first.
     """
     t_s = shot.t_s if shot is not None else 0.0
     return {

@@ -1,1 +1,1 @@
-"""The way browsers come in: who may, how often, and where their connections lead."""
+"""Access of browsers to the page: admission, limits, and proxies of their connections."""

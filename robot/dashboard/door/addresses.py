@@ -1,4 +1,4 @@
-"""Names in the addresses that browsers give and are given."""
+"""Host names and origins in the addresses of browsers."""
 
 import socket
 from urllib.parse import urlsplit
@@ -7,13 +7,13 @@ _EVERYWHERE = ("0.0.0.0", "::")
 
 
 def page_url(host: str, port: int) -> str:
-    """Return where browsers find what is served, by this machine's name if it is everywhere."""
+    """Return the URL for browsers, with this machine's name if all addresses are served."""
     name = socket.gethostname() if host in _EVERYWHERE else host
     return f"http://[{name}]:{port}" if ":" in name else f"http://{name}:{port}"
 
 
 def netloc(origin: str) -> str | None:
-    """Return host and port of an origin, None where it is none."""
+    """Return host and port of an origin, None if it is not an origin."""
     try:
         return urlsplit(origin).netloc
     except ValueError:
@@ -21,7 +21,7 @@ def netloc(origin: str) -> str | None:
 
 
 def hostname(host: str) -> str | None:
-    """Return the name alone of what a browser calls a host, None where it is none."""
+    """Return the name in a Host header, None if it has none."""
     try:
         return urlsplit(f"//{host}").hostname
     except ValueError:

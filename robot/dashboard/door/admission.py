@@ -1,4 +1,4 @@
-"""Who may come in to a page, and ask something of it.
+"""Admission of requests to a page.
 
 A client shows a token, once, in the query of the first address; a cookie takes its place. That
 holds on this machine as well, which may have other users. The Origin of every websocket and of
@@ -56,7 +56,7 @@ class Admission:
         return f"refused: {self._otherwise}"
 
     def with_cookie(self, request: web.Request, headers: Mapping[str, str]) -> web.Response:
-        """Move the token from the address into a cookie, where it is not seen, kept or sent on."""
+        """Move the token from the address to a cookie, which is not shown, stored or forwarded."""
         clean = request.rel_url.without_query_params("token").raw_path_qs
         # "//elsewhere" is the address of another machine, and so is "/\elsewhere".
         there = "/" + clean.lstrip("/\\")

@@ -1,4 +1,4 @@
-"""The page's door: the only way in, at the asked address, for those who may come in.
+"""Door of the page: its only entrance, for admitted browsers, at the configured address.
 
 Viser itself listens where no other program can reach it
 (``gazerig.robot.dashboard.door.viser_server``). Who is let in:
@@ -40,7 +40,7 @@ from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES, Widgets
 
 MOST_LINES = 32
-"""Tabs whose stop button receives the state of the rig."""
+"""Largest number of tabs whose stop button receives the state of the rig."""
 
 _ASKED_PER_S, _ASKED_BURST = 20.0, 40.0  # clicks of all people together
 _READ_S = 5.0
@@ -50,7 +50,7 @@ _OPEN_TIMEOUT_S = 20.0
 _CLOSE_TIMEOUT_S = 3.0
 _DAY_S = 86400
 _HEADERS = {
-    "X-Frame-Options": "DENY",  # no other page may lie over the buttons
+    "X-Frame-Options": "DENY",  # no other page may cover the buttons
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -62,13 +62,13 @@ _WHERE = (
 )
 
 Ask = Callable[[bytes], bool]
-"""Hands a JSON object to the rig; False where the rig does not take it."""
+"""Sends a JSON object to the rig; returns False if the rig does not accept it."""
 Point = Callable[[object, str], bool]
-"""Takes where a pointer is, as a browser sent it, and the name of the browser."""
+"""Receives a pointer's position as a browser sent it, and the name of the browser."""
 
 
 class AuthProxy:
-    """Lets people in to the server behind it, from a thread of its own.
+    """Proxy that admits browsers to the server behind it, in its own thread.
 
     webcam: receives pictures of browsers' own cameras
     """
@@ -91,13 +91,13 @@ class AuthProxy:
         Args:
             host: the address
             port: a free port of it
-            inside: where the server is
+            inside: address of the server
             ask: called in the door's thread with what is sent to the rig
-            stop: takes stops, beside and before all else
+            stop: receives stops, before all other requests
             token: what a client must show
             browsers: names them by that token
             widgets: of the panels
-            point: receives where a browser's pointer is, which is not answered
+            point: receives positions of a browser's pointer, without an answer
             picture: receives pictures of browsers' own cameras; False: it does not take them
         """
         self._host = host
@@ -111,13 +111,13 @@ class AuthProxy:
         self.widgets = widgets
         self._panel_socket = WidgetSocket(self.widgets)
         self._panel_tabs = TabLimits(MOST_LINES)
-        self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
+        self._cookie = f"gazerig_{port}"  # cookies are shared by all ports
         self._admission = Admission(host, port, token, self._cookie, _WHERE)
         self._state: Mapping[str, object] = {}
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
         self._lines = TabLimits(MOST_LINES)
-        self._loop = asyncio.SelectorEventLoop()  # Windows' usual one waits for no socket
+        self._loop = asyncio.SelectorEventLoop()  # that of Windows cannot wait for sockets
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
         self._opened = threading.Event()
@@ -126,7 +126,7 @@ class AuthProxy:
 
     @property
     def once(self) -> str:
-        """Return another token, which opens the page one time; "" for none."""
+        """Return another token that opens the page once, "" if there is none."""
         return self._admission.once
 
     @once.setter
@@ -146,7 +146,7 @@ class AuthProxy:
             raise self._failed
 
     def soon(self, do: Callable[[], None]) -> None:
-        """Let the thread that serves browsers do something in its turn.
+        """Let the thread that serves browsers call a function.
 
         Raises:
             RuntimeError: it has ended.
@@ -154,11 +154,11 @@ class AuthProxy:
         self._loop.call_soon_threadsafe(do)
 
     def is_open(self) -> bool:
-        """Return whether people can come in."""
+        """Return whether browsers can connect."""
         return self._thread.is_alive()
 
     def tell(self, state: Mapping[str, object]) -> None:
-        """Show this to all users of the stop button; from any thread."""
+        """Send the state to all stop buttons; may be called from any thread."""
         if state != self._state:
             self._state = dict(state)
             self._loop.call_soon_threadsafe(self._wake)
@@ -212,7 +212,7 @@ class AuthProxy:
             listener.close()
             await runner.cleanup()
 
-    # --- who may come in ----------------------------------------------------------------
+    # --- admission ---------------------------------------------------------------------
 
     def _doorkeeper(self) -> Middleware:
         """Accept a request, redirect it to an address without token, or refuse it in one line."""
@@ -230,7 +230,7 @@ class AuthProxy:
         return admit
 
     def _with_cookie(self, request: web.Request) -> web.Response:
-        """Move the token into a cookie, and give the browser another one, which names it."""
+        """Move the token to a cookie, and set another cookie with the browser's name."""
         answer = self._admission.with_cookie(request, _HEADERS)
         if self._name_cookie not in request.cookies:
             answer.set_cookie(
@@ -253,7 +253,7 @@ class AuthProxy:
     # --- the stop button ------------------------------------------------------------------
 
     async def _asked(self, request: web.Request) -> web.Response:
-        """Hand what is asked for to the rig, and say whether it was taken."""
+        """Send a request to the rig; answer whether it was accepted."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
         who = self._who(request)
@@ -261,7 +261,7 @@ class AuthProxy:
         return web.Response(status=status, text=f"{text}\n" if text else None, headers=_HEADERS)
 
     async def _handle(self, asked: dict[str, object] | None, who: str) -> tuple[int, str]:
-        """Hand on what a browser asks; return an HTTP status, and words of a refusal."""
+        """Send a browser's request to the rig; return an HTTP status and the refusal."""
         if asked is None:
             return 400, "not a JSON object that can be asked for"
         if asked.get("do") == "stop":
@@ -279,7 +279,7 @@ class AuthProxy:
     async def _line(self, request: web.Request) -> web.StreamResponse:
         """Send the state whenever it changes, with heartbeats in between; receive stops.
 
-        A connection that stands already when STOP is pressed: a browser opens only six others.
+        It is already open when STOP is pressed; a browser opens only six others.
         """
         line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False, autoping=False)
         await line.prepare(request)
@@ -320,7 +320,7 @@ class AuthProxy:
                 continue
             asked = from_browser(message.data, who)
             if asked is not None and "point" in asked:
-                self.browsers.led_by("")  # nobody's lead is renewed while a pointer leads
+                self.browsers.led_by("")  # no control is renewed during pointer control
                 self._point(asked["point"], who)
                 continue
             status, text = await self._handle(asked, who)
@@ -330,7 +330,7 @@ class AuthProxy:
     # --- the panels -----------------------------------------------------------------------
 
     async def _panels(self, request: web.Request) -> web.StreamResponse:
-        """Show the panels in a browser, as fast as it takes them."""
+        """Send the panels to a browser, as fast as it reads them."""
         socket = web.WebSocketResponse(max_msg_size=RECEIVED_BYTES, compress=False)
         who = self._who(request)
         return await self._last(
@@ -338,7 +338,7 @@ class AuthProxy:
         )
 
     async def _webcam(self, request: web.Request) -> web.StreamResponse:
-        """Receive the pictures of a browser's own camera."""
+        """Receive the images of a browser's webcam."""
         socket = self.webcam.prepared()
         return await self._last(request, socket, self._webcams, lambda: self.webcam.serve(socket))
 
@@ -349,7 +349,7 @@ class AuthProxy:
         tabs: TabLimits,
         serve: Callable[[], Awaitable[object]],
     ) -> web.StreamResponse:
-        """Keep a websocket until it, the page or its place is over."""
+        """Keep a websocket until it ends, the page closes or its slot is freed."""
         await socket.prepare(request)
         self._connections.lasting(request)
         with tabs.take(self._who(request)) as leave:
@@ -357,17 +357,17 @@ class AuthProxy:
         await close_socket(socket, request)
         return socket
 
-    # --- what is said to all --------------------------------------------------------------
+    # --- heartbeats ---------------------------------------------------------------------
 
     def _wake(self) -> None:
         for news in self._news:
             news.set()
 
     async def _ping(self, line: web.WebSocketResponse, who: str) -> None:
-        """Ask a browser that leads for signs of life; each of them renews its lead.
+        """Ping the browser in control; each answer renews its control.
 
-        A connection that stands proves nothing: that of a computer that was shut or has lost its
-        network stands for minutes. Browsers answer also for pages in the background.
+        An open connection proves nothing: if a computer is suspended or loses its network, it stays
+        open for minutes. Browsers also answer for pages in the background.
         """
         while True:
             await asyncio.sleep(_RENEWED_EVERY_S)
@@ -380,7 +380,7 @@ class AuthProxy:
     async def _pass_on(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" in request.headers:
             return await self._view.relay(request, self._who(request), self._over.wait())
-        if request.path == VIEW:  # what the document names is beside it
+        if request.path == VIEW:  # paths in the document are relative to it
             return web.Response(status=302, headers={**_HEADERS, "Location": f"{VIEW}/"})
         return await self._view.get(request)
 

@@ -1,4 +1,4 @@
-"""Who is at the page: a name for each browser, and whether the one that leads is still there."""
+"""Browsers of the page: their names, and whether the one in control is still connected."""
 
 import asyncio
 import hashlib
@@ -12,7 +12,7 @@ _DIGITS = 4
 
 
 class Browsers:
-    """Names browsers by the cookie that each was given; from any thread."""
+    """Names of browsers by their cookies; safe to call from any thread."""
 
     def __init__(self, token: str) -> None:
         self._key = token.encode()
@@ -21,7 +21,7 @@ class Browsers:
         self._leads = ""
 
     def name(self, cookie: str | None) -> str:
-        """Return what a browser is called, the same as long as it keeps its cookie."""
+        """Return a browser's name; it is constant while the browser keeps its cookie."""
         if not cookie:
             return "the page"
         digest = hmac.new(self._key, cookie.encode(errors="replace"), hashlib.sha256)
@@ -29,7 +29,7 @@ class Browsers:
 
     @contextmanager
     def connected(self, name: str) -> Iterator[None]:
-        """Count a browser as there."""
+        """Count a browser as connected within the block."""
         with self._lock:
             self._open[name] += 1
         try:
@@ -39,28 +39,28 @@ class Browsers:
                 self._open[name] -= 1
 
     def led_by(self, name: str) -> None:
-        """Record who led the head last."""
+        """Record the browser that controlled the head last."""
         self._leads = name
 
     def leading(self) -> str:
-        """Return who led last if that browser is still there, else ""."""
+        """Return the browser that controlled the head last, "" if it has disconnected."""
         with self._lock:
             return self._leads if self._leads and self._open[self._leads] > 0 else ""
 
 
 class TabLimits:
-    """So many open tabs; of one more, the browser with the most tabs loses its oldest.
+    """Limited number of open tabs; for one more, the browser with most tabs loses its oldest.
 
     Belongs to one event loop.
     """
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._taken: dict[asyncio.Event, str] = {}  # the oldest first
+        self._taken: dict[asyncio.Event, str] = {}  # oldest first
 
     @contextmanager
     def take(self, name: str) -> Iterator[asyncio.Event]:
-        """Occupy a slot; the event is set when it has to be freed."""
+        """Occupy a slot; the event is set when the slot must be freed."""
         leave = asyncio.Event()
         self._taken[leave] = name
         if len(self._taken) > self._most:

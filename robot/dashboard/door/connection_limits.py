@@ -1,4 +1,4 @@
-"""Connections to the page: how many there may be, and how long one may be silent.
+"""Limits on the number of connections to the page and on their idle time.
 
 A browser needs a handful. A client that opens hundreds and sends nothing, or sends a byte a second,
 must not keep others from pressing STOP, so that the one who has been idle longest goes when
@@ -13,18 +13,18 @@ from aiohttp import web
 from aiohttp.web_protocol import RequestHandler
 
 MOST = 96
-"""Connections at a time, of all browsers together."""
+"""Largest number of connections of all browsers together."""
 IDLE_S = 15.0
-"""For so long a connection may be open without asking for anything."""
+"""Longest time of a connection without a request, s."""
 BUSY_S = 20.0
-"""For so long one request may take, unless it is a websocket."""
+"""Longest time of one request, except websockets, s."""
 _LOOK_EVERY_S = 1.0
 _TRIM_AFTER_S = 0.02
 _BEGINS_WITHIN_S = 5.0
 
 
 class _ConnectionState:
-    """Since when a connection is as it is."""
+    """State of a connection and the time since it has it."""
 
     def __init__(self, since_s: float) -> None:
         self.since_s = since_s
@@ -32,7 +32,7 @@ class _ConnectionState:
 
 
 class Connections:
-    """Makes the handlers of connections and ends those that should not go on."""
+    """Creates the handlers of connections and closes those over a limit."""
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
@@ -40,21 +40,21 @@ class Connections:
         self._trimming = False
 
     def accept(self) -> RequestHandler:
-        """Return the handler of a new connection; the idlest goes where there are too many."""
+        """Return the handler of a new connection; if there are too many, close the idlest."""
         handler: RequestHandler = self._server()
         self._states[handler] = _ConnectionState(asyncio.get_running_loop().time())
         self._trim_soon()
         return handler
 
     def _trim_soon(self) -> None:
-        """End the idlest where there are too many, when those of this moment have begun."""
+        """If there are too many connections, close the idlest after the new ones have started."""
         if len(self._states) > MOST and not self._trimming:
             self._trimming = True
             asyncio.get_running_loop().call_later(_TRIM_AFTER_S, self._trim)
 
     @property
     def count(self) -> int:
-        """Return how many there are."""
+        """Return the number of connections."""
         return len(self._server.connections)
 
     def _trim(self) -> None:
@@ -80,12 +80,12 @@ class Connections:
             state.busy, state.since_s = False, loop.time()
 
     def lasting(self, request: web.BaseRequest) -> None:
-        """Record that a request is a websocket, which lasts as long as the browser keeps it."""
+        """Record that a request is a websocket, which the browser ends."""
         if (state := self._states.get(request.protocol)) is not None:
             state.lasting = True
 
     async def watch(self) -> None:
-        """End connections that are silent, or busy, for too long; until cancelled."""
+        """Close connections that are idle or busy for too long; runs until cancelled."""
         loop = asyncio.get_running_loop()
         while True:
             await asyncio.sleep(_LOOK_EVERY_S)
@@ -106,7 +106,7 @@ class Connections:
             handler.transport.abort()
 
     def _forget_gone(self) -> None:
-        """Forget connections that have ended; one that begins is not known for a moment."""
+        """Remove connections that have ended; a new one appears after a moment."""
         known = set(self._server.connections)
         now_s = asyncio.get_running_loop().time()
         for handler, state in tuple(self._states.items()):

@@ -1,4 +1,4 @@
-"""The page's own files: document, style, scripts and icon, as the door serves them."""
+"""Files of the page that the door serves: document, styles, scripts and icon."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,7 +26,7 @@ _MAY = {
 
 
 class PageFiles:
-    """What is in the folder ``browser``: the document at "/", the others at "/rig/NAME".
+    """Files of the folder ``browser``: the document at "/", the others at "/rig/NAME".
 
     Args:
         headers: of every answer.
@@ -37,7 +37,7 @@ class PageFiles:
         self._files = {path.name: path for path in FOLDER.iterdir() if path.suffix in _TYPES}
 
     def add_to(self, router: web.UrlDispatcher) -> None:
-        """Add the addresses of all files."""
+        """Add the routes of all files."""
         router.add_get("/", self._document)
         for name in self._files:
             if name != _DOCUMENT:
@@ -51,7 +51,7 @@ class PageFiles:
 
 
 def file_answer(path: Path, headers: Mapping[str, str]) -> web.Response:
-    """Return a file of a page as it is now: they are small, and it may have been edited."""
+    """Return the present content of a file; it is small and may have been edited."""
     return web.Response(
         body=path.read_bytes(),
         content_type=_TYPES[path.suffix],

@@ -1,4 +1,4 @@
-"""Hands on what browsers ask of viser, which draws the 3-D view in a frame of the page."""
+"""Proxy to viser, which draws the 3-D view in a frame of the page."""
 
 import asyncio
 import socket
@@ -27,14 +27,14 @@ from gazerig.robot.dashboard.door.websocket_relay import (
 from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 
 VIEW = "/view"
-"""Where the page has the view; the server behind the door does not know of this folder."""
+"""Folder of the view in the page's addresses; the server behind the door does not use it."""
 MOST_TABS = 16
-"""Tabs that show the page at a time."""
+"""Largest number of tabs that show the page."""
 
 _STYLE_TAG = b'<link rel="stylesheet" href="/rig/view.css">'
 _HEAD_END = b"</head>"
 _TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each receives the whole state, which takes a moment
-# What a proxy must not hand on: it is about one leg of the way (RFC 9110, 7.6.1).
+# Headers of a single connection, which a proxy must not forward (RFC 9110, 7.6.1).
 _ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
 _PLAIN = {"Accept-Encoding": "identity"}
 # The page itself shows it in a frame, and no other page may.
@@ -45,7 +45,7 @@ _FRAMED = {
 
 
 class _OnlyInside(AbstractResolver):
-    """Knows one address, whatever is asked for."""
+    """Resolver that returns one address for every name."""
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -66,11 +66,11 @@ class _OnlyInside(AbstractResolver):
         ]
 
     async def close(self) -> None:
-        """Need nothing."""
+        """Close nothing."""
 
 
 def client_of(inside: ViewAddress) -> aiohttp.ClientSession:
-    """Return what asks the server behind the door; called in the door's event loop."""
+    """Return a client of the server behind the door; called in the door's event loop."""
     connector: aiohttp.BaseConnector
     if inside.path is not None:
         connector = aiohttp.UnixConnector(str(inside.path), limit=0)
@@ -82,7 +82,7 @@ def client_of(inside: ViewAddress) -> aiohttp.ClientSession:
 
 
 class ViewProxy:
-    """Viser behind the door; belongs to the door's event loop.
+    """Proxy to viser behind the door; used in the door's event loop.
 
     Args:
         client: reaches the server.
@@ -102,7 +102,7 @@ class ViewProxy:
         self._tab_rate = TokenBucket(_TABS_PER_S, _TABS_BURST)
 
     async def get(self, request: web.Request) -> web.StreamResponse:
-        """Return a file of viser's; its document gets the page's style for the view."""
+        """Return a file of viser; its document gets the page's style for the view."""
         async with self._client.get(_address("http", request), headers=_PLAIN) as inside:
             body = await inside.read()
             headers = {k: v for k, v in inside.headers.items() if k.lower() not in _ONE_LEG}
@@ -114,11 +114,11 @@ class ViewProxy:
     async def relay(
         self, request: web.Request, who: str, over: Awaitable[object]
     ) -> web.StreamResponse:
-        """Carry a browser's websocket to the server and back, each side as slow as the other.
+        """Relay a browser's websocket to the server and back, at the speed of the slower side.
 
         Args:
             request: to open it.
-            who: the name of the browser.
+            who: Name of the browser.
             over: ends the connection.
         """
         if not self._tab_rate.take(asyncio.get_running_loop().time()):

@@ -1,4 +1,4 @@
-"""The viser server behind the page's door: on a Unix socket that no other user can reach.
+"""Viser server behind the page's door, on a Unix socket that no other user can reach.
 
 Viser authenticates no client. On a port of the loopback every user of the machine, and every
 page that is open in a browser here, could talk to it past the door.
@@ -21,18 +21,18 @@ from viser import _messages, transforms
 from gazerig.robot.dashboard.requests.pointer_to_look import ViewCamera
 
 BROWSER_HEADER = "X-Gazerig-Browser"
-"""Says to the server which browser a websocket is of."""
+"""Header with the name of a websocket's browser."""
 KEY_HEADER = "X-Gazerig-Key"
-"""Shows the server on a port that it is the door who asks."""
+"""Header with the key by which a server on a port recognises the door."""
 HAS_SOCKET_FILES = hasattr(socket, "AF_UNIX")
 TO_BROWSER_BYTES = 1 << 25
-"""No message to a browser is longer."""
+"""Longest message to a browser, bytes."""
 FROM_BROWSER_BYTES = 1 << 20
-"""No message from a browser is longer: the longest that the page's script sends has some kB."""
+"""Longest message from a browser, bytes; those of the page's script have some kB."""
 
 
 class ViewAddress(NamedTuple):
-    """Where the door finds the server.
+    """Address of the server, for the door.
 
     path: of its Unix socket; None: it listens on a port of the loopback
     key: what must be shown there with each request, as others could reach a port
@@ -44,9 +44,9 @@ class ViewAddress(NamedTuple):
 
 
 def open_server(socket_path: Path) -> tuple[viser.ViserServer, ViewAddress]:
-    """Open a server on a new Unix socket, in a folder that is its user's alone.
+    """Open a server on a new Unix socket, in a folder of this user only.
 
-    Where a system has no such sockets it gets a port of the loopback, and answers who shows a key.
+    On a system without such sockets it uses a port of the loopback and answers only with a key.
 
     Raises:
         OSError: the socket cannot be made.
@@ -58,14 +58,14 @@ def open_server(socket_path: Path) -> tuple[viser.ViserServer, ViewAddress]:
         server = viser.ViserServer(host="127.0.0.1", port=0, label="gazerig", verbose=False)
     if inside.path is None:
         inside = inside._replace(port=server.get_port())
-    # A browser must not be able to put this page on the internet.
+    # A browser must not be able to publish this page on the internet.
     for publish in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(publish)
     return server, inside
 
 
 def browser_of(server: viser.ViserServer, client_id: int) -> str:
-    """Return which browser a client of the server is, "" where that is not known."""
+    """Return the name of a client's browser, "" if unknown."""
     connection = server._websock_server._live_connections.get(client_id)
     if connection is None or connection.request is None:
         return ""
@@ -73,7 +73,7 @@ def browser_of(server: viser.ViserServer, client_id: int) -> str:
 
 
 def camera_of(server: viser.ViserServer, browser: str) -> ViewCamera | None:
-    """Return from where a browser sees the scene in its newest tab; None: it does not see it."""
+    """Return the camera of a browser's newest tab, None if it does not show the scene."""
     for client_id, client in sorted(server.get_clients().items(), reverse=True):
         if browser_of(server, client_id) == browser:
             seen = client.camera
@@ -85,9 +85,9 @@ def camera_of(server: viser.ViserServer, browser: str) -> ViewCamera | None:
 
 @contextlib.contextmanager
 def _listening_inside(inside: ViewAddress) -> Iterator[None]:
-    """Within the block, make viser's server, which supports only ports, listen for the door alone.
+    """Within the block, make viser's server, which supports only ports, listen only for the door.
 
-    On a socket file, or on its port for who shows the key.
+    It listens on a socket file, or on its port for requests with the key.
     """
     serve = websocket_server.serve
 
@@ -107,7 +107,7 @@ def _listening_inside(inside: ViewAddress) -> Iterator[None]:
 
 
 def _for_key(key: str, answer: Callable[..., Any]) -> Callable[..., Any]:
-    """Return what answers a request as ``answer`` does, if it shows the key."""
+    """Return a handler that answers as ``answer`` does if a request has the key."""
 
     def checked(connection: Any, request: Any) -> Any:
         if not hmac.compare_digest(request.headers.get(KEY_HEADER, "").encode(), key.encode()):

@@ -1,7 +1,7 @@
-"""The way of a browser's own camera to the rig: a websocket of pictures, one at a time.
+"""Websocket for the images of a browser's webcam, one image at a time.
 
 The browser sends a JPEG and waits for the answer "next" before it sends another, so that a slow rig
-or a slow way makes fewer pictures and no queue. One browser at a time: the newest takes over.
+or a slow connection results in fewer images and no queue. Only one browser sends: the newest.
 """
 
 import asyncio
@@ -18,11 +18,11 @@ PICTURES_PER_S, _BURST = 20.0, 5.0
 _JPEG = b"\xff\xd8\xff"
 
 TakePicture = Callable[[bytes], bool]
-"""Hands a picture to the rig; False where it is not taken now."""
+"""Sends an image to the rig; returns False if it is not accepted now."""
 
 
 class WebcamSocket:
-    """Takes pictures of one browser at a time.
+    """Receives images of one browser at a time.
 
     Args:
         now_s: the clock of the event loop.
@@ -37,11 +37,11 @@ class WebcamSocket:
 
     @staticmethod
     def prepared() -> web.WebSocketResponse:
-        """Return a websocket that takes no more than a picture at a time."""
+        """Return a websocket that accepts one image at a time."""
         return web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False)
 
     async def serve(self, socket: web.WebSocketResponse) -> None:
-        """Receive pictures until the browser ends, sends something else, or another takes over."""
+        """Receive images until the browser ends, sends other data, or another takes over."""
         self._newest = socket
         async for message in socket:
             if self._newest is not socket:

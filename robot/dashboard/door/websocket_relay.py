@@ -1,4 +1,4 @@
-"""Carries a browser's websocket to the server behind the door and back."""
+"""Relay of a browser's websocket to the server behind the door and back."""
 
 import asyncio
 from collections.abc import Awaitable
@@ -10,18 +10,18 @@ from aiohttp import web
 from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 
 MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
-"""From one browser; a person who drags with two hands sends some 60 a second."""
+"""Messages of one browser; a person who drags with two hands sends some 60 a second."""
 BYTES_PER_S, BYTES_BURST = 1e6, 4e6
 TAKES_S = 20.0
-"""A browser that takes nothing for so long is sent away; it comes again by itself."""
+"""Timeout of sending to a browser, s; it reconnects after it is disconnected."""
 _CLOSES_WITHIN_S = 1.0
-"""A browser that has not answered by then that it is over is not waited for."""
+"""Timeout of a browser's answer to the closing message, s."""
 
 Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
 async def carry_in(browser: web.WebSocketResponse, inside: Socket) -> None:
-    """Carry what a browser sends, no faster than the server should have to read it."""
+    """Relay a browser's messages, at a limited rate."""
     messages, size = (
         TokenBucket(MESSAGES_PER_S, MESSAGES_BURST),
         TokenBucket(BYTES_PER_S, BYTES_BURST),
@@ -36,7 +36,7 @@ async def carry_in(browser: web.WebSocketResponse, inside: Socket) -> None:
 
 
 async def carry_out(inside: Socket, browser: web.WebSocketResponse) -> None:
-    """Carry what the server sends, as fast as the browser takes it.
+    """Relay the server's messages, as fast as the browser reads them.
 
     Raises:
         TimeoutError: it takes nothing any more.
@@ -47,7 +47,7 @@ async def carry_out(inside: Socket, browser: web.WebSocketResponse) -> None:
 
 
 async def until_one_ends(*works: Awaitable[object]) -> None:
-    """Run all until one is over, and end the others."""
+    """Run all until one ends, and cancel the others."""
     tasks = {asyncio.ensure_future(work) for work in works}
     _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     for task in others:
@@ -56,7 +56,7 @@ async def until_one_ends(*works: Awaitable[object]) -> None:
 
 
 async def close_socket(socket: web.WebSocketResponse, request: web.Request) -> None:
-    """Close a browser's websocket; one who reads nothing does not read that it is over.
+    """Close a browser's websocket; a browser that reads nothing does not read the closing message.
 
     Args:
         socket: to be closed.

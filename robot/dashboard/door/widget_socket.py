@@ -1,4 +1,4 @@
-"""The websocket of the page's panels: what changed goes out, what people do comes in."""
+"""Websocket of the page's panels: sends changes, receives the input of users."""
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
@@ -16,11 +16,11 @@ from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
 
 _PAUSE_S = 0.04
-"""A browser is sent no more than 25 messages a second: more cannot be read."""
+"""Time between messages to a browser, s: 25 a second, more cannot be read."""
 
 
 class WidgetSocket:
-    """Carries the panels to one browser after the other, each as fast as it takes them.
+    """Sends the panels to browsers, to each as fast as it reads them.
 
     Args:
         widgets: all panels.
@@ -28,12 +28,12 @@ class WidgetSocket:
 
     def __init__(self, widgets: Widgets) -> None:
         self._widgets = widgets
-        # What people do takes its time in a thread of its own, one after the other: a STOP
-        # that comes by the same loop must not wait behind it.
+        # Input of users is handled in a separate thread, in order: a STOP through the same loop
+        # must not wait for it.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="page panels")
 
     async def serve(self, socket: web.WebSocketResponse, browser: str) -> None:
-        """Serve a connection until it ends; browser: whose it is."""
+        """Serve a connection of a browser until it ends."""
         loop, news = asyncio.get_running_loop(), asyncio.Event()
 
         def wake() -> None:

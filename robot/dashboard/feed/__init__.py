@@ -1,1 +1,1 @@
-"""What the page is told of the rig: from the loop's thread to the page's process."""
+"""Data of the rig for the page, from the loop's thread to the page's process."""

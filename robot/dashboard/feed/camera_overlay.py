@@ -1,4 +1,4 @@
-"""Draw what was found into the camera image, small enough for the page."""
+"""Draw detections into the camera image, scaled down for the page."""
 
 from typing import cast
 
@@ -44,8 +44,8 @@ def draw_detections(
 ) -> ImageArray:
     """Draw faces, landmarks, moving blobs and the gaze point into a copy.
 
-    image: the camera's image, or None where the source has none: a dark ground
-    gaze_px: where the rig looks, pixels of the full image; None draws none
+    image: the camera's image, None if the source has none: a dark background
+    gaze_px: gaze point of the rig in the full image, pixels; None draws none
     lens: of the full image; it places the blobs
     faces: whether faces, landmarks and blobs are drawn
     heat_px: points (n, 2) of the full image that the gaze has been on; None draws none
@@ -70,9 +70,9 @@ def draw_detections(
 
 
 def ground(detections: Detections, depth: bool) -> ImageArray | None:
-    """Return what ``draw_detections`` is to draw on: the image, or the depth as asked for.
+    """Return the background of ``draw_detections``: the image, or the depth if selected.
 
-    A camera that measures no depth gives its image with words that say so.
+    A camera without depth returns its image with a message.
     """
     if not depth:
         return detections.image
@@ -85,7 +85,7 @@ def ground(detections: Detections, depth: bool) -> ImageArray | None:
 
 
 def without_pictures() -> ImageArray:
-    """Return a dark image that says that no pictures were recorded."""
+    """Return a dark image with a message that no images were recorded."""
     drawn = np.full((IMAGE_WIDTH_PX * 5 // 8, IMAGE_WIDTH_PX, 3), _DARK_GROUND, np.uint8)
     words, size = "no pictures were recorded", 1.0
     (width, height), _ = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 2)
@@ -102,7 +102,7 @@ def depth_image(depth_m: Depth) -> ImageArray:
     """
     scale = min(1.0, IMAGE_WIDTH_PX / depth_m.shape[1])
     size = (max(1, round(depth_m.shape[1] * scale)), max(1, round(depth_m.shape[0] * scale)))
-    # Not averaged: between a hand and the wall behind it there is nothing.
+    # Not averaged: no surface is between a hand and the wall behind it.
     small = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
     known = np.isfinite(small)
     metres = np.clip(np.where(known, small, FARTHEST_M), NEAREST_M, FARTHEST_M)
@@ -162,7 +162,7 @@ def _draw_person(drawn: ImageArray, person: DetectedPerson, scale: float) -> Non
 
 def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: float) -> None:
     z = blob.p_camera_m[2]
-    if z <= 0.0:  # behind the camera there is no pixel
+    if z <= 0.0:  # behind the camera
         return
     u, v = project([blob.p_camera_m], lens)[0].tolist()
     radius = max(2, _clipped(lens.fx_px * blob.radius_m / z * scale))
@@ -172,7 +172,7 @@ def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: flo
 
 
 def _draw_gaze(drawn: ImageArray, at: Point) -> None:
-    share = drawn.shape[1] / IMAGE_WIDTH_PX  # small images are shown as large as others
+    share = drawn.shape[1] / IMAGE_WIDTH_PX  # small images are shown in the same size
     ring, edge, line, dot = (max(2, round(share * px)) for px in (14, 5, 3, 3))
     for radius, thick, colour in ((ring, edge, _GAZE_EDGE), (ring, line, _GAZE), (dot, -1, _GAZE)):
         cv2.circle(drawn, at, radius, colour, thick, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""Where the gaze has been, drawn into the camera's picture as warmth."""
+"""Heat map of the recent gaze, drawn into the camera image."""
 
 import cv2
 import numpy as np
@@ -7,14 +7,14 @@ from gazerig.drivers.types import ImageArray
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.gaze_trail import EVERY_S
 
-_SMALL = 8  # the map is so many times coarser than the picture
+_SMALL = 8  # pixels of the image for each pixel of the map
 _BLUR = 2.6  # in pixels of the map
 _FULL = 0.05  # of the map's blurred seconds: there it is hottest
 _STRONGEST = 0.62
 
 
 def draw_heat(image: ImageArray, points_px: Floats) -> None:
-    """Lay warmth over a picture where points (n, 2) are dense, in place."""
+    """Draw the density of points (n, 2), pixels, over an image, in place."""
     height, width = image.shape[:2]
     low = np.zeros((-(-height // _SMALL), -(-width // _SMALL)), np.float32)
     cells = np.floor(points_px / _SMALL)

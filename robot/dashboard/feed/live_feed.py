@@ -1,8 +1,8 @@
-"""A running rig as the page shows it, made in the page's process of the ticks it is sent.
+"""State of a running rig as the page shows it, computed in the page's process from ticks.
 
 Everything that is only shown is worked out here, at the page's rate: words, eye movements, the pose
 that was commanded, what was found drawn into the camera's image. The control loop sends plain
-ticks, and what they do not tell (``RunState``) when it has changed.
+ticks, and other data (``RunState``) when it has changed.
 """
 
 import pickle
@@ -43,14 +43,14 @@ TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
 its pixels."""
 
 _NEAREST_M = 0.05
-"""What is nearer to the plane of the camera, or behind it, has no place in the image."""
+"""Smallest distance from the plane of the camera of points in the image, m."""
 
 
 class LiveRig(NamedTuple):
-    """A running rig: the rate of its loop, and how it is built.
+    """Constant properties of a running rig: the rate of its loop, and its geometry.
 
-    emulated: its servos are, and nobody calibrates them
-    picture: draws what a simulated camera sees; None where there is none, or it gives images
+    emulated: whether its servos are emulated and not being calibrated
+    picture: draws the image of a simulated camera; None without one, or if it returns images
     world: how the simulated world about the rig looks; None without one
     detector: what finds faces and people, and what it lacks; "" if none runs
     """
@@ -64,16 +64,16 @@ class LiveRig(NamedTuple):
 
 
 class WorldNow(NamedTuple):
-    """A simulated world, and the time since it began, in seconds."""
+    """Simulated world, and the time since its start, s."""
 
     shapes: WorldShapes
     world_s: float
 
 
 class RunState(NamedTuple):
-    """What a tick does not tell.
+    """State of a run that ticks do not contain.
 
-    errors: of the bus, by kind; behaviour, conversation, character: those in force
+    errors: of the bus, by kind; behaviour, conversation, character: the present ones
     residual: see ``ResidualFigures``
     scene_start_s: when a simulated scene or world began, None before that and without one
     others: the other heads of the same world, as fields of ``OtherHead``
@@ -89,7 +89,7 @@ class RunState(NamedTuple):
 
 
 class FrameHead(NamedTuple):
-    """What was found in a frame, as far as it is drawn, and what goes along with it.
+    """Detections of a frame that are drawn, and properties of its image.
 
     faces: box, landmarks and confidence; blobs: id, kind, position and radius
     people: box, middle of the head, size of the trunk and confidence
@@ -97,7 +97,7 @@ class FrameHead(NamedTuple):
     lens: by which the frame was located, else as the camera reports it: fx, fy, cx, cy in pixels
         and five numbers of distortion
     shape, dtype: of the array in the memory that goes along; None, "" without one
-    depth: that is the depth image; wants_depth: depth is to be shown
+    depth: whether it is the depth image; wants_depth: whether depth should be shown
     """
 
     captured_s: float
@@ -116,12 +116,12 @@ class FrameHead(NamedTuple):
 
 
 def rig_message(rig: LiveRig) -> bytes:
-    """Return a message that tells the page how the rig is built."""
+    """Return a message with the rig's properties."""
     return RIG + pickle.dumps(tuple(rig), pickle.HIGHEST_PROTOCOL)
 
 
 def state_message(state: RunState) -> bytes:
-    """Return a message that tells the page what ticks do not."""
+    """Return a message with the state that ticks do not contain."""
     return STATE + encode(state)
 
 
@@ -158,9 +158,9 @@ def frame_with_pixels(
 
 
 class LiveFeed:
-    """Takes what the rig's side sends; returns what there is to show.
+    """Receives the rig's messages; returns the data to show.
 
-    emulated: the servos are; False before the rig has said so
+    emulated: whether the servos are emulated; False before the first message
     choices: what is wanted in the camera's image
     watched: someone sees the images; otherwise none is drawn
     shown_s: the time of what is shown: of the newest tick, or of a recording's snapshot
@@ -185,7 +185,7 @@ class LiveFeed:
         self._new_ticks = self._new_frame = False
 
     def take(self, message: bytes, fd: int = -1) -> bool:
-        """Handle a message of one of the kinds above; False if it is none.
+        """Handle a message of one of the kinds above; return False for others.
 
         Only ever fed by the process that started this one.
         """
@@ -206,7 +206,7 @@ class LiveFeed:
         return True
 
     def snapshot(self) -> Snapshot | None:
-        """Return what the rig does now and has done since the last call; None without news."""
+        """Return the rig's state and its events since the last call; None without new ticks."""
         if not self._new_ticks or self._builder is None or self._newest is None:
             return None
         self._new_ticks = False
@@ -227,19 +227,19 @@ class LiveFeed:
 
     @property
     def shape(self) -> RigShape | None:
-        """Return how the rig's parts are built; None where it is not known."""
+        """Return the geometry of the rig's parts; None if unknown."""
         rig = self._builder.rig if self._builder is not None else None
         return rig.shape if rig is not None else None
 
     def world(self) -> WorldNow | None:
-        """Return the world about the rig as it is shown; None without one, or too early."""
+        """Return the simulated world to be shown; None without one, or before its data."""
         start_s, t_s = self._state.scene_start_s, self.shown_s
         if self._world is None or start_s is None or t_s is None:
             return None
         return WorldNow(self._world, t_s - start_s)
 
     def image(self) -> ImageArray | None:
-        """Return the newest frame with what was found in it; None without a new one."""
+        """Return the newest frame with its detections; None without a new one."""
         tick, found, builder, poses = self._newest, self._found, self._builder, self._poses
         if not (self._new_frame and self.watched):
             return None
@@ -260,13 +260,13 @@ class LiveFeed:
             found,
             gaze_pixel(tick, R, p_m, lens) if self.choices.gaze else None,
             lens,
-            # Where there is no image, what was found is all there is to see.
+            # Without an image only the detections can be drawn.
             faces=self.choices.faces or _blank(found),
             heat_px=None if points_m is None else pixels(points_m, R, p_m, lens),
         )
 
     def _pictured(self, found: Detections, lens: Intrinsics, R: Mat3, p_m: Vec3) -> Detections:
-        """Return detections with a picture of the simulated scene, where they have no image."""
+        """Return detections with a drawn image of the scene if they have no image."""
         start_s = self._state.scene_start_s
         if not _blank(found) or self._picture is None or start_s is None:
             return found
@@ -299,7 +299,7 @@ class LiveFeed:
         self._new_ticks = True
 
     def _tick(self, row: TickRow, percepts: Mapping[int, Percept]) -> Tick:
-        """Return a tick; the percept before stands for one that was lost and comes again."""
+        """Return a tick; the previous percept replaces one that is not in the batch."""
         number = row.percept
         self._percept = None if number is None else percepts.get(number, self._percept)
         return Tick(

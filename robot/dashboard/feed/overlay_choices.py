@@ -1,4 +1,4 @@
-"""What may be drawn into the page's scene and into the camera's picture, as its users chose."""
+"""Layers of the scene and the camera image that users can select."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -6,7 +6,7 @@ from typing import ClassVar
 
 @dataclass
 class OverlayChoices:
-    """Which of them are wanted; changed by the users of the page."""
+    """Selected layers; users of the page change them."""
 
     gaze: bool = True
     faces: bool = False

@@ -1,4 +1,4 @@
-"""What the rig sends to the page's process, received from the socket."""
+"""Receiver of the rig's messages in the page's process."""
 
 import json
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from gazerig.robot.model.types import Snapshot
 
 
 class News(NamedTuple):
-    """What was waiting on the socket: all snapshots, the last frame, whether it has closed.
+    """Messages that waited on the socket: all snapshots, the last frame, whether it has closed.
 
     jpeg: a recording's frame; image: a running rig's, with what was found in it, BGR
     world: the simulated world about the rig, if there is one

@@ -1,4 +1,4 @@
-"""Show the running rig on a web page without ever making the control loop wait.
+"""Page process: shows the running rig on a web page and never delays the control loop.
 
 The page is a process of its own (``gazerig.robot.dashboard.page_main``), fed through a socket pair
 with frozen values. Every call here returns at once: what the page cannot take is dropped and
@@ -38,41 +38,41 @@ from gazerig.robot.dashboard.requests.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
-# The first byte of a message says what follows it. To the page: a snapshot and a frame of a
+# The first byte of a message is its kind. To the page: a snapshot and a frame of a
 # recording, menus, the parameters, their values, a reply or a message to all users, the position
 # of a replay; what a running rig sends is in live_feed.py.
 SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
 # From the page: its address, a message for the terminal, and REQUEST, a user's request.
 URL, NOTICE = b"u", b"n"
 TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
-"""Of the page's environment: what browsers must show."""
+"""Environment variable with the token that browsers must present."""
 ONCE_VARIABLE = "GAZERIG_PAGE_ONCE"
-"""Of the page's environment: a token that opens the page once, "" for none."""
+"""Environment variable with a token that opens the page once, "" for none."""
 FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
-"""Of the page's environment: a folder of this user's alone, for its server's socket."""
+"""Environment variable with a folder of this user only, for its server's socket."""
 CANNOT_OPEN = 3
-"""Exit code of a page that cannot have its address: it need not be tried again."""
+"""Exit code of a page that cannot open its address; a restart would not help."""
 ALL_USERS = "*"
-"""Takes the place of the user's name in messages to all users of the page."""
+"""User name in messages to all users of the page."""
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""What the page offers; any speed between the ends can be asked for."""
+"""Speeds of a replay that the page offers; any speed between the ends is accepted."""
 MARK_KINDS = ("saccade", "blink", "event")
-"""What a replay can be led to, one after the other."""
+"""Kinds of events to which a replay can jump."""
 
 OnRequest = Callable[[dict[str, object]], str | None]
-"""Carries out a request of a user of the page; returns the reply, or None."""
+"""Executes a request of a user of the page; returns the reply or None."""
 
 _CLOSE_TIMEOUT_S = 2.0
 _CHECK_S = 0.25  # between two checks that the process neither hangs nor was suspended
 _HANG_S = 5.0
-"""A page that is sent snapshots and has been silent so long hangs."""
+"""Time without a message after which a page that receives snapshots hangs, s."""
 _LAST_LINES_BYTES = 4096
-_MOST_PIXELS = 1 << 23  # of a message, where images go along in it
+_MOST_PIXELS = 1 << 23  # of a message that contains images
 _MOST_WORDS = 20_000  # of one answer, in characters
 _MOST_OWED = 100  # answers to a page that takes none
 _AGAIN_AFTER_S = 0.5
 _AGAIN_LATEST_S = 30.0
-_WELL_AFTER_S = 60.0  # one that lived so long begins with a short wait again
+_WELL_AFTER_S = 60.0  # after this time the wait before a restart is short again
 _TOKEN_BYTES = 16
 
 SHOWN_EVERY_S = 0.0095
@@ -106,7 +106,7 @@ def unpack(message: bytes) -> Snapshot:
 
 
 class PageProcess:
-    """The live page as the control loop sees it.
+    """Live page, for the control loop.
 
     ``show`` belongs to one thread; everything else may be called from any.
 
@@ -124,7 +124,7 @@ class PageProcess:
         on_request: OnRequest | None = None,
         on_picture: Callable[[bytes], None] | None = None,
     ) -> None:
-        """Prepare a page for this address and port; a busy port moves on to the next.
+        """Prepare a page for an address and port; if the port is busy, the next one is used.
 
         on_request: called with each request of a user of the page; None: requests are dropped
         on_picture: called with each picture of a browser's own camera; None: they are dropped
@@ -159,14 +159,14 @@ class PageProcess:
         self.frames_dropped = 0
 
     def open(self) -> str:
-        """Start the page and return at once, with the words to say meanwhile."""
+        """Start the page without waiting; return a message for the user."""
         self._begin()
         return f"the page is starting on port {self._port}"
 
     def _begin(self) -> None:
-        """Start a process, and talk to it."""
+        """Start a process and connect to it."""
         links = message_link.create_links(2)
-        # The page's own words are of interest only if it dies, and a pipe without a reader fills.
+        # A file: the page's messages matter only if it dies, and a pipe without a reader fills.
         self._errors = _errors_file()
         self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
         try:
@@ -191,7 +191,7 @@ class PageProcess:
         self.join(ours, stops)
 
     def join(self, link: MessageLink, stops: MessageLink | None = None) -> None:
-        """Talk over these from now on; ``open`` makes them with a process at the other ends.
+        """Use these links from now on; ``open`` creates them with a process at the other ends.
 
         stops: for stops alone
         """
@@ -201,7 +201,7 @@ class PageProcess:
         self._stops = StopListener(stops, self._stop) if stops is not None else None
 
     def show(self, snapshot: Snapshot) -> None:
-        """Hand over a snapshot; dropped and counted where the page does not take it."""
+        """Send a snapshot; if the page does not accept it, it is dropped and counted."""
         self._end_hung()
         if abs(snapshot.t_s - self._shown_s) < SHOWN_EVERY_S:
             return
@@ -211,12 +211,12 @@ class PageProcess:
             self.dropped += 1
 
     def show_frame(self, jpeg: bytes) -> None:
-        """Hand over an encoded camera image with what was found already drawn in."""
+        """Send an encoded camera image with the detections drawn in."""
         if not self.send(FRAME + jpeg):
             self.frames_dropped += 1
 
     def show_detections(self, message: bytes, fd: int = -1) -> None:
-        """Hand over what was found in a frame, with the memory of its image unless fd is -1."""
+        """Send the detections of a frame, with the memory of its image unless fd is -1."""
         if not self.send(message, fd):
             self.frames_dropped += 1
 
@@ -230,7 +230,7 @@ class PageProcess:
         self._answer(ALL_USERS, text)
 
     def send(self, message: bytes, fd: int = -1) -> bool:
-        """Hand over a message as it is; False where the page does not take it now.
+        """Send an encoded message; return False if the page does not accept it now.
 
         fd: goes along, unless it is -1; it stays the caller's
         """
@@ -239,27 +239,27 @@ class PageProcess:
             return False
         try:
             send(page, message, fd)
-        except OSError:  # full, gone, or closed by close() in this very moment
+        except OSError:  # full, gone, or just closed by close()
             return False
         return True
 
     def url(self) -> str | None:
-        """Return the page's address, token included, once it is there and as long as it is."""
+        """Return the page's URL with its token while the page is available, else None."""
         return self._url
 
     def url_once(self) -> str | None:
         """Return an address that opens the page once, for a program that is handed it.
 
-        What a program is started with can be read by all users of this computer.
+        All users of this computer can read a program's arguments.
         """
         return self._url and self._url.replace(self._token, self._once)
 
     def notice(self) -> str | None:
-        """Return the next line for the person in front of the rig, each one once."""
+        """Return the next line for the terminal, each one once."""
         return self._notices.popleft() if self._notices else None
 
     def _take(self, message: bytes) -> None:
-        """Do what a message of the page is for; called by the ear."""
+        """Handle a message of the page; called by the inbox."""
         kind, body = message[:1], message[1:]
         if kind == PICTURE:
             if self._on_picture is not None:
@@ -293,11 +293,11 @@ class PageProcess:
         return self._handle(json.dumps(asked).encode()) or ""
 
     def _handle(self, data: bytes) -> str | None:
-        """Carry out a request; an error of it must not end the handling of requests."""
+        """Execute a request; an error in it must not end the handling of requests."""
         try:
             asked = json.loads(data)
             return self._on_request(asked) if self._on_request is not None else None
-        except Exception as error:  # a stop must still be obeyed after any fault
+        except Exception as error:  # a stop must be executed after any fault
             return f"the rig could not do that: {type(error).__name__}: {error}"
 
     def _answer(self, who: str, text: str | None) -> None:
@@ -307,7 +307,7 @@ class PageProcess:
         self._pay()
 
     def _pay(self) -> None:
-        """Send the answers that the page had no room for so far."""
+        """Send the answers that the page could not accept so far."""
         with self._paying:
             while self._owed and self.send(self._owed[0]):
                 self._owed.popleft()
@@ -341,14 +341,14 @@ class PageProcess:
                 self._notices.append(f"the page cannot be started again: {error.strerror}")
 
     def _end_hung(self) -> None:
-        """Kill a page that hangs or was suspended: its STOP button may do nothing. It starts again.
+        """Kill and restart a page that hangs or is suspended: its STOP button may not work.
 
         One that is still starting, without an address, does not hang.
         """
         now_s, process = self._clock.now_s(), self._process
         if now_s < self._check_s or process is None or process.returncode is not None:
             return
-        # Where nobody looked the whole machine may have stood still: that is not all counted.
+        # If no check ran, the whole machine may have been suspended: not all of it counts.
         looked_s = min(now_s - self._check_s + _CHECK_S, 2.0 * _CHECK_S)
         self._silent_s = self._silent_s + looked_s if self._url is not None else 0.0
         self._check_s = now_s + _CHECK_S
@@ -396,7 +396,7 @@ class PageProcess:
 
 
 def _errors_file() -> BinaryIO:
-    """Return a file without a name: in memory, where the system has such files."""
+    """Return a file without a name, in memory if the system supports it."""
     if hasattr(os, "memfd_create"):
         return os.fdopen(os.memfd_create("page_errors"), "w+b", buffering=0)
     return tempfile.TemporaryFile(buffering=0)
@@ -405,14 +405,14 @@ def _errors_file() -> BinaryIO:
 def _end_of(file: BinaryIO) -> bytes:
     """Return the last bytes of a file that another process may still write to."""
     start = max(0, os.fstat(file.fileno()).st_size - _LAST_LINES_BYTES)
-    if hasattr(os, "pread"):  # leaves alone where the other process writes
+    if hasattr(os, "pread"):  # keeps the position at which the other process writes
         return os.pread(file.fileno(), _LAST_LINES_BYTES, start)
     file.seek(start)
     return file.read(_LAST_LINES_BYTES)
 
 
 def _code(process: subprocess.Popen[bytes]) -> int | None:
-    """Return the exit code of a process that has hung up, None where it hangs."""
+    """Return the exit code of a process that has closed its link, None if it hangs."""
     try:
         return process.wait(_CLOSE_TIMEOUT_S)
     except subprocess.TimeoutExpired:

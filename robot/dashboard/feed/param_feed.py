@@ -1,4 +1,4 @@
-"""Sends the page what can be tuned, once, and afterwards what has changed."""
+"""Feed of the parameters to the page: all of them once, then changes."""
 
 import json
 import threading
@@ -10,7 +10,7 @@ from gazerig.robot.control.observers import failure_text
 from gazerig.robot.dashboard.feed.page_process import PARAMS, VALUES
 from gazerig.robot.model.commands import Value
 
-_PIECE = 40  # parameters a message: some 20 kB, a tenth of what a message may be
+_PIECE = 40  # parameters in a message: some 20 kB, a tenth of the limit
 
 
 class ParamFeed:
@@ -39,18 +39,18 @@ class ParamFeed:
 
     @property
     def pending(self) -> bool:
-        """Return whether there is something to send."""
+        """Return whether data waits to be sent."""
         return bool(self._due) or self._tuning.version != self._version
 
     def step(self) -> None:
-        """Send what is due, as far as the page takes it."""
+        """Send waiting data, as far as the page accepts it."""
         if not self._due and self._tuning.version != self._version:
             self._write()
         while self._due and self._send(self._due[0]):
             self._due.popleft()
 
     def _write(self) -> None:
-        """Write messages: all parameters the first time, then the values that are others."""
+        """Create messages: all parameters the first time, then changed values."""
         first = self._version is None
         self._version = self._tuning.version  # before reading: a change meanwhile is seen next
         if first:
@@ -89,7 +89,7 @@ class ParamThread:
         self._thread: threading.Thread | None = None
 
     def look(self) -> None:
-        """Have what is new sent; called by the loop."""
+        """Request that changes are sent; called by the loop."""
         if self._feed.pending and not self._wanted.is_set():
             if self._thread is None:
                 self._thread = threading.Thread(
@@ -99,7 +99,7 @@ class ParamThread:
             self._wanted.set()
 
     def begin_anew(self) -> None:
-        """Have everything sent again to a restarted page."""
+        """Request that everything is sent again to a restarted page."""
         self._again = True
         self._wanted.set()
 

@@ -1,7 +1,7 @@
-"""Feeds the page with a running robot, in the loop's thread: ticks as they are, and news.
+"""Publisher of a running robot to the page, in the loop's thread: ticks and changes.
 
 Nothing is worked out here that is only shown: the page's process makes of the ticks what people
-see (robot/dashboard/feed/live_feed.py). What is sent besides is sent when it has changed.
+see (robot/dashboard/feed/live_feed.py). Other data is sent when it has changed.
 """
 
 import os
@@ -29,17 +29,17 @@ _STATE_S = 0.3
 
 
 class Publisher:
-    """Sends batches of ticks to the page, and beside them what they do not tell.
+    """Sends batches of ticks to the page, and other state when it changes.
 
     Args:
         page: the page.
         rig: returns how the rig is built now.
-        state: returns what ticks do not tell.
+        state: Returns the state that ticks do not contain.
         feed: sends the parameters to the page.
-        tell: prints a line that stays, such as the page's address.
+        tell: Prints a line on the terminal, such as the page's address.
         browse: opens an address in the user's browser, once; None: leaves that to the user.
 
-    depth: the depth image is to be shown in place of the camera's
+    depth: whether the depth image is shown in place of the camera's
     """
 
     def __init__(
@@ -64,16 +64,16 @@ class Publisher:
         self._images = False
 
     def obeyed(self, commands: Iterable[Command]) -> None:
-        """Note commands that the loop has obeyed: tuning may have changed how the rig is built."""
+        """Process executed commands: tuning may have changed the rig's geometry."""
         if any(isinstance(command, Tune) for command in commands):
             self.rebuilt()
 
     def rebuilt(self) -> None:
-        """Show the rig as it is built now: its camera sits elsewhere, or it was tuned."""
+        """Send the rig's geometry again, after a change of its camera or its parameters."""
         self._rig_sent = False
 
     def take(self, batch: TickBatch) -> bool:
-        """Send ticks and what is new; False where the page did not take the ticks."""
+        """Send ticks and changes; return False if the page did not accept the ticks."""
         page, t_s = self._page, batch.newest.t_s
         self._tell_notices()
         new = page.started != self._started
@@ -94,7 +94,7 @@ class Publisher:
         if abs(t_s - self._frame_s) >= _FRAME_S:
             self._frame_s = t_s
             self._send_frame(batch.newest.detections)
-        return taken and not new  # a new page needs the percept in force
+        return taken and not new  # a new page needs the present percept
 
     def close(self) -> None:
         """Send no more parameters."""
@@ -102,7 +102,7 @@ class Publisher:
             self._params.close()
 
     def _begin_anew(self) -> None:
-        """Begin again with a page that has come up; one that died knew all that was sent."""
+        """Send everything to a new page: only the one before has received it."""
         if self._params is not None and self._started:
             self._params.begin_anew()
         self._started = self._page.started
@@ -110,7 +110,7 @@ class Publisher:
         self._state_s = self._frame_s = -inf
 
     def _tell_notices(self) -> None:
-        """Print the page's address, once, and what else it says."""
+        """Print the page's address once, and its other messages."""
         page = self._page
         if not self._url_told and (url := page.url()) is not None:
             self._url_told = True

@@ -1,4 +1,4 @@
-"""One tick in the words and shapes that people are shown: the page's snapshot, status words."""
+"""Snapshot of a tick for people: words and shapes of the page."""
 
 from collections import Counter, deque
 from dataclasses import replace
@@ -39,7 +39,7 @@ from gazerig.robot.model.types import (
 )
 
 _TICKS_KEPT = 600
-"""Ticks that wait at most: three seconds, should the one who looks be held up."""
+"""Largest number of waiting ticks: three seconds, if the reader is delayed."""
 _TRAIL_S = 0.0095
 """Joints are shown 100 times a second; a little less than 10 ms, for rounding's sake."""
 _TIMING_S = 0.5
@@ -48,7 +48,7 @@ _GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "torque_off": 3}
 
 
 class ShownRig(NamedTuple):
-    """How a rig is built, as far as people are shown it.
+    """Geometry of a rig as it is shown.
 
     shape: of all its parts; None where only its kinematics are known
     """
@@ -63,7 +63,7 @@ class ShownRig(NamedTuple):
 
 
 class SnapshotTexts(NamedTuple):
-    """What a tick does not tell: bus figures in words, what is seen, what is in force.
+    """State that a tick does not contain: bus errors, perception, present choices, as text.
 
     others: the other heads of the same world
     """
@@ -77,7 +77,7 @@ class SnapshotTexts(NamedTuple):
 
 
 class SnapshotBuilder:
-    """Makes snapshots of a running rig, with all that has happened since the one before.
+    """Creates snapshots of a running rig, with all events since the previous one.
 
     ``update`` only keeps the tick; ``take`` does the work.
     """
@@ -97,7 +97,7 @@ class SnapshotBuilder:
         self._unanswered: Counter[str] = Counter()
 
     def retune(self, rate_hz: float) -> None:
-        """Go on with a loop of another rate."""
+        """Continue with another rate of the loop."""
         if rate_hz != self._rate_hz:
             self._rate_hz = rate_hz
             self._timing.retune(rate_hz)
@@ -153,7 +153,7 @@ class SnapshotBuilder:
             self._unanswered.update(tick.joints.missing)
 
     def _timed(self, t_s: float) -> LoopFigures | None:
-        """Return the loop's figures, worked out twice a second."""
+        """Return the timing of the loop, computed twice a second."""
         if t_s - self._figures_s >= _TIMING_S:
             self._figures, self._figures_s = self._timing.figures(), t_s
         return self._figures
@@ -167,7 +167,7 @@ def snapshot(
     perception: str = "",
     rig: ShownRig | None = None,
 ) -> Snapshot:
-    """Return what the page is shown of a single tick.
+    """Return the snapshot of a single tick.
 
     rig: how it is built, for the commanded pose, the camera and the servos' limits
     """
@@ -221,20 +221,20 @@ def snapshot(
 
 
 def _by_time(reasons: tuple[str, ...], busy: str) -> tuple[str, ...]:
-    """Return why joints are limited; a busy computer is named in place of joints that are old."""
+    """Return why joints are limited; a busy computer replaces joints with old readings."""
     others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
     return (*others, busy) if busy and len(others) < len(reasons) else reasons
 
 
 def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
-    """Return a name a joint; a recording may know none, then they are numbered."""
+    """Return the names of the joints; a recording without names has numbers."""
     names = tick.guard_result.joints or (rig.kinematics.names if rig is not None else ())
     count = len(tick.joints.position_rad)
     return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
 
 
 def _estimated(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the joints whose position is not measured; where nothing is said of it, none."""
+    """Return the joints whose position is not measured; none if it is unknown."""
     if not joints.measured:
         return ()
     pairs = zip(names, joints.measured, strict=True)
@@ -246,7 +246,7 @@ def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] 
 
 
 def _pivot(pose: GazeState, rig: ShownRig | None) -> Vec3 | None:
-    """Return where in the world the neck turns the head."""
+    """Return the pivot of the neck in the world, m."""
     if rig is None:
         return None
     head, _ = rig.kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
@@ -271,7 +271,7 @@ def _faces(tick: Tick) -> tuple[SeenFace, ...]:
 
 
 def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
-    """Return what has no visible face: what moves, and people who are turned away."""
+    """Return targets without a visible face: moving things and people who are turned away."""
     if tick.percept is None:
         return ()
     bodies = tick.percept.bodies
@@ -303,7 +303,7 @@ def _commanded_pose(tick: Tick, rig: ShownRig) -> CommandedPose:
 
 
 def _camera(tick: Tick, rig: ShownRig) -> SeenCamera | None:
-    """Return where the camera is now, None before its first frame, whose shape it needs."""
+    """Return the pose of the camera, None before its first frame, whose shape it needs."""
     found = tick.detections
     if found is None:
         return None

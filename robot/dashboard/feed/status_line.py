@@ -1,4 +1,4 @@
-"""The status line of a running rig: one line of words, five times a second."""
+"""Status line of a running rig, rewritten five times a second."""
 
 from collections.abc import Callable
 from math import inf
@@ -15,12 +15,12 @@ _RATE_S = 1.0
 
 
 class StatusLine:
-    """Rewrites the status line with the newest tick, now and then.
+    """Rewrites the status line with the newest tick at a limited rate.
 
     Args:
         write: rewrites the line, without waiting.
         health: returns the present state of the bus.
-        timing: returns how the loop keeps its time; None where that is not known yet.
+        timing: Returns the timing of the loop; None if it is not known yet.
     """
 
     def __init__(

@@ -1,1 +1,1 @@
-"""What is shown and tuned beside the view: charts, figures, controls, health."""
+"""Panels of the page: charts, figures, controls, health."""

@@ -1,4 +1,4 @@
-"""What moves the face on the page: a button for each expression and for each gesture."""
+"""Controls of the face: a button for each expression and each gesture."""
 
 from collections.abc import Sequence
 
@@ -10,17 +10,17 @@ from gazerig.robot.model.commands import NO_GESTURE, Express, Play
 
 EXPRESSION = "expression"
 GESTURE = "gesture"
-"""The menus of these names are shown here."""
+"""Names of the menus that are shown here."""
 _SPEEDS, _SPEED_STEP = (0.5, 2.0), 0.1
-"""Slowest and fastest speed of gestures."""
+"""Slowest and fastest speed of gestures, and its step."""
 
 
 class AnimationPanel:
-    """A section of the controls; it appears when the rig offers something for it.
+    """Section of the controls; it appears when the rig offers expressions or gestures.
 
     Args:
-        place: where the section is added.
-        outbox: takes commands for the rig.
+        place: Container of the section.
+        outbox: Sends commands to the rig.
     """
 
     def __init__(self, place: Container, outbox: Outbox) -> None:
@@ -32,7 +32,7 @@ class AnimationPanel:
         self.speed: Slider | None = None
 
     def offer(self, names: Sequence[str]) -> None:
-        """Show a button for each expression, in place of those before."""
+        """Show a button for each expression, instead of the previous ones."""
         options = tuple(sorted(names, key=lambda name: (name != NEUTRAL, name)))
         if self.expressions is not None:
             self.expressions.options = options
@@ -47,10 +47,10 @@ class AnimationPanel:
         self.expressions.on_press(express)
 
     def offer_gestures(self, names: Sequence[str]) -> None:
-        """Show a button for each gesture, in place of those before; the first ends them.
+        """Show a button for each gesture, instead of the previous ones; the first ends a gesture.
 
         Args:
-            names: gestures that the rig can do, and the name that ends the one under way.
+            names: Gestures that the rig can play, and the name that ends the present one.
         """
         options = tuple(sorted(names, key=lambda name: (name != NO_GESTURE, name)))
         if self.gestures is not None:
@@ -67,7 +67,7 @@ class AnimationPanel:
         self.gestures.on_press(play)
 
     def _shown(self) -> Container:
-        """Return the section, which is there once something is offered."""
+        """Return the section; create it at the first call."""
         if self._section is None:
             self._section = self._place.section("face", order=20)
         return self._section

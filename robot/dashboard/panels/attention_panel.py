@@ -1,4 +1,4 @@
-"""HTML of why the gaze is where it is: the winner, its salience by term, and the runners-up."""
+"""HTML of the present target: the reason, and the salience of all candidates by term."""
 
 from html import escape
 
@@ -13,15 +13,15 @@ _BECAUSE = {
     "rotation": "turns",
     "onset": "has just come into view",
 }
-"""What each term of the salience says of a body."""
+"""Term of the salience -> property of the body, as text."""
 _LEAST_TOLD, _SHARE_TOLD = 0.005, 0.1
-"""Terms are told from this salience on, and from this share of the largest."""
+"""Smallest salience, and smallest share of the largest, of terms in the text."""
 _LEAST_FULL = 1.0
-"""A bar as long as the panel stands for this salience, or for the highest where that is more."""
+"""Salience of a bar over the whole panel; the highest salience if that is more."""
 
 
 def winner(snapshot: Snapshot) -> str:
-    """Return what is looked at, the reason, and what is in force."""
+    """Return the target, the reason, and the present behaviour and plan as HTML."""
     return (
         f"<div class='big'>{escape(snapshot.target_name)}</div>"
         f"<div class='tall'>{escape(reason(snapshot))}</div>"
@@ -31,9 +31,9 @@ def winner(snapshot: Snapshot) -> str:
 
 
 def reason(snapshot: Snapshot) -> str:
-    """Return why the target won in one plain sentence, e.g. "because it moves (translation 0.38)".
+    """Return the reason for the target as text, e.g. "because it moves (translation 0.38)".
 
-    While somebody leads, or where nothing was compared, it is what the rig says.
+    During manual control, or without saliences, it is the rig's own reason.
     """
     if snapshot.leader.led or not snapshot.saliences:
         return snapshot.why
@@ -55,12 +55,12 @@ def reason(snapshot: Snapshot) -> str:
 
 
 def _planned(because: str) -> str:
-    """Return the planner's reason behind a sentence, where there is one."""
+    """Return the planner's reason as the end of a sentence, "" without one."""
     return f": {because}" if because else ""
 
 
 def saliences(snapshot: Snapshot) -> str:
-    """Return the saliences that were compared, term by term, the highest first."""
+    """Return the saliences by term as HTML, the highest first."""
     return "" if snapshot.leader.led else _saliences(snapshot.saliences)
 
 
@@ -95,7 +95,7 @@ def _saliences(rows: tuple[Salience, ...]) -> str:
 
 
 def _row(salience: Salience, full: float, *, winner: bool) -> str:
-    """Return one body: its name and figures above a bar of its terms."""
+    """Return the row of one body: its name and values above a bar of its terms."""
     bars = "".join(
         f"<div class='term-{term}' "
         f"style='width:{100.0 * max(0.0, getattr(salience, term)) / full:.1f}%'></div>"

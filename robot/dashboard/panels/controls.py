@@ -1,4 +1,4 @@
-"""What a person can make the rig do: the drawers Steer and Tune."""
+"""Controls of the rig: the drawers Steer and Tune."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -16,7 +16,7 @@ from gazerig.robot.model.commands import Ask, LookAt
 from gazerig.robot.model.types import Snapshot
 
 STEER = "steer"
-"""A menu of this name is the steps of a calibration, not something to ask the robot for."""
+"""Menu of the steps of a calibration, not of requests to the robot."""
 BEHAVIOUR, CONVERSATION, CHARACTER = "behaviour", "conversation", "character"
 
 _TARGET_SCALE = 0.12
@@ -24,7 +24,7 @@ _DRAG, _FREE = "drag a target", "look freely"
 
 
 class Controls:
-    """Steer: where it looks, behaviours, the face, joints; Tune: parameters."""
+    """Drawers Steer (gaze, behaviours, face, joints) and Tune (parameters)."""
 
     def __init__(self, widgets: Widgets, scene: viser.SceneApi, outbox: Outbox) -> None:
         self._steer, self._tune = widgets.panel("steer"), widgets.panel("tune")
@@ -42,7 +42,7 @@ class Controls:
             place.html(note("A recording: there is no rig to move or to tune."))
 
     def offer(self, menus: Mapping[str, Sequence[str]]) -> None:
-        """Add menus, each with what can be chosen from it."""
+        """Add menus with their choices."""
         for name, choices in menus.items():
             if name == EXPRESSION:
                 self._face.offer(choices)
@@ -56,7 +56,7 @@ class Controls:
         self._tuning.params(params)
 
     def values(self, state: Mapping[str, object]) -> None:
-        """Update the values in force: changed values, what is not saved, the file, characters."""
+        """Update the present values: changed and unsaved values, the file, characters."""
         self._tuning.values(state)
         self._jog.values(self._tuning.in_force)
         characters = state.get("characters")
@@ -64,23 +64,23 @@ class Controls:
             self._lead.characters(characters, str(state.get("character", "")))
 
     def show(self, snapshot: Snapshot) -> None:
-        """Show what is measured beside what is asked for."""
+        """Show measured values next to requested ones."""
         self._lead.show(snapshot)
         self._jog.show(snapshot)
 
     def answered(self, who: str) -> None:
-        """Record that the rig has answered who tuned."""
+        """Record that the rig has answered a browser's change."""
         self._tuning.answered(who)
 
 
 class LeadPanel:
-    """Where the head looks, and menus; a target is dragged through the scene.
+    """Controls of the gaze, with a target to drag through the scene, and menus.
 
     Args:
-        place: of the drawer.
-        scene: where the target is.
-        outbox: takes commands for the rig.
-        let_go: called when joints are no longer held.
+        place: Container of the drawer.
+        scene: Scene of the target.
+        outbox: Sends commands to the rig.
+        let_go: Called when joints are released.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class LeadPanel:
         self.drag.on_change(lambda on, _: self._show_target(on))
         self.free.on_press(lambda _, client: self._look_freely(client))
 
-        # A coroutine: viser runs these one after the other, plain functions in any order.
+        # A coroutine: viser runs these in order, plain functions in any order.
         @self._gizmo.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
             x, y, z = map(float, event.target.position)
@@ -138,7 +138,7 @@ class LeadPanel:
         self._outbox.command(LookAt(None), client)
 
     def offer(self, name: str, choices: Sequence[str]) -> None:
-        """Add a menu as a row of buttons, in place of the one of that name."""
+        """Add a menu as a row of buttons, or replace its choices."""
         if (before := self.menus.get(name)) is not None:
             before.options = choices
             return
@@ -153,7 +153,7 @@ class LeadPanel:
         menu.on_press(ask)
 
     def characters(self, names: Sequence[str], present: str) -> None:
-        """Add the characters there are, once, and note the present one."""
+        """Add the menu of characters once, and store the present one."""
         self._character = present
         if CHARACTER in self.menus:
             return
@@ -169,7 +169,7 @@ class LeadPanel:
         return self.menus[name]
 
     def show(self, snapshot: Snapshot) -> None:
-        """Mark what is in force; the target to drag starts where the head looks."""
+        """Mark the present choices; the target to drag starts at the gaze target."""
         self._target_m = snapshot.p_world_target_m
         in_force = {
             BEHAVIOUR: snapshot.behaviour,

@@ -1,4 +1,4 @@
-"""How long the gaze rests on each part of a face, beside the one person measured.
+"""Dwell times of the gaze on the parts of a face, with those of one measured person.
 
 Mean dwell times per part are those of Nakamoto & Tsuruno, table 1.
 """
@@ -20,10 +20,10 @@ from gazerig.robot.dashboard.widgets.html import (
 from gazerig.robot.model.types import SeenFixation
 
 MEASURED_MEAN_S = dict(zip(PARTS, DWELL_MEAN_S, strict=True))
-"""Nakamoto & Tsuruno, table 1."""
+"""Mean dwell times of a person, s (Nakamoto & Tsuruno, table 1)."""
 
 BIN_S, BINS = 0.1, 12
-"""Rests of more than BINS * BIN_S are counted in the last bin."""
+"""Width, s, and number of the bins; the last also has all longer fixations."""
 
 _ROW_PX, _TOP_PX = 23.0, 18.0
 _SHARE_PX, _SHARE_WIDE_PX = 70.0, 78.0
@@ -32,7 +32,7 @@ _BIN_PX = (LINE_PX - 6.0 - _BINS_PX) / BINS
 
 
 class DwellChart:
-    """Gathers fixations by face part."""
+    """Chart of fixations by face part."""
 
     def __init__(self) -> None:
         self._seconds: defaultdict[str, float] = defaultdict(float)
@@ -40,7 +40,7 @@ class DwellChart:
         self._counts: Counter[str] = Counter()
 
     def update(self, fixation: SeenFixation) -> None:
-        """Add a fixation; one that was on no face part is left out."""
+        """Add a fixation; those on no face part are ignored."""
         part = fixation.part
         if part is None:
             return
@@ -55,11 +55,11 @@ class DwellChart:
 
     @property
     def rests(self) -> int:
-        """How many rests were on a part of a face."""
+        """Number of fixations on a part of a face."""
         return sum(self._counts.values())
 
     def drawing(self) -> str:
-        """Return a row a part as HTML: share of the time, and how long the rests were."""
+        """Return one row for each part as HTML: share of time, and histogram of durations."""
         shares = self.shares()
         most = max(shares.values(), default=1.0)
         rows = [

@@ -1,4 +1,4 @@
-"""The last half minute as a strip: targets, face parts, saccades, blinks, what the guard did."""
+"""Strip of the last half minute: targets, face parts, saccades, blinks, guard levels."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ from gazerig.robot.dashboard.widgets.html import (
 from gazerig.robot.model.types import SeenBlink, SeenEvent, SeenSaccade, Snapshot
 
 STRIP_S = 30.0
-"""How far back the strip reaches."""
+"""Duration of the strip, s."""
 
 _LEFT_PX = 64.0
 _RIGHT_PX = LINE_PX - 4.0
@@ -31,7 +31,7 @@ _LETTER_PX = 7.4
 
 
 class _Stretch(NamedTuple):
-    """A time over which something was the same."""
+    """Interval with a constant value."""
 
     start_s: float
     end_s: float
@@ -60,7 +60,7 @@ class Timeline(PagePanel):
             stretches.clear()
 
     def update(self, snapshot: Snapshot) -> None:
-        """Add a snapshot; one from before the last resets the timeline."""
+        """Add a snapshot; one with an earlier time than the last resets the strip."""
         t_s = snapshot.t_s
         if self._now_s is not None and t_s < self._now_s:
             self._clear()
@@ -74,7 +74,7 @@ class Timeline(PagePanel):
         self._forget(t_s - STRIP_S)
 
     def _lengthen(self, row: str, t_s: float, what: str, kind: str) -> None:
-        """Go on with a row's last stretch, or begin another where that one ends."""
+        """Extend a row's last interval, or start a new one if the value has changed."""
         stretches = self._rows[row]
         if stretches and (stretches[-1].what, stretches[-1].kind) == (what, kind):
             stretches[-1] = stretches[-1]._replace(end_s=t_s)
@@ -89,7 +89,7 @@ class Timeline(PagePanel):
             self._events.popleft()
 
     def stretches(self, row: str) -> tuple[tuple[float, float, str], ...]:
-        """Return start, end and what of each stretch of a row: target, part or guard."""
+        """Return start, end and value of each interval of a row: target, part or guard."""
         return tuple(stretch[:3] for stretch in self._rows[row])
 
     def drawing(self) -> str:
@@ -101,7 +101,7 @@ class Timeline(PagePanel):
         return svg(_AXIS_PX + 18.0, parts, self._says())
 
     def _says(self) -> str:
-        """Return the strip in words, for those who do not see it."""
+        """Return the strip as text, for screen readers."""
         targets = dict.fromkeys(stretch.what for stretch in self._rows["target"] if stretch.what)
         saccades = sum(isinstance(event, SeenSaccade) for event in self._events)
         blinks = sum(isinstance(event, SeenBlink) for event in self._events)
@@ -137,7 +137,7 @@ class Timeline(PagePanel):
 
 
 def _x(t_s: float, now_s: float) -> float:
-    """Return where in the drawing an instant lies, held at its left edge."""
+    """Return the x coordinate of a time, limited to the left edge."""
     ago = max(-STRIP_S, t_s - now_s)
     return _RIGHT_PX + ago * (_RIGHT_PX - _LEFT_PX) / STRIP_S
 
@@ -159,7 +159,7 @@ def _ground() -> Iterable[str]:
 def _band(
     row: str, stretch: _Stretch, now_s: float, high: float, colour: str, label: str
 ) -> Iterable[str]:
-    """Return one stretch as a bar, with its name inside where there is room."""
+    """Return one interval as a bar, with its name if it fits."""
     x0, x1 = _x(stretch.start_s, now_s), _x(stretch.end_s, now_s)
     says = PART_NAMES.get(stretch.what, stretch.what)
     yield box(x0, _ROWS_PX[row], x1 - x0 - 0.3, high, colour, says)

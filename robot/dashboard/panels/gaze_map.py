@@ -1,4 +1,4 @@
-"""Where on the face that is looked at the gaze has been: a heat map that fills as the rig runs."""
+"""Heat map of the gaze on the faces that the rig looks at, accumulated during the run."""
 
 from functools import cache
 
@@ -13,14 +13,14 @@ from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, d
 from gazerig.robot.model.types import Snapshot
 
 SHRINK = 3
-"""The map is so many times smaller than the drawn face."""
+"""Factor by which the map is smaller than the drawn face."""
 
 WIDE_PX, HIGH_PX = WIDTH_PX // SHRINK, HEIGHT_PX // SHRINK
 
 _PLANE_M = -0.028
-"""The plane between the nose tip and the eyes and mouth, along the face's own x axis."""
+"""x coordinate in the face's frame of a plane between nose tip and eyes, m."""
 _SPREAD_M = 0.0085
-"""Half a degree seen from a metre away: what is seen sharply."""
+"""Width of half a degree at 1 m, about the fovea, m."""
 _LONGEST_GAP_S = 0.2
 _LONGEST_FORESEEN_S = 0.3
 _FAINT, _PLAIN, _COVER = 0.02, 0.45, 0.82
@@ -29,9 +29,10 @@ Image = NDArray[np.uint8]
 
 
 class GazeMap:
-    """Gathers time on a face's plane.
+    """Accumulates gaze time on the plane of a face.
 
-    seconds: how long the gaze was on the map
+    Attributes:
+        seconds: Total time on the map, s.
     """
 
     def __init__(self) -> None:
@@ -40,7 +41,7 @@ class GazeMap:
         self._last_s: float | None = None
 
     def update(self, snapshot: Snapshot) -> None:
-        """Add the time since the last snapshot where a face is looked at and no eye jumps."""
+        """Add the time since the last snapshot if a face is the target, except during saccades."""
         last_s, self._last_s = self._last_s, snapshot.t_s
         if last_s is None or not 0.0 < snapshot.t_s - last_s <= _LONGEST_GAP_S:
             return
@@ -53,7 +54,7 @@ class GazeMap:
             self.seconds += snapshot.t_s - last_s
 
     def image(self) -> Image:
-        """Return the map over a drawn face, RGB (HIGH_PX, WIDE_PX, 3): yellow is where most was."""
+        """Return the map over a drawn face, RGB (HIGH_PX, WIDE_PX, 3); the maximum is yellow."""
         blurred = cv2.GaussianBlur(self._time, (0, 0), _SPREAD_M * PX_PER_M / SHRINK)
         top = float(blurred.max())
         share = blurred / top if top > 0.0 else blurred
@@ -64,9 +65,9 @@ class GazeMap:
 
 
 def gaze_on_face(snapshot: Snapshot) -> tuple[float, float] | None:
-    """Return where the measured gaze meets the face it is meant for, (y, z) in that face's frame.
+    """Return the point of the measured gaze on its target face, (y, z) in the face's frame, m.
 
-    None while the eyes jump, where no face is the target, or where the gaze misses its plane.
+    None during a saccade or blink, without a target face, or if the gaze misses its plane.
     """
     if snapshot.target_kind != "face" or snapshot.phase in ("saccade", "blink"):
         return None
@@ -82,6 +83,6 @@ def gaze_on_face(snapshot: Snapshot) -> tuple[float, float] | None:
 
 @cache
 def _face() -> Image:
-    """Draw the face once, small."""
+    """Return the drawn face in the size of the map."""
     small = cv2.resize(draw_face(), (WIDE_PX, HIGH_PX), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.uint8)

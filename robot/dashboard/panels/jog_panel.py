@@ -1,4 +1,4 @@
-"""Sliders that put joints at angles, each with the joint's limits; others follow their joints."""
+"""Sliders to jog joints within their limits; the other sliders follow their joints."""
 
 from collections.abc import Mapping
 from math import degrees, radians
@@ -12,27 +12,27 @@ from gazerig.robot.model.types import Snapshot, in_order
 
 _STEP_DEG = 0.1
 _FIRST, _LAST = 1, 100
-"""Order of the sliders, and of what stands below them."""
+"""Order of the sliders and of the elements below them."""
 _FOLLOWS_DEG = 0.15
-"""A slider that is not held follows its joint in steps of this."""
+"""Step in which a slider follows its joint, deg."""
 _FREE_AFTER_S = 0.5
-"""A jogged joint whose desired angle is another for this long is no longer jogged."""
+"""Time after which a joint with another desired angle counts as no longer jogged, s."""
 _SAME_DEG = 0.3
 ESTIMATED = "estimated from what was asked for, not measured: the servos tell nothing"
 
 
 class JogPanel:
-    """One slider a joint; they come with the joints' limits.
+    """One slider for each joint; they are created when the limits are known.
 
     Args:
-        place: where they stand.
+        place: Container of the sliders.
         outbox: takes commands for the rig.
     """
 
     def __init__(self, place: Container, outbox: Outbox) -> None:
         self._place, self._outbox = place, outbox
         self.sliders: dict[str, Slider] = {}
-        # Joint -> angle asked for and the time of the last frame in which it was requested.
+        # Joint -> requested angle and the time of the last frame in which it was desired.
         self._held: dict[str, tuple[float, float]] = {}
         self._now_s = 0.0
         place.html(
@@ -45,11 +45,11 @@ class JogPanel:
         self.not_measured = place.html(order=_LAST)
 
     def let_go(self) -> None:
-        """Forget which joints were moved here: their sliders follow them again."""
+        """Forget the jogged joints; their sliders follow them again."""
         self._held.clear()
 
     def values(self, in_force: Mapping[str, object]) -> None:
-        """Create the sliders, and keep their ends at the joints' limits."""
+        """Create the sliders, and set their ranges to the joints' limits."""
         keys = [key.split(".") for key in in_force if key.startswith("joints.")]
         for joint in in_order(path[1] for path in keys if path[2:] == ["min_deg"]):
             low, high = (in_force.get(f"joints.{joint}.{end}_deg") for end in ("min", "max"))
@@ -81,8 +81,8 @@ class JogPanel:
         self._outbox.command(Jog(((joint, radians(angle_deg)),)), who)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Let sliders that are not held follow their joints, and say which are not measured."""
-        if snapshot.t_s < self._now_s:  # the rig's clock was started again
+        """Update the sliders of joints that are not jogged, and list joints without measurement."""
+        if snapshot.t_s < self._now_s:  # the rig's clock was restarted
             self._held.clear()
         self._now_s = snapshot.t_s
         places = {joint: i for i, joint in enumerate(snapshot.joints)}
@@ -97,7 +97,7 @@ class JogPanel:
         self.not_measured.content = not_measured(snapshot)
 
     def _note_held(self, joint: str, desired_deg: float, stopped: bool) -> None:
-        """Forget a joint that was let go elsewhere, by a stop or another command."""
+        """Forget a joint that a stop or another command has released."""
         held = self._held.get(joint)
         if held is None:
             return
@@ -111,7 +111,7 @@ class JogPanel:
 
 
 def not_measured(snapshot: Snapshot) -> str:
-    """Return which joints' angles are estimated, as HTML, "" where all are measured."""
+    """Return the joints with estimated angles as HTML, "" if all are measured."""
     estimated = [joint for joint in snapshot.joints if joint in frozenset(snapshot.estimated)]
     if not estimated:
         return ""

@@ -12,11 +12,11 @@ from gazerig.robot.dashboard.widgets.widget import Chart
 from gazerig.robot.model.types import Snapshot, Trail
 
 TRACE_S = 30.0
-"""How far back the traces are kept."""
+"""Duration of the traces, s."""
 
 SPANS = {"3 s": 3.0, "10 s": 10.0, "30 s": TRACE_S}
 MOST_POINTS = 300
-"""More points than this in a trace are thinned out: the panel is not wider."""
+"""Largest number of points in a trace; more would not be visible."""
 
 _LEAST_SPAN_DEG = 10.0
 _COMMANDS = (("desired", "desired"), ("commanded", "commanded"))
@@ -26,7 +26,7 @@ _ESTIMATED = ("estimated, not measured", "estimated")
 
 
 class ChartGroup(NamedTuple):
-    """Joints that are drawn as the mean of them."""
+    """Joints of which the mean is drawn."""
 
     title: str
     joints: tuple[str, ...]
@@ -74,11 +74,11 @@ GROUPS = {
         ChartGroup("neck, roll, + right ear down", ("neck_roll",)),
     ),
 }
-"""What can be shown of a head that has every joint: one plot a group."""
+"""Groups of joints of a head with all joints; one chart for each."""
 
 
 def groups_of(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
-    """Return what can be shown of a rig: groups of joints that are there, none empty."""
+    """Return the groups of a rig, with its joints only, none empty."""
     there = frozenset(joints)
     menu: dict[str, tuple[ChartGroup, ...]] = {}
     for name, groups in GROUPS.items():
@@ -89,7 +89,7 @@ def groups_of(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
 
 
 class JointSeries:
-    """The joints of the last half minute.
+    """Joint angles of the last half minute.
 
     joints: their names; estimated: those that are not measured
     """
@@ -100,17 +100,17 @@ class JointSeries:
         self.estimated: frozenset[str] = frozenset()
 
     def add(self, snapshot: Snapshot) -> None:
-        """Add what a snapshot brings and forget what has become too old."""
-        if snapshot.joints != self.joints:  # of another rig the rows would not fit
+        """Add a snapshot and remove old ones."""
+        if snapshot.joints != self.joints:  # rows of another rig have other joints
             self._rows.clear()
             self.joints = snapshot.joints
         self.estimated = frozenset(snapshot.estimated)
         for row in snapshot.trail:
-            if self._rows and row.t_s < self._rows[-1].t_s:  # the rig's clock was started again
+            if self._rows and row.t_s < self._rows[-1].t_s:  # the rig's clock was restarted
                 self._rows.clear()
             self._rows.append(row)
         while len(self._rows) > 1 and self._rows[-1].t_s - self._rows[1].t_s >= TRACE_S:
-            self._rows.popleft()  # one older row closes the axis
+            self._rows.popleft()  # one older row fills the axis
 
     def table(self, over_s: float) -> tuple[Floats, Floats]:
         """Return the last seconds, thinned to MOST_POINTS: times and joints.
@@ -134,10 +134,10 @@ def mean_deg(angles_deg: Floats, group: ChartGroup, joints: tuple[str, ...]) -> 
 
 
 class JointCharts:
-    """Two menus, and a chart for each group of what is chosen.
+    """Two menus, and a chart for each group of the choice.
 
     Args:
-        place: where they stand.
+        place: Container of menus and charts.
     """
 
     def __init__(self, place: Container) -> None:
@@ -149,7 +149,7 @@ class JointCharts:
         self.charts: list[Chart] = []
 
     def show(self, traces: JointSeries) -> None:
-        """Draw the traces as they are now."""
+        """Draw the traces."""
         ago_s, angles_deg = traces.table(SPANS[self.span.value])
         menu = groups_of(traces.joints)
         if not len(ago_s) or not menu:
@@ -164,7 +164,7 @@ class JointCharts:
             chart.draw(x, dict(zip(chart.names(), columns, strict=True)))
 
     def _make(self, wanted: tuple[tuple[ChartGroup, bool], ...]) -> None:
-        """Create the charts again if other groups are chosen, or values are estimated now."""
+        """Create the charts again if other groups are chosen or values become estimated."""
         if wanted == self._drawn:
             return
         for chart in self.charts:
@@ -184,7 +184,7 @@ class JointCharts:
 
 
 def _key(estimated: Sequence[bool]) -> str:
-    """Name the lines that there are."""
+    """Return the names of the lines."""
     shown = [(*line, "&#8212;") for line in _COMMANDS]
     if not all(estimated):
         shown.append((*_MEASURED, "&#8212;"))

@@ -1,6 +1,6 @@
-"""The main sequence as the rig makes it, in the range of people's: speed and length of saccades.
+"""Main sequence of the rig's saccades: peak speed and duration, with the range of people.
 
-The ranges are those that the report judges by (gazerig.robot.analysis.human_norms).
+The ranges are those of the report (gazerig.robot.analysis.human_norms).
 """
 
 from collections import deque
@@ -14,7 +14,7 @@ from gazerig.robot.dashboard.widgets.html import LINE_PX, counted, heading, line
 from gazerig.robot.model.types import SeenSaccade
 
 KEPT = 400
-"""Saccades shown at most, the newest."""
+"""Largest number of saccades shown, the newest ones."""
 
 _LEFT_PX, _RIGHT_PX, _TOP_PX, _FOOT_PX = 38.0, LINE_PX - 10.0, 8.0, 132.0
 _WIDEST_DEG = (5.0, 10.0, 20.0, 40.0, 80.0)
@@ -25,7 +25,7 @@ Curve = Callable[[Floats], Floats]
 
 
 class MainSequenceChart:
-    """Gathers saccades and draws them."""
+    """Chart of the newest saccades."""
 
     def __init__(self) -> None:
         self._seen: deque[SeenSaccade] = deque(maxlen=KEPT)
@@ -37,7 +37,7 @@ class MainSequenceChart:
         self.count += 1
 
     def drawing(self) -> str:
-        """Return both images as HTML."""
+        """Return both charts as HTML."""
         sizes = [s.amplitude_deg for s in self._seen]
         widest = _room(_WIDEST_DEG, sizes)
         speeds = [s.peak_deg_s for s in self._seen]
@@ -59,7 +59,7 @@ class MainSequenceChart:
 
 
 def _room(choices: tuple[float, ...], values: list[float]) -> float:
-    """Return the smallest end of an axis that holds all values, else the largest there is."""
+    """Return the smallest end of an axis that includes all values, else the largest."""
     most = max(values, default=0.0)
     return next((choice for choice in choices if choice >= most), choices[-1])
 

@@ -1,4 +1,4 @@
-"""What people see of the rig beside the view: camera, reasons, traces, figures and health."""
+"""Panels that show the rig: camera, reasons, traces, statistics and health."""
 
 from collections.abc import Callable
 from math import inf
@@ -23,17 +23,17 @@ from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
 
-# What is shown by and by, in frames of the page, of which there are at most 25 a second.
+# Frames of the page between two drawings of an element; the page has at most 25 a second.
 _WORDS_EVERY, _TRACES_EVERY, _FIGURES_EVERY = 3, 4, 25
 
 
 class PanelView:
     """Camera image, alarms, and the drawers Watch, Health and Report.
 
-    A drawer that nobody has open is not drawn.
+    A drawer that no browser has open is not drawn.
 
-    layers: what is to be drawn into the scene, as chosen by the users
-    depth: called whenever a user selects the depth image or the plain one
+    layers: layers of the scene, as selected by the users
+    depth: called when a user selects the depth image or the camera image
     """
 
     def __init__(self, widgets: Widgets) -> None:
@@ -65,7 +65,7 @@ class PanelView:
         report.html(HOW_TO, order=2)
 
     def _begin(self) -> None:
-        """Start all that is gathered from the snapshots."""
+        """Reset all data that is collected from snapshots."""
         self._last_s = -inf
         self._last: Snapshot | None = None
         self._traces = JointSeries()
@@ -74,9 +74,9 @@ class PanelView:
         self.panels.begin()
 
     def update(self, snapshots: tuple[Snapshot, ...]) -> None:
-        """Remember every snapshot for traces and figures, also those that are not drawn.
+        """Add snapshots to traces and statistics, also those that are not drawn.
 
-        One from before the last, of a rig or recording that starts again, resets all.
+        One with an earlier time than the last, after a restart, resets all.
         """
         if snapshots:
             self.silence.content = ""
@@ -95,7 +95,7 @@ class PanelView:
                     self._dwell.update(event)
 
     def show(self) -> None:
-        """Draw the newest words and, less often, traces, strip and figures."""
+        """Draw the newest text and, less often, traces, strip and statistics."""
         if (snapshot := self._last) is None:
             return
         before, self._open = self._open, frozenset(filter(self._widgets.sees, PANELS))
@@ -118,11 +118,11 @@ class PanelView:
         self._shown += 1
 
     def silent(self) -> None:
-        """Show that the rig sends nothing any more, until it does again."""
+        """Show that the rig sends no data, until it does again."""
         self.silence.content = silence()
 
     def draw_all(self) -> None:
-        """Draw everything at the next frame, whichever element is due."""
+        """Draw all elements at the next frame."""
         self._shown = 0
 
     def show_jpeg(self, jpeg: bytes) -> None:
@@ -134,7 +134,7 @@ class PanelView:
         self.image.show(encode(bgr))
 
     def _draw_figures(self) -> None:
-        """Draw what grows as the rig runs."""
+        """Draw the statistics of the run."""
         if "report" in self._open:
             self.figures.content = self._figures.table(self._dwell)
         if "watch" not in self._open:
@@ -156,7 +156,7 @@ class PanelView:
 
 
 def of_what(snapshot: Snapshot) -> str:
-    """Return a remark that eye movements are estimated, "" if they are measured."""
+    """Return a note that eye movements are estimated, "" if they are measured."""
     if not any("eye" in joint for joint in snapshot.estimated):
         return ""
     return note(
@@ -173,4 +173,4 @@ def _setter(layers: OverlayChoices, name: str) -> Callable[[bool, str], None]:
 
 
 def _ignore(wanted: bool) -> None:
-    """Do nothing: there is no receiver."""
+    """Do nothing, without a receiver."""

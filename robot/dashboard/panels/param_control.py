@@ -1,4 +1,4 @@
-"""One parameter as a control: a slider, a tick box, a choice or a line of text."""
+"""Control of one parameter: a slider, a checkbox, a choice or a line of text."""
 
 import json
 from collections.abc import Callable
@@ -10,11 +10,11 @@ from gazerig.robot.dashboard.widgets.widget import Checkbox, Choice, Slider, Tex
 from gazerig.robot.model.parameter import Parameter
 
 Put = Callable[[str, object], None]
-"""Asks for another value: key, value."""
+"""Requests another value: key, value."""
 
 _SLIDER_STEPS = 500
 _FAR = 20.0
-"""A range this many times wider than the value needs a number typed, not a slider."""
+"""Ratio of range to value from which a number is typed instead of set by a slider."""
 
 
 def hint(param: Parameter) -> str:
@@ -25,21 +25,21 @@ def hint(param: Parameter) -> str:
         parts.append(f"from {param.low:g} to {param.high:g}{unit}")
     if param.choices:
         parts.append("one of " + ", ".join(map(str, param.choices)))
-    if param.default is not None or param.optional:  # else the shipped rig has no such joint or bus
+    if param.default is not None or param.optional:  # the shipped rig may have no such joint or bus
         parts.append(f"default {written(param, param.default)}{unit}")
     parts.append(f"in force at the {param.live}")
     return "; ".join(parts)
 
 
 def label(param: Parameter, unsaved: bool) -> str:
-    """Name a control: the last parts of the key, its unit, a mark where it is not saved."""
+    """Return a control's label: the last parts of the key, its unit, a mark if it is unsaved."""
     unit = f" ({param.unit})" if param.unit else ""
     name = ".".join(param.key.split(".")[-2:])
     return f"{'● ' if unsaved else ''}{name}{unit}"
 
 
 def step_of(low: float, high: float) -> float:
-    """Return a slider's step: 1, 2 or 5 times a power of ten, some hundreds to the range."""
+    """Return a slider's step: 1, 2 or 5 times a power of ten, some hundreds in the range."""
     fine = (high - low) / _SLIDER_STEPS
     ten = 10.0 ** floor(log10(fine))
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
@@ -49,7 +49,7 @@ def slides(param: Parameter, value: object) -> bool:
     """Return whether a slider can set a parameter finely enough."""
     if param.kind not in ("number", "whole") or isinstance(value, bool):
         return False
-    if param.optional and param.default is None:  # a slider cannot be put back to null
+    if param.optional and param.default is None:  # a slider cannot be set to null
         return False
     low, high = param.low, param.high
     if low is None or high is None or not low < high or not isinstance(value, int | float):
@@ -59,7 +59,7 @@ def slides(param: Parameter, value: object) -> bool:
 
 
 def written(param: Parameter, value: object) -> str:
-    """Write a value as a person types it: text as it is, everything else as in the file."""
+    """Return a value as a person types it: text unchanged, other values as in the file."""
     if isinstance(value, str) and param.kind in ("text", "choice"):
         return value
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
@@ -68,10 +68,10 @@ def written(param: Parameter, value: object) -> str:
 
 
 def read(param: Parameter, text: str) -> object:
-    """Read what a person typed.
+    """Parse text that a person typed.
 
     Raises:
-        ValueError: it is nothing of the kind; the message says what would be.
+        ValueError: it is not of the parameter's kind; the message describes valid values.
     """
     text = text.strip()
     if param.optional and text in ("null", ""):
@@ -88,13 +88,14 @@ def read(param: Parameter, text: str) -> object:
 
 
 class ParamControl:
-    """A parameter's control in one browser.
+    """Control of a parameter in one browser.
 
     Args:
-        place: where it is added.
+        place: Container of the control.
         param: the parameter.
-        value: the one in force; unsaved: whether it differs from the file's.
-        put: called when a person asks for another value.
+        value: Present value.
+        unsaved: Whether it differs from the file's.
+        put: Called when a person sets another value.
         refuse: called with words when what was typed cannot be read.
         order: its place among the others.
     """
@@ -138,7 +139,7 @@ class ParamControl:
         )
 
     def _asked(self, shown: object) -> None:
-        """Ask for what a person has set."""
+        """Request the value that a person has set."""
         try:
             value = self._meant(shown)
         except ValueError as error:
@@ -147,7 +148,7 @@ class ParamControl:
             self._put(self.param.key, value)
 
     def _meant(self, shown: object) -> object:
-        """Return the choice that a name stands for, what a text says, or the value itself.
+        """Return the choice of a name, the value of a text, or the value itself.
 
         Raises:
             ValueError: the text cannot be read.
@@ -157,7 +158,7 @@ class ParamControl:
         return next((c for c in self.param.choices if str(c) == shown), shown)
 
     def show(self, value: object, unsaved: bool) -> None:
-        """Show the value in force."""
+        """Show the present value."""
         self.field.label = label(self.param, unsaved)
         if isinstance(self.field, TextField):
             self.field.value = written(self.param, value)

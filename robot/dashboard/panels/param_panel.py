@@ -1,7 +1,7 @@
-"""All parameters as controls, in every browser its own: a group of them at a time.
+"""Parameters as controls, separately in each browser, one group at a time.
 
 A rig has some five hundred parameters. Their controls are built when a group is chosen or
-something is searched for, never all: a browser takes seconds to build so many.
+it is searched for, never all: a browser takes seconds to build all of them.
 """
 
 import threading
@@ -27,13 +27,13 @@ _REVERT: dict[str, object] = {"do": "revert"}
 
 
 class ParamState:
-    """The parameters, and one panel of controls for each browser."""
+    """Parameters, and one panel of controls for each browser."""
 
     def __init__(self, widgets: Widgets, place: Container, outbox: Outbox) -> None:
         self._widgets, self._place, self._outbox = widgets, place, outbox
         self._params: dict[str, Parameter] = {}
         self._panels: dict[str, ParamPanel] = {}
-        # What people do, and that they come and go, is told in a thread of its own.
+        # Input, and browsers that connect and disconnect, are handled in a separate thread.
         self._lock = threading.RLock()
         self.in_force: dict[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
@@ -43,7 +43,7 @@ class ParamState:
         widgets.on_leave(self._forget)
 
     def leave(self) -> None:
-        """Have no parameters any more."""
+        """Remove all parameters."""
         with self._lock:
             self._over = True
             self._panels.clear()
@@ -71,7 +71,7 @@ class ParamState:
                 panel.offer(self._params)
 
     def values(self, state: Mapping[str, object]) -> None:
-        """Update changed values, what is not saved, and the file that save would write."""
+        """Update changed values, unsaved values, and the file that save would write."""
         with self._lock:
             self.in_force.update(cast(Mapping[str, object], state.get("values", {})))
             self._unsaved = frozenset(cast(Iterable[str], state.get("unsaved", ())))
@@ -80,7 +80,7 @@ class ParamState:
                 panel.take(self.in_force, self._unsaved, self._path)
 
     def answered(self, who: str) -> None:
-        """Record that the rig has answered who asked for a change."""
+        """Record that the rig has answered a browser's change."""
         client, _, of_tuning = who.partition(":")
         with self._lock:
             panel = self._panels.get(client)
@@ -89,12 +89,12 @@ class ParamState:
 
 
 class ParamPanel:
-    """The controls of one browser; parameters come when they are chosen.
+    """Controls of one browser, built when a group is chosen.
 
     Args:
         widgets: all panels.
         client: the browser's tab.
-        place: where the controls stand.
+        place: Container of the controls.
         outbox: takes requests for the rig.
         lock: held by who changes the panels.
     """
@@ -143,19 +143,19 @@ class ParamPanel:
         self._show_chosen()
 
     def offer(self, params: Mapping[str, Parameter]) -> None:
-        """Set the parameters that there are."""
+        """Set the available parameters."""
         self._params = params
         groups = tuple(dict.fromkeys(group_of(param) for param in params.values()))
         self._group.options = (NOTHING, UNSAVED, DIFFERENT, *groups)
 
     def take(self, values: Mapping[str, object], unsaved: frozenset[str], path: str) -> None:
-        """Update the values in force; a control that is being moved keeps its value."""
+        """Update the present values; a control that is being moved keeps its value."""
         self._values, self._unsaved = values, unsaved
         some = f"<b>● {len(unsaved)} not saved</b>" if unsaved else "all saved"
         self._words.content = (
             f"<div>{len(self._params)} parameters, {some}</div><div>{escape(path)}</div>"
         )
-        if len(values) != self._known:  # the first come after the browser
+        if len(values) != self._known:  # the first arrive after the browser
             self._known = len(values)
             self._show_chosen()
         if not self._unanswered:
@@ -197,7 +197,7 @@ class ParamPanel:
         self._widgets.notify(refusal, self._client, refused=True)
 
     def _show_chosen(self) -> None:
-        """Build the controls of what is searched for, or of the chosen group."""
+        """Build the controls of the search result or of the chosen group."""
         with self._lock:
             wanted = self._chosen()
             for key in [key for key in self._controls if key not in wanted[:MOST_SHOWN]]:
@@ -233,12 +233,12 @@ class ParamPanel:
 
 
 def group_of(param: Parameter) -> str:
-    """Return the group a parameter is listed in: as in the file, two names deep."""
+    """Return the group of a parameter: its section of the file, at most two names deep."""
     return ".".join(param.group.split(".")[:2]) if param.group else "rig"
 
 
 def found(text: str, params: Iterable[Parameter]) -> list[str]:
-    """Return the keys in which, with what they mean, every word of a text occurs."""
+    """Return the keys that contain, with description and unit, every word of a text."""
     words = text.lower().split()
     return [
         param.key

@@ -1,4 +1,4 @@
-"""The five buttons under the head: which this rig cannot do, and why."""
+"""Five buttons under the head: reasons why a rig cannot do some of them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,11 +13,11 @@ _NO_JOINTS = "this rig has none of the joints that it moves"
 def refused_moves(
     menus: Mapping[str, Sequence[str]], joints: Sequence[str] | None
 ) -> dict[str, str]:
-    """Return the buttons that do nothing on this rig, with the reason for each.
+    """Return button -> reason of the buttons that this rig cannot do.
 
     Args:
-        menus: what the rig offers, as it came; empty before it has come.
-        joints: the rig's; None before they are known.
+        menus: Menus of the rig; empty before they are received.
+        joints: Names of the rig's joints; None before they are known.
     """
     if not menus:
         return {}

@@ -1,7 +1,7 @@
-"""The page's panel for a recording: a time slider, play and pause, speed, steps, what happened.
+"""Panel of a recording: a time slider, play and pause, speed, steps, events.
 
-What a person does is only told to the rig's side, which plays; what is shown here is what
-it says back, so that every browser shows the same.
+Input of users goes to the rig's process, which plays. This panel shows only the state that it
+returns, so that every browser shows the same.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,11 +12,11 @@ from gazerig.robot.dashboard.feed.page_process import MARK_KINDS, SPEEDS
 from gazerig.robot.dashboard.widgets.container import Container
 
 Tell = Callable[[str, Mapping[str, object]], None]
-"""Hands what a person asks for to the rig's side: the browser's tab, and the request."""
+"""Sends a user's request to the rig's process: the browser's tab, and the request."""
 
 _WIDTH, _HEIGHT = 340, 26
 _ROWS = (("saccade", "saccade", 0, 12), ("blink", "pursue", 13, 6), ("event", "alarm", 20, 6))
-"""Kind of mark, its colour, and where its row is."""
+"""Kind of mark, its colour, and the position of its row."""
 _EVENTS_BEFORE, _EVENTS_AFTER = 2, 2
 _STEP_S = 0.005
 _WORDS = 90
@@ -24,11 +24,11 @@ _PLAY, _PAUSE = "play", "pause"
 
 
 class ReplayView:
-    """The controls of a recording that is shown.
+    """Controls of a recording that is shown.
 
     Args:
-        place: where they stand.
-        tell: takes what people ask for.
+        place: Container of the controls.
+        tell: Receives requests of users.
         duration_s: length of the recording.
     """
 
@@ -74,7 +74,7 @@ class ReplayView:
         self._tell(client, {"replay": asked})
 
     def show(self, state: Mapping[str, Any]) -> None:
-        """Show where it stands, as gazerig.robot.recording.replay writes it: a player's State.
+        """Show the player's state, as gazerig.robot.recording.replay sends it.
 
         Once there are also marks, counts along the recording by kind, and events, (at_s, words).
         """
@@ -83,7 +83,7 @@ class ReplayView:
         if (events := state.get("events")) is not None:
             self._events = [(float(at_s), str(text)) for at_s, text in events]
         at_s, sought_s = float(state["at_s"]), state["sought_s"]
-        # While a hand moves the slider, what is played is behind it and must not pull it back.
+        # The played position lags behind a slider that is being moved and must not reset it.
         if self._asked_s is None or sought_s == self._asked_s:
             self._asked_s = None
             self.slider.value = min(round(at_s, 3), self._duration_s)
@@ -101,7 +101,7 @@ class ReplayView:
 
 
 def strip(marks: Mapping[str, Sequence[int]]) -> str:
-    """Draw how many saccades, blinks and events there are along the recording, as SVG.
+    """Return the density of saccades, blinks and events along the recording, as SVG.
 
     marks: counts of equal shares of the recording, by kind
     """
@@ -120,7 +120,7 @@ def strip(marks: Mapping[str, Sequence[int]]) -> str:
 
 
 def _bars(counts: Sequence[int], colour: str, top: int, height: int) -> str:
-    """Draw one row: a bar a share of the recording, the darker the more happened in it."""
+    """Return one row of bars, darker for parts of the recording with more marks."""
     most, width = max(counts, default=0), _WIDTH / max(len(counts), 1)
     return "".join(
         f"<rect x='{i * width:.1f}' y='{top}' width='{width:.1f}' height='{height}' "
@@ -137,13 +137,13 @@ def place_words(at_s: float, duration_s: float, playing: bool) -> str:
 
 
 def clock(seconds: float) -> str:
-    """Write seconds as minutes and seconds, e.g. "1:02.345"."""
+    """Return seconds as minutes and seconds, e.g. "1:02.345"."""
     thousandths = round(seconds * 1e3)
     return f"{thousandths // 60000}:{thousandths % 60000 / 1e3:06.3f}"
 
 
 def event_list(events: Sequence[tuple[float, str]], at_s: float) -> str:
-    """List the events about a time: the last two, and the next two paler."""
+    """Return the events around a time as HTML: the last two, and the next two paler."""
     past = [e for e in events if e[0] <= at_s + 1e-6][-_EVENTS_BEFORE:]
     coming = [e for e in events if e[0] > at_s + 1e-6][:_EVENTS_AFTER]
     rows = [_event(*event, "past") for event in past]

@@ -1,7 +1,7 @@
-"""The figures of the run so far against the ranges of people, for the drawer Report.
+"""Measures of the present run with the ranges of people, for the drawer Report.
 
-They are counted from the eye movements that the page is told of. The report of a recording
-measures the same and more from every tick; its bands are used here.
+They are computed from the eye movements in the snapshots. The report of a recording computes
+these and more from every tick; its bands are used here.
 """
 
 from html import escape
@@ -15,13 +15,13 @@ from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.model.types import SeenBlink, SeenSaccade, Snapshot
 
 LEAST_DEG = 1.0
-"""Smaller saccades are left out, as in the report: encoder steps shape what is measured."""
+"""Smallest saccade that counts, deg, as in the report: encoder steps distort smaller ones."""
 
 _SMALL_PEAK_DEG, _SMALL_DURATION_DEG, _LARGE_DEG = 8.0, 12.0, 15.0
 _SOON_S, _PAUSE_S = 0.1, 2.0
 _LEAST_RATE_S = 60.0
 _SURE = 1.96
-"""So many standard errors beyond a range are chance in one of twenty cases."""
+"""Distance to a range, in standard errors, that is chance in one of twenty cases."""
 _TALKING = ("talk", "listen", "think")
 
 HOW_TO = note(
@@ -32,7 +32,7 @@ HOW_TO = note(
 
 
 class RunFigure(NamedTuple):
-    """One measure: how much, and of how many events."""
+    """Measure: its value and its number of events."""
 
     key: str
     value: float
@@ -40,10 +40,10 @@ class RunFigure(NamedTuple):
 
 
 class RunFigures:
-    """Counts eye movements since the start."""
+    """Counter of eye movements since the start."""
 
     def __init__(self) -> None:
-        self._inside: dict[str, list[int]] = {}  # key -> how many inside, of how many
+        self._inside: dict[str, list[int]] = {}  # key -> number inside, total number
         self._first_s: float | None = None
         self._now_s = 0.0
         self._blinks = self._saccades = 0
@@ -51,7 +51,7 @@ class RunFigures:
         self._talking = False
 
     def update(self, snapshot: Snapshot) -> None:
-        """Add what a snapshot brings."""
+        """Add a snapshot."""
         if self._first_s is None:
             self._first_s = snapshot.t_s
         self._now_s = snapshot.t_s
@@ -86,7 +86,7 @@ class RunFigures:
         counts[1] += 1
 
     def figures(self, dwell: DwellChart) -> list[RunFigure]:
-        """Return what there is to say; dwell: the rests on parts of faces."""
+        """Return all measures; dwell: fixations on parts of faces."""
         seconds = self._now_s - self._first_s if self._first_s is not None else 0.0
         found = [RunFigure(key, inside / n, n) for key, (inside, n) in self._inside.items()]
         if seconds > 0.0:
@@ -100,7 +100,7 @@ class RunFigures:
         return sorted(found, key=lambda figure: order.index(figure.key))
 
     def table(self, dwell: DwellChart) -> str:
-        """Return the figures as HTML."""
+        """Return the measures as HTML."""
         rows = "".join(_row(figure, BY_KEY[figure.key]) for figure in self.figures(dwell))
         if not rows:
             return note("no eye movement has been seen yet")
@@ -113,9 +113,9 @@ class RunFigures:
 
 
 def judged(figure: RunFigure, band: NormBand) -> str:
-    """Return in words how a measure stands to the range of people.
+    """Return the relation of a measure to the range of people as text.
 
-    As in the report nothing is called outside that so few events may have put there by chance.
+    As in the report, a measure is not called outside if its distance may be chance.
     """
     if figure.events < band.least:
         return f"too few: {figure.events} of {band.least}"
@@ -130,7 +130,7 @@ def judged(figure: RunFigure, band: NormBand) -> str:
 
 
 def _row(figure: RunFigure, band: NormBand) -> str:
-    """Return one measure, what is found here, and the range of people."""
+    """Return the row of one measure: its value and the range of people."""
     verdict = judged(figure, band)
     kind = " class='near'" if verdict == "outside" else ""
     unit, factor = ("%", 100.0) if band.unit == "share" else (band.unit, 1.0)

@@ -1,4 +1,4 @@
-"""The machine's health: guard, loop and frame in a few lines, every servo in a table."""
+"""Health of the rig: guard, loop and frame in a few lines, every servo in a table."""
 
 from html import escape
 from typing import Literal
@@ -13,18 +13,18 @@ from gazerig.robot.dashboard.widgets.html import LEVELS, heading, note, pill
 from gazerig.robot.model.types import LoopFigures, Servos, Snapshot
 
 Strain = Literal["", "near", "over"]
-"""How a figure stands to its limit."""
+"""Relation of a value to its limit."""
 
 _OLD_S = 0.15
 _HARD_LOAD = 0.9
 _LATE_SHARE = 0.5
 
 NO_FEEDBACK = "no feedback"
-"""Said in the place of figures that a servo does not tell."""
+"""Text in the place of values that a servo does not report."""
 
 
 def health(snapshot: Snapshot) -> str:
-    """Return everything of the machine's health."""
+    """Return the health of the rig as HTML."""
     return (
         guard(snapshot)
         + heading("servos")
@@ -40,7 +40,7 @@ def health(snapshot: Snapshot) -> str:
 
 
 def guard(snapshot: Snapshot) -> str:
-    """Return what the guard does and why, in a place that does not grow when it limits a joint."""
+    """Return the guard's action and reasons as HTML of constant height."""
     level = "stopped" if snapshot.stopped else snapshot.level
     if snapshot.stopped:
         said = f"<div>{escape(snapshot.stopped)}</div>"
@@ -53,9 +53,9 @@ def guard(snapshot: Snapshot) -> str:
 
 
 def servo_table(servos: Servos, joints: tuple[str, ...], estimated: tuple[str, ...] = ()) -> str:
-    """Return a row a joint: temperature, load, voltage, ticks without an answer, faults.
+    """Return one row for each joint: temperature, load, voltage, unanswered ticks, faults.
 
-    estimated: joints whose servos tell nothing
+    estimated: joints whose servos report nothing
     """
     if not servos.age_s:
         return note("nothing is known of the servos yet")
@@ -105,7 +105,7 @@ def _figures(servos: Servos, i: int) -> str:
 
 
 def _said(servos: Servos, i: int) -> str:
-    """Return what is wrong with a servo."""
+    """Return a servo's fault, silence or missing torque as text, "" if it is well."""
     if servos.fault and servos.fault[i]:
         return servos.fault[i]
     if servos.age_s[i] > _OLD_S:
@@ -114,7 +114,7 @@ def _said(servos: Servos, i: int) -> str:
 
 
 def strain_of_heat(servos: Servos, i: int) -> Strain:
-    """Return how a servo's temperature stands to what the guard bears."""
+    """Return the relation of a servo's temperature to the limits of the guard."""
     warmth, limits = _at(servos.temperature_c, i), servos.limits
     if warmth is None or limits is None:
         return ""
@@ -122,7 +122,7 @@ def strain_of_heat(servos: Servos, i: int) -> Strain:
 
 
 def strain_of_load(servos: Servos, i: int) -> Strain:
-    """Return how a servo's load stands to what may last."""
+    """Return the relation of a servo's load to its continuous limit."""
     load, limits = _at(servos.load, i), servos.limits
     if load is None or limits is None:
         return ""
@@ -130,7 +130,7 @@ def strain_of_load(servos: Servos, i: int) -> Strain:
 
 
 def strain_of_voltage(servos: Servos, i: int) -> Strain:
-    """Return how a servo's voltage stands to its own limits."""
+    """Return the relation of a servo's voltage to its limits."""
     volts, limits = _at(servos.voltage_v, i), servos.limits
     if volts is None or limits is None:
         return ""
@@ -164,7 +164,7 @@ def _timing(timing: LoopFigures | None) -> str:
 
 
 def _beside_age(perception: str) -> str:
-    """Return what is said of perception without the frame's age, which has a line of its own."""
+    """Return the text about perception without the frame's age, which has its own line."""
     first, _, others = perception.partition(" | ")
     return others if first.startswith(("frame ", "no frame")) else perception
 

@@ -1,4 +1,4 @@
-"""What is wrong with the rig, in a few words; where nothing is, nothing is said."""
+"""Short messages about faults of the rig, empty without any."""
 
 from html import escape
 
@@ -11,13 +11,13 @@ _STANDS_STILL = {
     "torque_off": "guard: torque off - joints are let go",
 }
 OLD_FRAME_S = 0.5
-"""From this age on a frame is called old: the guard stops the neck at three times that."""
+"""Age from which a frame is old, s; the guard stops the neck at three times that."""
 
 
 def alarms(snapshot: Snapshot) -> str:
-    """Return banners for joints that are held and for an old frame, "" where all is well.
+    """Return banners for held joints and an old frame, "" without faults.
 
-    That the rig is stopped is said beside the stop button.
+    The stop button shows that the rig is stopped.
     """
     said, kind = "", LEVELS[snapshot.level]
     if not snapshot.stopped and snapshot.level in ("hold", "torque_off"):
@@ -31,12 +31,12 @@ def alarms(snapshot: Snapshot) -> str:
 
 
 def other_heads(snapshot: Snapshot) -> str:
-    """Return what the other heads of the same world do, a line each, "" where there are none."""
+    """Return the activity of the other heads of the same world, one line each."""
     return "".join(one_line(f"{other.name}: {other.headline}") for other in snapshot.others)
 
 
 def silence() -> str:
-    """Return a message that the rig sends nothing any more."""
+    """Return a message that the rig sends no data."""
     return note(
         "silent: nothing has come from the rig for a second; what is shown is the last that was "
         "seen"
@@ -46,8 +46,7 @@ def silence() -> str:
 def drawn_together(reasons: tuple[str, ...]) -> str:
     """Return each reason once, with its first joint and the number of others.
 
-    For example "too fast (neck_yaw, +2)": a limitation that lasts a moment must not move what is
-    below it under the user's finger.
+    For example "too fast (neck_yaw, +2)": a short limitation must not move the elements below it.
     """
     joints: dict[str, list[str]] = {}
     for reason in reasons:
@@ -60,7 +59,7 @@ def drawn_together(reasons: tuple[str, ...]) -> str:
 
 
 def one_line(text: str) -> str:
-    """Cut words at the panel's edge; the mouse shows all of them."""
+    """Return text that is cut at the panel's edge, with all of it as tooltip."""
     said = escape(text)
     return f"<div class='line' title='{said}'>{said}</div>"
 

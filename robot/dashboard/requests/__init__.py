@@ -1,1 +1,1 @@
-"""What people do at the page, checked and handed to the rig."""
+"""Input of the page's users, checked and sent to the rig."""

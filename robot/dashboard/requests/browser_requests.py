@@ -1,4 +1,4 @@
-"""What a browser may ask of the rig over the page's door: small JSON objects, checked."""
+"""Requests of browsers to the rig through the page's door: small, checked JSON objects."""
 
 import json
 from collections.abc import Mapping
@@ -7,15 +7,15 @@ from typing import NoReturn
 from gazerig.robot.model.commands import COMMANDS, Leading
 
 ASKED_BYTES = 2048
-"""Longest request; a stop with its reason has a hundred bytes."""
+"""Longest request, bytes; a stop with its reason has a hundred."""
 
 _LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, Leading))
 _SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
-"""Commands that carry who asks."""
+"""Commands with the name of the client."""
 
 
 def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
-    """Return a request with who asks written in, None where it is none.
+    """Return a request with the browser's name written in, None if it is not valid.
 
     Args:
         body: as it came
@@ -35,7 +35,7 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
 
 
 def leads(asked: Mapping[str, object]) -> bool:
-    """Return whether a request makes who asks the one that leads the head."""
+    """Return whether a request gives its browser control of the head."""
     return "pick" in asked or asked.get("do") in _LEADING
 
 
@@ -45,5 +45,5 @@ def compact(asked: Mapping[str, object]) -> bytes:
 
 
 def _no_number(word: str) -> NoReturn:
-    """Refuse NaN and Infinity, which are no JSON."""
+    """Refuse NaN and Infinity, which are not JSON."""
     raise ValueError(f"{word} is no number of JSON")

@@ -1,4 +1,4 @@
-"""A click in the camera frame -> the point of the world that was clicked on."""
+"""Conversion of a click in the camera image to a point in the world."""
 
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.tick import Tick
@@ -6,7 +6,7 @@ from gazerig.robot.perception.pixel_to_world import PixelToWorld
 
 
 class ClickToLook:
-    """Knows the newest frame and where the camera was when it was taken.
+    """Stores the newest frame and the pose of the camera at its capture.
 
     Args:
         pixels: places pixels in the world.
@@ -19,7 +19,7 @@ class ClickToLook:
         self.newest: Tick | None = None
 
     def point(self, x: float, y: float) -> Vec3 | None:
-        """Return the point of the world at a place of the newest frame, None without one.
+        """Return the world point at a position in the newest frame, None without one.
 
         x, y: 0..1 from the left and from the top
         """

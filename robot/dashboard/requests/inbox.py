@@ -1,8 +1,8 @@
-"""Receives requests of the page beside the control loop: urgent ones are handled at once.
+"""Inbox of the page's requests, outside the control loop; urgent ones are handled first.
 
 One thread waits on the socket and handles commands the moment they come, so that a stop is
-obeyed at the next tick. What may take long, such as checking a changed parameter, is
-handled by a second thread, and a stop never waits behind it.
+executed at the next tick. Slow requests, such as the check of a changed parameter, are
+handled by a second thread, and a stop never waits for them.
 """
 
 import contextlib
@@ -18,19 +18,19 @@ from gazerig.robot.model.commands import COMMANDS
 REQUEST = b"t"
 """First byte of a request of a user of the page."""
 BEAT = b"b"
-"""All of a message that says that the page draws and serves browsers."""
+"""Complete message of a page that draws and serves browsers."""
 PICTURE = b"j"
-"""First byte of a picture of a browser's own camera."""
+"""First byte of an image of a browser's webcam."""
 MESSAGE_BYTES = 200_000
-"""No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
+"""Longest message, bytes; a socket's default send buffer in Linux has 212,992."""
 
 _URGENT = tuple(f'{{"do":"{name}"'.encode() for name in COMMANDS if name != "tune")
 _CHANGE = b'{"do":"set",'
 _OVER = b""
 _MOST_WAITING = 100
-"""Requests that wait for the slow thread; one more is refused."""
+"""Largest number of requests that wait for the slow thread; one more is refused."""
 _CHANGES_EVERY_S = 0.1
-"""A change costs a few ms of processor in all, which the control loop has to share."""
+"""Time between changes, s; each takes a few ms of the processor from the control loop."""
 _CLOSE_TIMEOUT_S = 2.0
 
 
@@ -50,7 +50,7 @@ def parse_request(message: bytes) -> tuple[str, bytes]:
 
 
 def overtaken(earlier: bytes, later: bytes) -> bool:
-    """Return whether a change of a parameter need not be made, as a later one makes it again."""
+    """Return whether a later change of the same parameters replaces an earlier one."""
     who, first = parse_request(earlier)
     again, second = parse_request(later)
     if who != again or not (first.startswith(_CHANGE) and second.startswith(_CHANGE)):
@@ -135,7 +135,7 @@ class Inbox:
         while waiting[0]:
             while len(waiting) < _MOST_WAITING and not self._later.empty():
                 waiting.append(self._later.get())
-            # A slider that is dragged sends more than can be checked: its last word counts.
+            # A dragged slider sends more than can be checked: only its last value counts.
             message = waiting.pop(0)
             if not any(overtaken(message, later) for later in waiting if later):
                 self._take(message)
@@ -145,7 +145,7 @@ class Inbox:
                 waiting.append(self._later.get())
 
     def close(self) -> None:
-        """Stop listening; the socket itself stays the caller's."""
+        """Stop listening; the caller closes the socket."""
         self._over.set()
         try:
             self._link.shutdown(socket.SHUT_RDWR)  # wakes the thread that waits on it

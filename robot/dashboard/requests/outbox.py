@@ -1,4 +1,4 @@
-"""The page's voice: what people do in their browsers goes to the rig from here."""
+"""Outbox of the page: sends the requests of browsers to the rig."""
 
 import contextlib
 import json
@@ -13,15 +13,15 @@ from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Command, Leading
 
 DOOR = "door"
-"""Who asks where it is the stop button or a click in the image."""
+"""Name of the sender for the stop button and clicks in the image."""
 
 
 _PER_S, _BURST = 100.0, 200.0
-"""Requests of all browsers together; each drags one thing, at some 20 changes a second."""
+"""Rate limit of all browsers together; dragging sends some 20 changes a second."""
 
 
 def _unnamed(client: str) -> str:
-    """Return no name: it is unknown which browser a client is."""
+    """Return "": the browser of a client is unknown."""
     return ""
 
 
@@ -32,7 +32,7 @@ class Outbox:
         feed: to the rig.
         clock: of the page.
         name: returns the name of the browser of a client of the page.
-        leads: receives the name of a browser that leads the head now.
+        leads: Receives the name of the browser in control of the head.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Outbox:
         self.name, self._leads = name, leads
 
     def command(self, command: Command, who: str) -> bool:
-        """Return a command; False where the rig does not take it now."""
+        """Send a command; return False if the rig does not accept it now."""
         if isinstance(command, Leading):
             self._leads(self.name(who))
             command = command._replace(who=self.name(who))
@@ -60,7 +60,7 @@ class Outbox:
         return self.hand_on(json.dumps(data, separators=(",", ":")).encode(), who)
 
     def picture(self, jpeg: bytes) -> bool:
-        """Hand on a picture of a browser's own camera; False where the rig does not take it."""
+        """Send an image of a browser's webcam; return False if the rig does not accept it."""
         try:
             self._feed.send(PICTURE + jpeg, DONT_WAIT)
         except OSError:  # full, gone, or too long
@@ -73,14 +73,14 @@ class Outbox:
             self._feed.send(BEAT, DONT_WAIT)
 
     def hand_on(self, data: bytes, who: str = DOOR) -> bool:
-        """Hand on a compact JSON object."""
+        """Send a compact JSON object."""
         message = request_message(who, data)
         with self._lock:
             if len(message) > MESSAGE_BYTES or not self._rate.take(self._clock.now_s()):
                 return False
         try:
-            # A rig that takes nothing must not hold up the others who ask.
+            # A rig that accepts nothing must not delay other requests.
             self._feed.send(message, DONT_WAIT)
-        except OSError:  # full, or gone: then the page ends by itself
+        except OSError:  # full, or closed: then the page ends
             return False
         return True

@@ -1,7 +1,7 @@
-"""A pointer over the view -> a point of the world between viewer and head, to be looked at.
+"""Conversion of a pointer over the view to a gaze target between viewer and head.
 
 The eyes seem to look at the pointer because they look at a point of the line of sight on which
-the viewer sees it. A pointer leads only as long as its points come: without one for a second the
+the viewer sees it. A pointer controls the gaze only while its points arrive: after a second the
 gaze is free again.
 """
 
@@ -15,15 +15,15 @@ from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
 
 PER_S, BURST = 40.0, 40.0
-"""Points of all browsers together; one sends 20 a second."""
+"""Rate limit of points of all browsers together; one sends 20 a second."""
 TOWARDS_HEAD = 0.6
-"""Where the plane stands on which the pointer moves: this share of the way to the head."""
+"""Position of the pointer's plane, as a share of the distance to the head."""
 _NEAREST_M = 0.02
-_WIDEST, _NARROWEST = 10.0, 0.1  # width of the view by its height
+_WIDEST, _NARROWEST = 10.0, 0.1  # aspect ratios of the view
 
 
 class ViewCamera(NamedTuple):
-    """From where a browser sees the scene.
+    """Camera of a browser's view of the scene.
 
     R_world_camera: x right, y down, z ahead; fov_rad: from the upper to the lower edge
     """
@@ -42,7 +42,7 @@ class Pointer(NamedTuple):
 
 
 def pointer_of(asked: object) -> Pointer | None:
-    """Return the pointer that a browser sent, None where it is none."""
+    """Return the pointer that a browser sent, None if it is not valid."""
     match asked:
         case {"x": int() | float() as x, "y": int() | float() as y, "aspect": int() | float() as a}:
             pointer = Pointer(float(x), float(y), float(a))
@@ -53,11 +53,11 @@ def pointer_of(asked: object) -> Pointer | None:
 
 
 def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Vec3 | None:
-    """Return the point of the world, None where the viewer is inside the head.
+    """Return the point in the world, None if the viewer is inside the head.
 
     Args:
         pointer: over the view.
-        camera: from where the view is seen.
+        camera: Camera of the view.
         p_world_eyes_m: the middle between the eyes, world frame.
     """
     to_head = sub(p_world_eyes_m, camera.p_world_m)
@@ -75,10 +75,10 @@ def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Ve
 
 
 class PointerToLook:
-    """Turns pointers into what to look at; from any thread.
+    """Converts pointers to gaze targets; safe to call from any thread.
 
     Args:
-        camera: returns from where a browser sees the scene, None where that is not known.
+        camera: Returns the camera of a browser's view, None if unknown.
         look: hands a point to the rig, with the name of the browser.
         clock: limits how many are handed on.
 
@@ -97,10 +97,10 @@ class PointerToLook:
         self.p_world_eyes_m: Vec3 | None = None
 
     def take(self, asked: object, who: str) -> bool:
-        """Hand on where a browser's pointer is; False where it leads nowhere.
+        """Send the target of a browser's pointer; return False if there is none.
 
         Args:
-            asked: as the browser sent it.
+            asked: Pointer as the browser sent it.
             who: the name of the browser.
         """
         pointer, eyes_m = pointer_of(asked), self.p_world_eyes_m

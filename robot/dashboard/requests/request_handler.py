@@ -1,4 +1,4 @@
-"""What people ask for on the page, handed to the rig: commands, tuning, clicks in the image."""
+"""Requests of the page's users to the rig: commands, tuning, clicks in the image."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -23,18 +23,18 @@ from gazerig.robot.model.reply import CommandTaker, Ticket
 _REPLY_S = 1.0
 _SAID_EVERY_S = 3.0
 _LATER = "next start"
-"""Of what a change did, people are told what it did not; the controls show the rest."""
+"""Time of effect of the changes that are reported in a message; the controls show the others."""
 
 
 PAGE = "the page"
-"""Who asks, where a browser does not say which one it is."""
+"""Name of the sender if a browser sends none."""
 
 Point = Callable[[float, float], Vec3 | None]
 """Place in the image, 0..1 from the left and from the top -> point in the world."""
 
 
 class PageRequestHandler:
-    """Carries out one request of the page and gives what there is to say about it.
+    """Executes requests of the page; a call returns the message for the user.
 
     Args:
         command: executes commands.
@@ -71,7 +71,7 @@ class PageRequestHandler:
         self._limited_s = -_SAID_EVERY_S
 
     def __call__(self, data: Mapping[str, object]) -> str | None:
-        """Do what is asked; None where nothing needs to be said, else words or a refusal."""
+        """Execute a request; return a message or refusal, None if there is none."""
         try:
             return self._do(data)
         except self._handler.refusals as error:
@@ -93,7 +93,7 @@ class PageRequestHandler:
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} cannot be asked for here")
 
     def _told(self, verb: str, outcome: RequestResult, data: Mapping[str, object]) -> str | None:
-        """Return an outcome in words, None where nothing needs to be said."""
+        """Return an outcome as text, None if no message is needed."""
         match outcome:
             case PendingCommand():
                 return self._replied(outcome)
@@ -112,10 +112,10 @@ class PageRequestHandler:
             case QuestionAnswer(list(found)) if verb == "differs":
                 lines = [f"{c['key']}: {c['new']} (default {c['old']})" for c in found]
                 return "\n".join(lines) or "all is as by default"
-        return None  # the page has its own ways to know
+        return None  # the page gets these by other messages
 
     def _replied(self, given: PendingCommand) -> str | None:
-        """Return what a command cannot do, None if it does all or no client waits."""
+        """Return a command's restrictions as text, None if there are none or no client waits."""
         if given.ticket is None or not isinstance(given.command, Leading | Resume):
             return None
         reply = given.ticket.wait(_REPLY_S)
@@ -125,7 +125,7 @@ class PageRequestHandler:
             return f"refused: {reply.refused}"
         if not reply.limited:
             return None
-        # Of a user who drags a target out of reach one word is enough for a while.
+        # One message is enough for a while if a user drags a target out of reach.
         now_s = self._clock.now_s()
         if now_s - self._limited_s < _SAID_EVERY_S:
             return None
@@ -142,24 +142,24 @@ class PageRequestHandler:
 
 
 class _Taking:
-    """A robot of which the page knows nothing but where commands go."""
+    """Robot of which the page only uses the commands."""
 
     def __init__(self, take: CommandTaker) -> None:
         self._take = take
 
     def command(self, command: Command) -> Ticket | None:
-        """Hand on a command."""
+        """Queue a command."""
         return self._take(command)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
-        """Return none: the page is sent them."""
+        """Return none: the page receives them separately."""
         return {}
 
     def gestures(self) -> tuple[GestureInfo, ...]:
-        """Return none: the page is sent their names."""
+        """Return none: the page receives their names separately."""
         return ()
 
 
 def _signed(command: Command) -> Command:
-    """Return a command with who asks: the browser that was written in, or the page."""
+    """Return a command with its client: the browser's name, or the page."""
     return command if getattr(command, "who", PAGE) else signed(command, PAGE)

@@ -1,7 +1,7 @@
-"""The way of a STOP from the page's process to the rig: a socket pair of its own.
+"""Channel for STOPs from the page's process to the rig: a separate socket pair.
 
-Whatever else people ask for shares one socket, which a flood can fill. Nothing but stops goes
-here, one at a time: those that come while one is on its way are answered with it.
+All other requests share one socket, which a flood can fill. Only stops use this one, one at a
+time: those that arrive while one is pending get the same answer.
 """
 
 import contextlib
@@ -18,12 +18,12 @@ WORDS = 150  # of who and why, in characters
 
 
 class StopListener:
-    """The rig's end: a thread that waits for stops and for nothing else."""
+    """End of the rig: a thread that only waits for stops."""
 
     def __init__(self, link: MessageLink, take: Callable[[Mapping[str, object]], str]) -> None:
-        """Listen at once.
+        """Start listening.
 
-        take: obeys {"do": "stop", "why": words, "who": words}; what it returns is answered
+        take: executes {"do": "stop", "why": reason, "who": name} and returns the answer
         """
         self._link = link
         self._take = take
@@ -42,7 +42,7 @@ class StopListener:
             answer = [asked.pop("number"), self._take(asked)[:WORDS]]
             try:
                 self._link.send(json.dumps(answer).encode(), DONT_WAIT)
-            except OSError:  # no client waits any more; the stop is obeyed
+            except OSError:  # no client waits any more; the stop is executed
                 continue
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The page's end of the way of a STOP; see gazerig.robot.dashboard.requests.stop_channel."""
+"""End of the page of the stop channel; see gazerig.robot.dashboard.requests.stop_channel."""
 
 import asyncio
 import contextlib
@@ -11,7 +11,7 @@ _ANSWERED_WITHIN_S = 1.0
 
 
 class StopSender:
-    """The page's end, of the event loop that serves the browsers."""
+    """End of the page, in the event loop that serves the browsers."""
 
     def __init__(self, link: MessageLink) -> None:
         link.setblocking(False)
@@ -20,10 +20,10 @@ class StopSender:
         self._waiting: asyncio.Future[str] | None = None
 
     async def send(self, why: str, who: str) -> str:
-        """Return what the rig says to a stop: "" where it is obeyed at the next tick.
+        """Send a stop; return the rig's answer, "" if it is executed at the next tick.
 
         Raises:
-            OSError: the rig is gone, or does not answer.
+            OSError: the rig has ended or does not answer.
         """
         if self._waiting is None:
             self._waiting = self._sent(why[:WORDS], who[:WORDS])
@@ -42,7 +42,7 @@ class StopSender:
     def _sent(self, why: str, who: str) -> asyncio.Future[str]:
         self._number += 1
         stop = {"number": self._number, "do": "stop", "why": why, "who": who}
-        # It may be full of stops, which a rig that hangs will find when it wakes.
+        # It may be full of stops, which a rig that hangs receives when it resumes.
         with contextlib.suppress(BlockingIOError):
             self._link.send(json.dumps(stop).encode())
         return asyncio.get_running_loop().create_future()

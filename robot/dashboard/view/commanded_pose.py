@@ -18,7 +18,7 @@ from gazerig.robot.model.types import CommandedPose, Snapshot
 
 _GHOST: Colour = (70, 110, 255)
 _SIGHT = 5.6  # length of its lines of sight, in distances between the eyes
-_SWELL = 0.04  # in distances between the eyes: the ghost's skin lies outside the rig's, or both would flicker
+_SWELL = 0.04  # in distances between the eyes: the ghost's skin is outside the rig's, or both would flicker
 _IRIS_RAD = radians(29.0)
 _APART = radians(1.5)  # of the head's axes: less would only tint the rig's own shell
 
@@ -31,11 +31,11 @@ class _CommandedEye(NamedTuple):
 
 
 class CommandedPoseView:
-    """The ghost in the scene."""
+    """Ghost of the desired pose in the scene."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
-        # What has a size, and how far ahead in its frame it is; in distances between the eyes.
+        # Elements with a size, and their distance ahead in their frame, in eye distances.
         self._sized: list[tuple[viser.MeshHandle | viser.LineSegmentsHandle, float]] = []
         self._frame = scene.add_frame("/ghost", show_axes=False, visible=False)
         points, normals = (array[::3, ::3] for array in surface())
@@ -59,7 +59,7 @@ class CommandedPoseView:
         return handle
 
     def _add_eye(self, side: str) -> _CommandedEye:
-        """Add an iris as a ring with a line of sight, and the lids' edges."""
+        """Add a ring for the iris with a line of sight, and the edges of the lids."""
         name = f"/ghost/eye_{side}"
         ball = self._scene.add_frame(name, show_axes=False)
         iris = ring(1.12 * EYE_RADIUS * float(np.sin(_IRIS_RAD)), 0.012)
@@ -95,7 +95,7 @@ class CommandedPoseView:
             self._move(ghost, edges)
 
     def _have(self, joints: tuple[str, ...]) -> None:
-        """Draw the edges of those lids that a joint moves."""
+        """Draw the edges of the lids that a joint moves."""
         self._joints = joints
         for eye in self._eyes:
             eye.upper.visible = f"{eye.side}_upper_lid" in joints
@@ -130,6 +130,6 @@ class CommandedPoseView:
 
 
 def _apart(ghost: CommandedPose, snapshot: Snapshot) -> bool:
-    """Return whether the desired head is so far off the measured one that both can be seen."""
+    """Return whether the desired and the measured head are far enough apart to show both."""
     turned = np.array(ghost.R_world_head) - np.array(snapshot.R_world_head)
     return float(np.abs(turned).max()) > _APART

@@ -18,7 +18,7 @@ from gazerig.robot.description.texture import TexturedMesh
 
 
 class Light(NamedTuple):
-    """A light: where it comes from, its colour, and how strong it is."""
+    """Light: its direction, colour and intensity."""
 
     position: Vec3
     colour: Colour
@@ -26,7 +26,7 @@ class Light(NamedTuple):
 
 
 SKY, GROUND, SKY_INTENSITY = (255, 250, 244), (186, 170, 166), 2.1
-"""Light from all round: colours from above and from below."""
+"""Ambient light: colours from above and from below."""
 # The key light comes from above and the head's left, where a window would be; then there is a
 # fill from the right, and a light from behind.
 LIGHTS = (
@@ -35,11 +35,11 @@ LIGHTS = (
     Light((-1.2, -0.5, 1.0), (235, 242, 255), 1.4),
 )
 _TO_EYE = np.array((0.88, -0.47, 0.07))
-"""Where the scene is seen from at first: shine is where it would be from there."""
+"""First viewpoint of the scene, for which highlights are computed."""
 
 
 class Finish(NamedTuple):
-    """How a surface answers light.
+    """Reflection of a surface.
 
     shine: how bright its reflection of a light is; tight: how small that is, an exponent
     roughness: below 1 the browser lights every pixel, and lights are seen in the surface the
@@ -54,8 +54,8 @@ class Finish(NamedTuple):
 
 
 _SAMPLER = {"magFilter": 9729, "minFilter": 9985, "wrapS": 10497, "wrapT": 10497}
-"""Pictures are repeated, and smoothed between pixels, not between sizes: without a graphics card
-that would cost more than all else in the room."""
+"""Textures are repeated and smoothed between pixels, not between sizes: without a graphics card
+that would cost more than the rest of the room."""
 SKIN = Finish(0.06, 9.0)
 CLOTH = Finish()
 PLASTIC = Finish(0.22, 26.0)
@@ -67,10 +67,10 @@ def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
     """Return a mesh with a texture as a binary glTF file, lit here.
 
     Args:
-        shape: the mesh as it stands in the scene.
+        shape: mesh in the frame of the scene.
         finish: how it answers light.
     """
-    # Only where a world is shown: it takes half a second of a processor.
+    # Imported only to show a world: it takes half a second of a processor.
     import trimesh
     from trimesh.exchange.gltf import export_glb
 
@@ -133,7 +133,7 @@ def glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
 
 
 def lit(colours: Floats, normals: Floats, finish: Finish) -> Floats:
-    """Return what surfaces send to the eye under the scene's lights.
+    """Return the colours of surfaces under the scene's lights.
 
     Args:
         colours: (n, 3), what they reflect, 0..1 in proportion to light.
@@ -160,7 +160,7 @@ def _of(colour: Colour) -> Floats:
 
 
 def _linear(share: Floats) -> Floats:
-    """Return colours as glTF wants those of vertices: in proportion to light, not as on screens."""
+    """Return colours in linear light, as glTF defines vertex colours."""
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 

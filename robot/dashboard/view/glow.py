@@ -1,4 +1,4 @@
-"""A disc of light or shade that fades to nothing."""
+"""Disc of light or shade that fades out."""
 
 from math import pi
 
@@ -9,7 +9,7 @@ from gazerig.robot.description.paint import Painted, plain
 
 
 def glow(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
-    """Return a flat disc of radius 1, facing up, that fades from its middle to nothing."""
+    """Return a flat disc of radius 1, facing up, that fades out from its middle."""
     radius = np.linspace(1.0, 0.0, rings)
     mesh = turned([(r, 0.0) for r in radius.tolist()])
     alpha = np.repeat(

@@ -40,23 +40,23 @@ _FINISHES: Mapping[links.Finish, Finish] = {
 _SHADE = 4.4
 """Radius of the shade below the shoulders, in distances between the eyes."""
 _LIT_OPEN = 0.7
-"""Upper lids are lit as they stand most of the time."""
+"""Opening for which upper lids are lit: their usual one."""
 _LIT_LOWER_LID: Mat3 = rotation((0.0, radians(12.0), 0.0))
-"""Lower lids are lit as if they stood a little higher, or they look tired."""
+"""Rotation by which lower lids are lit as if a little higher; otherwise they look tired."""
 
 
 class _Node(NamedTuple):
-    """A link in the scene: its frame, and one file for each of its looks."""
+    """Link in the scene: its frame, and one file for each of its materials."""
 
     frame: viser.FrameHandle
     looks: list[viser.GlbHandle]
 
 
 class HeadView:
-    """The rig in the scene, with all parts that its joints move.
+    """Rig in the scene, with all parts that its joints move.
 
-    shape: how the rig is built; None: as far as snapshots tell
-    on_table: it stands on something of a world that is drawn, and needs no shade of its own
+    shape: geometry of the rig; None: derived from snapshots
+    on_table: whether it is on an object of a drawn world, and needs no shade of its own
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -75,14 +75,14 @@ class HeadView:
 
     @property
     def lid_edges(self) -> LidEdges:
-        """Return where the edges of the lids stand; of no lids before the first snapshot."""
+        """Return the positions of the lid edges; without lids before the first snapshot."""
         return self._edges
 
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
         return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
 
     def show(self, snapshot: Snapshot, *, sight: bool = False, camera: bool = False) -> None:
-        """Move everything to where it was measured.
+        """Move all parts to their measured positions.
 
         Args:
             snapshot: of the rig.
@@ -107,7 +107,7 @@ class HeadView:
         colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
         for line, p_world_m in zip(self._sights, snapshot.p_world_eyes_m, strict=True):
             if wanted:
-                # As far as the target is: the lines meet there only if the eyes truly fixate it.
+                # As long as the target's distance: the lines meet there only if the eyes fixate it.
                 line.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
             line.visible = wanted
             if colour != self._colour:
@@ -115,7 +115,7 @@ class HeadView:
         self._colour = colour
 
     def _fit(self, snapshot: Snapshot) -> None:
-        """Draw another rig if this is another one."""
+        """Draw another rig if the geometry has changed."""
         shape = wide_awake(self.shape) if self.shape is not None else None
         if shape is None:
             seen = snapshot.joints, shown_measures(snapshot)
@@ -126,7 +126,7 @@ class HeadView:
             self._draw(describe(shape), shape)
 
     def _draw(self, description: Description, shape: RigShape) -> None:
-        """Draw a rig; of one with the same links only those that look otherwise."""
+        """Draw a rig; if it has the same links, only those that look different."""
         before, self._description = self._description, description
         if before is None or _tree(before) != _tree(description):
             before = None
@@ -151,7 +151,7 @@ class HeadView:
             put(self._shade, (x, y, FLOOR_M + 0.001))
 
     def _plant(self, description: Description) -> None:
-        """Put a frame into the scene for every link, in that of its parent."""
+        """Add a frame for every link to the scene, in that of its parent."""
         self._root.remove()
         self._root = self._scene.add_frame("/rig", show_axes=False)
         paths = _paths(description)
@@ -176,7 +176,7 @@ class HeadView:
 
 
 def _paths(description: Description) -> dict[str, str]:
-    """Return where in the scene each link is: within its parent."""
+    """Return the pose of each link in the frame of its parent."""
     found: dict[str, str] = {}
     for link in description.links:
         found[link.name] = f"{found[link.parent] if link.parent else '/rig'}/{link.name}"
@@ -198,7 +198,7 @@ def _alike(one: Link, other: Link) -> bool:
 
 
 def _lit_as(link: Link, look: Visual, R_world_link: Mat3) -> Floats:
-    """Return the turn in the scene with which a mesh is lit."""
+    """Return the rotation in the scene for which a mesh is lit."""
     if look.name.endswith("still_lid") or (link.joint and "lower_lid" in link.joint.name):
         return np.array(_LIT_LOWER_LID)
     return np.array(compose(R_world_link, look.R))

@@ -1,4 +1,4 @@
-"""Where the edges of a rig's lids stand when they are so far open."""
+"""Positions of the edges of a rig's lids, from their openings."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from gazerig.robot.model.kinematics import LIDS
 class LidEdges(NamedTuple):
     """Elevations above the eye's equator, in radians.
 
-    meeting_rad: where the lids of each side meet
+    meeting_rad: elevation at which the lids of each side meet
     span_rad: how far each lid opens from there, by its name
     """
 
@@ -19,14 +19,14 @@ class LidEdges(NamedTuple):
     span_rad: Mapping[str, float]
 
     def elevation_rad(self, lid: str, opening: float) -> float:
-        """Return where the edge of a lid is that is open so far, 0..1."""
+        """Return the elevation of a lid's edge at an opening, 0..1."""
         side, which, _ = lid.split("_")
         up = 1.0 if which == "upper" else -1.0
         return self.meeting_rad[side] + up * opening * self.span_rad[lid]
 
 
 def lid_edges(shape: RigShape) -> LidEdges:
-    """Return the edges of the lids of a rig; of one without lids, of none."""
+    """Return the lid edges of a rig; a rig without lids has none."""
     span_rad = {
         name: abs(wide - shut)
         for name, (shut, wide) in ((name, shape.lids.get(name, (0.0, 0.0))) for name in LIDS)

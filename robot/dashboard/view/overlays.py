@@ -1,4 +1,4 @@
-"""What can be drawn into the page's scene beside the rig: desired pose, camera, eyes' field."""
+"""Layers of the page's scene around the rig: desired pose, camera, field of the eyes."""
 
 import viser
 
@@ -10,7 +10,7 @@ from gazerig.robot.model.types import Snapshot
 
 
 class OverlayPanel:
-    """The layers in the scene."""
+    """Layers of the scene."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._commanded_pose = CommandedPoseView(scene)
@@ -18,7 +18,7 @@ class OverlayPanel:
         self._eyes = EyeFields(scene)
 
     def show(self, snapshot: Snapshot, layers: OverlayChoices, edges: LidEdges) -> None:
-        """Draw what is wanted and take the rest away.
+        """Draw the selected layers and remove the others.
 
         Args:
             snapshot: of the rig.

@@ -1,4 +1,4 @@
-"""Draw who and what the rig has seen: faces with their eight parts, moving bodies, the target."""
+"""Draw the rig's detections: faces with their eight parts, moving bodies, the target."""
 
 from functools import lru_cache
 
@@ -18,14 +18,14 @@ from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 FIXATED_WITHIN_M = 0.02
-"""A face part this close to the target is the one looked at (parts are 3 cm apart or more)."""
+"""Largest distance of the target from its face part, m (parts are 3 cm apart or more)."""
 
 _BODY: Colour = (118, 146, 190)
 _TARGET: Colour = (255, 120, 40)
 _FOUND: Colour = (40, 120, 255)
-"""What marks faces and bodies that were found, on people who are drawn as they are."""
+"""Colour of marks of detected faces and bodies on people of a simulated world."""
 _OUTLINE_M, _OUTLINE_MIDDLE_M = 0.115, np.array((-0.02, 0.0, 0.01))
-"""Radius of the line around a face, and its middle, from the nose."""
+"""Radius and centre of the line around a face, from the nose, m."""
 _FINENESS = 0.8
 _CHEST_M = 0.34
 _LABEL_ABOVE_M, _BEHIND_M = 0.155, 0.11
@@ -34,7 +34,7 @@ _LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
 
 @lru_cache(maxsize=len(LOOKS))
 def _person_glb(look: int) -> tuple[bytes, bytes]:
-    """Return head and chest of a person with a look as browsers draw them."""
+    """Return head and chest of a person's look as files for browsers."""
     return glb(head(look, _FINENESS), SKIN), glb(torso(look, _CHEST_M), CLOTH)
 
 
@@ -44,7 +44,7 @@ def _look(number: int) -> int:
 
 
 class _Shade:
-    """A dark spot on the floor, which tells where above it something is."""
+    """Dark spot on the floor below an object."""
 
     def __init__(self, scene: viser.SceneApi, name: str, radius_m: float) -> None:
         self._spot = scene.add_glb(
@@ -63,7 +63,7 @@ class _Shade:
 
 
 class _Person:
-    """Whom a face belongs to: a head in the face's frame, and a chest that stands upright."""
+    """Person of a face: a head in the face's frame, and an upright chest."""
 
     def __init__(self, scene: viser.SceneApi, frame: str, face: SeenFace) -> None:
         self._shade = _Shade(scene, f"/shades/{face.id}", 0.3)
@@ -74,7 +74,7 @@ class _Person:
         )
 
     def show(self, face: SeenFace, nose_m: Floats) -> None:
-        """Move the person so that the nose is where it was found."""
+        """Move the person so that the nose is at its detected position."""
         (ahead, _, _), (aside, _, _), _ = face.R_world_face
         x, y, z = face.p_world_m
         self._shade.below((x - _BEHIND_M * ahead, y - _BEHIND_M * aside, z))
@@ -83,7 +83,7 @@ class _Person:
         turn_to(self._chest, along((ahead, aside, 0.0)))
 
     def fit(self, size: float) -> None:
-        """Make the person so many times as large as most people are."""
+        """Scale the person by a factor on the usual size."""
         self._head.scale = self._chest.scale = size
 
     def remove(self) -> None:
@@ -92,7 +92,7 @@ class _Person:
 
 
 class _Outline:
-    """A line around a face that was found, where the person is drawn anyway."""
+    """Line around a detected face, if the person is drawn by the world."""
 
     def __init__(self, scene: viser.SceneApi, frame: str) -> None:
         line = ring(_OUTLINE_M, 0.0025)
@@ -101,21 +101,21 @@ class _Outline:
         )
 
     def show(self, face: SeenFace, nose_m: Floats) -> None:
-        """Put the line around the face; it lies in the plane of the eyes."""
+        """Move the line to the face, in the plane of the eyes."""
         put(self._line, (nose_m + _OUTLINE_MIDDLE_M).tolist())
 
     def fit(self, size: float) -> None:
-        """Make it as large as the face was measured."""
+        """Scale it to the measured size of the face."""
         self._line.scale = (size, 0.8 * size, 1.12 * size)
 
     def remove(self) -> None:
-        """Go with the frame of the face."""
+        """Remove nothing: it is a child of the face's frame."""
 
 
 class _FaceView:
-    """One face in the scene, with its name and parts: a person, or marks on one.
+    """Face in the scene, with its name and parts: a person, or marks on one.
 
-    marks: the person is drawn as it is, and the face only marked where it was found
+    marks: whether the world draws the person, and the detected face is only marked
     """
 
     def __init__(self, scene: viser.SceneApi, face: SeenFace, *, marks: bool) -> None:
@@ -151,7 +151,7 @@ class _FaceView:
         self._show_parts(face, parts_m, p_world_target_m, parts)
 
     def _fit(self, size: float) -> None:
-        """Make the face as large as it was measured."""
+        """Scale the face to its measured size."""
         if self._size != size:
             self._size = size
             self._shape.fit(size)
@@ -176,9 +176,9 @@ class _FaceView:
 
 
 class _BodyView:
-    """One moving body in the scene: a hand, or a calm ball, and its kind.
+    """Moving body in the scene: a hand or a ball, and its kind.
 
-    marks: a hand or thing is drawn as it is, and only marked where it was found
+    marks: whether the world draws the hand or thing, and its detection is only marked
     """
 
     def __init__(self, scene: viser.SceneApi, body: SeenBody, *, marks: bool) -> None:
@@ -204,7 +204,7 @@ class _BodyView:
         self._shade = None if marks else _Shade(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
 
     def fits(self, body: SeenBody) -> bool:
-        """Return whether this is what shows such a body."""
+        """Return whether this drawing fits a body."""
         return self._kind == body.kind
 
     def show(self, body: SeenBody) -> None:
@@ -225,7 +225,7 @@ class _BodyView:
 
 
 class PeopleView:
-    """Everything seen, and the target."""
+    """All detections, and the target."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -239,7 +239,7 @@ class PeopleView:
         )
 
     def mark_only(self, on: bool) -> None:
-        """Draw only marks where faces and bodies were found, or people: others draw them or not."""
+        """Draw only marks of detections, or people, if no world draws them."""
         if on != self._as_marks:
             self._as_marks = on
             while self._faces:
@@ -248,9 +248,9 @@ class PeopleView:
                 self._bodies.popitem()[1].remove()
 
     def show(self, snapshot: Snapshot, *, parts: bool = False) -> None:
-        """Draw what is there now, with the parts of faces if wanted; what has gone is removed."""
+        """Draw the present detections, with parts of faces if selected; remove the others."""
         faces = {face.id: face for face in snapshot.faces}
-        # A face is drawn as a face, not once more as a ball.
+        # A face is not drawn a second time as a ball.
         bodies = {body.id: body for body in snapshot.bodies if body.id not in faces}
         for gone in self._faces.keys() - faces.keys():
             self._faces.pop(gone).remove()
@@ -272,14 +272,14 @@ class PeopleView:
 
 
 def face_label(face: SeenFace) -> str:
-    """Return what stands above a face, e.g. "face 3, looks at the head, speaks"."""
+    """Return the label of a face, e.g. "face 3, looks at the head, speaks"."""
     looks = ", looks at the head" if face.looks_at_head else ""
     speaks = ", speaks" if face.speaks else ""
     return f"face {face.id}{looks}{speaks}"
 
 
 def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:
-    """Return the row of the part that the target lies on, or None where it lies on none."""
+    """Return the row of the target's face part, None if it is on none."""
     away_m = np.linalg.norm(np.array(face.parts_world_m) - p_world_target_m, axis=1)
     nearest = int(away_m.argmin())
     return nearest if away_m[nearest] < FIXATED_WITHIN_M else None

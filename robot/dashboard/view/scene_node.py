@@ -11,19 +11,19 @@ from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.model.quaternion import Quaternion
 
 _STILL_M, _STILL = 1e-4, 3e-4
-"""What has moved less, in metres and in parts of a quaternion (0.04 deg), stays where it is:
-a servo's noise would otherwise be sent to every browser, part by part, 25 times a second."""
+"""Smallest motion that is sent, in metres and in parts of a quaternion (0.04 deg): otherwise a
+servo's noise would be sent to every browser, for each part, 25 times a second."""
 
 
 class Placeable(Protocol):
-    """A handle of the scene."""
+    """Handle of a scene node."""
 
     position: Floats
     wxyz: Floats
 
 
 def put(thing: Placeable, p_m: Sequence[float], turn: Quaternion | None = None) -> None:
-    """Move a thing to a place, and turn it where a turn is given."""
+    """Move a node, and rotate it if a rotation is given."""
     if _off(thing.position.tolist(), p_m) > _STILL_M:
         thing.position = p_m  # type: ignore[assignment]
     if turn is not None:
@@ -31,25 +31,25 @@ def put(thing: Placeable, p_m: Sequence[float], turn: Quaternion | None = None) 
 
 
 def turn_to(thing: Placeable, turn: Quaternion) -> None:
-    """Turn a thing."""
+    """Rotate a node."""
     if _off(thing.wxyz.tolist(), turn) > _STILL:
         thing.wxyz = turn  # type: ignore[assignment]
 
 
 def along(direction: Vec3) -> Quaternion:
-    """Return the turn that lays the x axis along a direction, without roll."""
+    """Return the rotation of the x axis to a direction, without roll."""
     x, y, z = direction
     return _turned(atan2(y, x), -atan2(z, hypot(x, y)))
 
 
 def upright_along(direction: Vec3) -> Quaternion:
-    """Return the turn that lays the z axis along a direction."""
+    """Return the rotation of the z axis to a direction."""
     x, y, z = direction
     return _turned(atan2(y, x), atan2(hypot(x, y), z))
 
 
 def turned_up(angle_rad: float) -> Quaternion:
-    """Return the turn that lifts the x axis by an angle."""
+    """Return the rotation that raises the x axis by an angle."""
     return _turned(0.0, -angle_rad)
 
 

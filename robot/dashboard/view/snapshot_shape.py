@@ -1,4 +1,4 @@
-"""How a rig is shown: by how it is built, or as far as a snapshot tells."""
+"""Geometry of a shown rig: its own, or one derived from a snapshot."""
 
 from math import radians
 
@@ -10,18 +10,18 @@ from gazerig.robot.model.kinematics import LIDS, GeometryParams
 from gazerig.robot.model.types import Snapshot
 
 _LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}
-"""How far lids are shown to turn, from shut to open: as far as about a person's eyes. Servos of
-a small head move them by less, and would leave it sleepy at any opening."""
+"""Rotation of shown lids from closed to open, about that of a person. Servos of a small head
+move them less, so that it would always look sleepy."""
 _JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
 
 
 def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot) -> RigShape:
-    """Return a rig with the joints and the measures of a snapshot.
+    """Return a rig with the joints and the dimensions of a snapshot.
 
     Args:
         joints: their names.
         measures: of the head.
-        snapshot: tells where the head is.
+        snapshot: has the pose of the head.
     """
     x, _, z = measures.pivot_m
     pivot_m = snapshot.p_world_pivot_m
@@ -35,5 +35,5 @@ def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot
 
 
 def wide_awake(shape: RigShape) -> RigShape:
-    """Return a rig whose lids open as wide as they are shown to."""
+    """Return a rig whose lids have the rotation that is shown."""
     return shape._replace(lids={name: (0.0, _LID_RAD[name.split("_")[1]]) for name in shape.lids})

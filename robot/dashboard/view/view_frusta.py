@@ -1,4 +1,4 @@
-"""Draw what the camera covers and what the eyes can attend to."""
+"""Draw the fields of view of the camera and the eyes."""
 
 from math import atan, cos, hypot, pi, sin, tan
 
@@ -14,14 +14,14 @@ from gazerig.robot.model.types import Snapshot
 _CAMERA: Colour = (120, 128, 140)
 _FIELD: dict[str, Colour] = {"left": (20, 150, 120), "right": (190, 90, 30)}
 _DEPTH_M = 0.12
-"""How far from the camera its frame's frame is drawn."""
+"""Distance of the drawn frame from the camera, m."""
 _RADIUS_M = 0.22
-"""How far from the eye the edge of its field is drawn."""
+"""Distance of the drawn edge of its field from the eye, m."""
 _AROUND = 72
 
 
 class CameraField:
-    """The camera as a pyramid as wide as its frame."""
+    """Camera as a pyramid with the angles of its image."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -29,7 +29,7 @@ class CameraField:
         self._frustum: viser.CameraFrustumHandle | None = None
 
     def show(self, snapshot: Snapshot | None) -> None:
-        """Move it to where the camera is; without a snapshot or a camera it is not seen."""
+        """Move it to the camera; hide it without a snapshot or a camera."""
         camera = snapshot.camera if snapshot is not None else None
         if camera is None:
             if self._frustum is not None:
@@ -42,7 +42,7 @@ class CameraField:
         put(self._frustum, camera.p_world_camera_m, quaternion(camera.R_world_camera))
 
     def _add(self, horizontal_rad: float, aspect: float) -> viser.CameraFrustumHandle:
-        """Add the pyramid; one of another shape takes the place of the one before."""
+        """Add the pyramid; one of another shape replaces the previous one."""
         vertical_rad = 2.0 * atan(tan(horizontal_rad / 2.0) / aspect)
         return self._scene.add_camera_frustum(
             "/camera",
@@ -58,7 +58,7 @@ class CameraField:
 
 
 class EyeFields:
-    """The edge of each eye's field of attention, turning with the eye."""
+    """Edge of each eye's field of attention, which rotates with the eye."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -68,7 +68,7 @@ class EyeFields:
         )
 
     def show(self, snapshot: Snapshot | None) -> None:
-        """Turn the fields to where the eyes look; without a snapshot they are not seen."""
+        """Rotate the fields with the eyes; hide them without a snapshot."""
         field_deg = snapshot.field_deg if snapshot is not None else None
         for frame in self._frames:
             frame.visible = field_deg is not None

@@ -1,4 +1,4 @@
-"""Where each browser's camera stands in the page's scene, whatever the shape of its window."""
+"""Cameras of the browsers in the page's scene, for windows of any shape."""
 
 from collections.abc import Callable
 
@@ -9,14 +9,14 @@ from gazerig.robot.model.types import Snapshot
 
 _FOV_STEP_RAD = 0.01
 _KEPT = 64
-"""Of so many browsers a view is kept that they asked for before their scene had loaded."""
+"""Number of browsers whose requested view is stored until their scene has loaded."""
 
 
 class Viewpoints:
-    """Begins every browser with the face, and fits its field of view to its window."""
+    """Shows the face in every new browser, and fits the field of view to its window."""
 
     def __init__(self, server: viser.ViserServer, browser_of: Callable[[int], str]) -> None:
-        """Greet who comes.
+        """Set the view of browsers that connect.
 
         browser_of: the name of a client's browser by the client's number
         """
@@ -30,7 +30,7 @@ class Viewpoints:
         server.on_client_disconnect(self._forget)
 
     def fit(self, snapshot: Snapshot) -> None:
-        """Fit the view of the face to the rig's measures; who looks at the face sees it so."""
+        """Fit the view of the face to the rig's dimensions, in all browsers that show it."""
         self._snapshot = snapshot
         face = view(FACE, snapshot)
         if face == self._face:
@@ -42,10 +42,10 @@ class Viewpoints:
                 self._take(client, FACE)
 
     def choose(self, browser: str, name: str) -> None:
-        """Move the cameras of a browser's tabs to a view, or the first one that comes."""
-        if not browser:  # it has left
+        """Move the cameras of a browser's tabs to a view, now or when its scene has loaded."""
+        if not browser:  # it has disconnected
             return
-        # Noted first: the scene may finish loading in between.
+        # Stored first: the scene may finish loading in between.
         self._asked_early[browser] = name
         while len(self._asked_early) > _KEPT:
             self._asked_early.pop(next(iter(self._asked_early)), None)
@@ -76,7 +76,7 @@ class Viewpoints:
             name = self._views.get(client.client_id, FACE)
             _fit_field(camera, view(name, self._snapshot))
 
-        # Viser knows a client once its scene has loaded; the buttons are there before.
+        # Viser knows a client after its scene has loaded; the buttons work before.
         early = self._asked_early.pop(self._browser_of(client.client_id), None)
         if early is not None:
             self._take(client, early)

@@ -1,4 +1,4 @@
-"""From where the page's scene is seen: the face close up, both, over its shoulder, from above."""
+"""Viewpoints of the page's scene: the face, both, over its shoulder, from above."""
 
 from math import atan, cos, radians, sin, tan
 from typing import NamedTuple
@@ -14,22 +14,21 @@ HALF_WIDTH = 0.84
 """Tangent of half the horizontal field of view that shows rig and visitor: 80 deg."""
 
 HEAD_SHARE = 0.64
-"""Share of the canvas's height that the head fills when it is seen close up."""
+"""Share of the canvas's height that the head fills in the view of the face."""
 _FACE_RAD, _FACE_UP_RAD = radians(-28.0), radians(4.0)
-"""From where the face is seen: so far to the head's right, and from so far above."""
+"""Direction of the view of the face: angles to the head's right and above."""
 _FACE_AWAY = 10.5
-"""How far away, in distances between the eyes: near enough to look alive, not so near that the
-nose grows."""
+"""Distance of the view of the face, in eye distances: near, without a distorted nose."""
 _FACE_WIDTH = 3.3
-"""What must be in sight from side to side, in distances between the eyes."""
+"""Smallest visible width, in eye distances."""
 _FACE_MIDDLE: Vec3 = (-0.45, 0.0, 0.5 * (TOP + CHIN) - 0.30)
-"""What is in the middle: a little below the head's, so that the neck is in sight."""
+"""Centre of the view: a little below that of the head, so that the neck is visible."""
 
 
 class View(NamedTuple):
-    """A place of the camera, and what it has in its middle.
+    """Position of the camera and the point in the centre of its view.
 
-    vertical_rad: the vertical field of view, None where the horizontal one decides
+    vertical_rad: vertical field of view, None if the horizontal one is given
     least_width: tangent of half the horizontal field that must be in sight
     """
 
@@ -39,7 +38,7 @@ class View(NamedTuple):
     least_width: float = HALF_WIDTH
 
     def field_rad(self, aspect: float) -> float:
-        """Return the vertical field of view for a canvas so many times as wide as high."""
+        """Return the vertical field of view for an aspect ratio of the canvas, rad."""
         across = self.least_width / max(aspect, 1e-3)
         if self.vertical_rad is None:
             return 2.0 * atan(across)
@@ -49,19 +48,19 @@ class View(NamedTuple):
 _FIXED = {
     BOTH: View((0.95, -1.42, 0.56), (0.76, 0.0, 0.16)),
     SHOULDER: View((-0.56, -0.20, 0.42), (0.60, 0.06, 0.20)),
-    # Over the walls of a room, where there is one.
+    # Above the walls of a room.
     ABOVE: View((-1.5, -2.9, 2.5), (1.0, 0.05, -0.35), least_width=0.62),
 }
 NAMES = (FACE, *_FIXED)
 
 
 def view(name: str, snapshot: Snapshot | None = None) -> View:
-    """Return a view by its name; the face's is fitted to the head of a snapshot."""
+    """Return a view by its name; that of the face is fitted to the head of a snapshot."""
     return _FIXED[name] if name in _FIXED else _face(snapshot)
 
 
 def _face(snapshot: Snapshot | None) -> View:
-    """Return a close-up of the head as it stands when its neck is straight."""
+    """Return a close-up of the head with its neck straight."""
     measures, eyes_m = HeadMeasures(), (0.038, 0.0, 0.125)
     if snapshot is not None:
         measures = shown_measures(snapshot)

@@ -1,4 +1,4 @@
-"""Draw a simulated world as it is: its room, and people where they are, not where they are seen."""
+"""Draw a simulated world: its room, and people at their true positions."""
 
 from collections.abc import Iterable, Mapping
 from typing import Final
@@ -18,12 +18,12 @@ _FINISHES: Mapping[WorldFinish, Finish] = {
     "flat": FLAT,
 }
 _FOG_M: Final = (1.2, 10.0)
-"""Where the room begins to fade and where it would have gone: the head stays what is looked at."""
+"""Distances at which the room starts and ends to fade, so that the head stays the subject, m."""
 _FOG_COLOUR: Final = (233, 236, 240)
 
 
 class WorldView:
-    """The room in the scene, and all that moves in it."""
+    """Room of the scene, and all moving objects."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -32,7 +32,7 @@ class WorldView:
         self._moving: dict[str, viser.GlbHandle] = {}
 
     def show(self, shapes: WorldShapes, world_s: float) -> None:
-        """Move everything to where it is at a time; another world is drawn anew.
+        """Move all objects to their poses at a time; draw a new world if it has changed.
 
         Args:
             shapes: of the world.
@@ -70,7 +70,7 @@ class WorldView:
 
 
 def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
-    """Return what stands still as few files: one for each finish, and one for each texture."""
+    """Return the static objects as few files: one for each finish and each texture."""
     files: list[bytes] = []
     plain: dict[WorldFinish, list[Painted]] = {}
     for part in parts:

@@ -1,1 +1,1 @@
-"""The elements of the page's panels, as this program holds them."""
+"""Elements of the page's panels on the side of Python."""

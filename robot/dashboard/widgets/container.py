@@ -1,4 +1,4 @@
-"""Where elements are added: the panels of the page and the sections in them."""
+"""Containers of elements: the panels of the page and their sections."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
@@ -19,11 +19,11 @@ from gazerig.robot.dashboard.widgets.widget import (
 
 W = TypeVar("W", bound=Widget)
 Make = Callable[[WidgetPublisher, WidgetPlace, str, dict[str, object]], W]
-"""The constructor of a kind of element."""
+"""Constructor of a kind of element."""
 
 
 class Adder(Protocol):
-    """Keeps elements and shows them."""
+    """Owner of elements that sends them to browsers."""
 
     def clear(self, parent: str | int) -> None:
         """Remove everything from a panel or section."""
@@ -35,7 +35,7 @@ class Adder(Protocol):
 
 
 class Container:
-    """Where elements are added: a panel of the page, or a section in one.
+    """Container of elements: a panel of the page or a section of one.
 
     Args:
         page: takes what is added.
@@ -49,11 +49,11 @@ class Container:
         self._where = (parent, panel, owner)
 
     def own(self, client: str) -> "Container":
-        """Return the same place for what only one client is to see."""
+        """Return the same container for elements that only one client sees."""
         return Container(self.page, *self._where[:2], client)
 
     def clear(self) -> None:
-        """Remove everything that is here."""
+        """Remove all elements."""
         self.page.clear(self._where[0])
 
     def html(self, content: str = "", *, order: float = 0.0) -> Html:
@@ -61,12 +61,12 @@ class Container:
         return self.page.add(Html, "html", self._where, {"content": content, "order": order})
 
     def section(self, title: str, *, is_open: bool = True, order: float = 0.0) -> "Section":
-        """Add a section with a title, which can be folded."""
+        """Add a section with a title that can be folded."""
         props: dict[str, object] = {"title": title, "open": is_open, "order": order}
         return Section(self, self.page.add(Widget, "section", self._where, props))
 
     def image(self, label: str, *, pick: bool = False, order: float = 0.0) -> Image:
-        """Add an image, empty at first; label: what it shows, for those who do not see it.
+        """Add an image, empty at first; label: its description for screen readers.
 
         pick: a click asks the rig to look at what was clicked
         """
@@ -85,10 +85,10 @@ class Container:
         """Add a chart of lines over time.
 
         Args:
-            title: what stands above it.
+            title: Text above the chart.
             lines: name and style of each; browser/panels.css has a colour for each style.
             unit: of the values.
-            least: the axis spans at least so much.
+            least: Smallest range of the axis.
             order: its place among its neighbours.
         """
         props: dict[str, object] = {
@@ -100,7 +100,7 @@ class Container:
     def text(
         self, label: str, value: str = "", *, hint: str = "", on: str = "left", order: float = 0.0
     ) -> TextField:
-        """Add a line of text that counts at Enter, when it is left too, or by each key.
+        """Add a line of text that is sent at Enter, also when the focus leaves, or at each key.
 
         on: "enter", "left" or "key"
         """
@@ -120,7 +120,7 @@ class Container:
         whole: bool = False,
         order: float = 0.0,
     ) -> Slider:
-        """Add a number that is dragged between two ends, or typed."""
+        """Add a slider between two ends, whose number can also be typed."""
         props: dict[str, object] = {
             "label": label, "low": ends[0], "high": ends[1], "step": step, "value": value,
             "hint": hint, "whole": whole, "order": order,
@@ -128,7 +128,7 @@ class Container:
         return self.page.add(Slider, "slider", self._where, props)
 
     def checkbox(self, label: str, value: bool, *, hint: str = "", order: float = 0.0) -> Checkbox:
-        """Add a box to tick."""
+        """Add a checkbox."""
         props: dict[str, object] = {"label": label, "value": value, "hint": hint, "order": order}
         return self.page.add(Checkbox, "checkbox", self._where, props)
 
@@ -151,7 +151,7 @@ class Container:
     def buttons(
         self, label: str, options: Sequence[str], *, hint: str = "", order: float = 0.0
     ) -> Buttons:
-        """Add a row of buttons; label: what they are about, "" shows none."""
+        """Add a row of buttons; label: text in front of them, "" for none."""
         props: dict[str, object] = {
             "label": label, "options": list(options), "current": "", "hint": hint, "order": order,
         }  # fmt: skip
@@ -159,7 +159,7 @@ class Container:
 
 
 class Section(Container):
-    """A part of a panel under a title."""
+    """Part of a panel under a title."""
 
     def __init__(self, parent: Container, widget: Widget) -> None:
         super().__init__(parent.page, widget.place.number, *widget.place[2:])

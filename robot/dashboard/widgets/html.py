@@ -16,19 +16,19 @@ OTHER_TARGET = "other"
 """Names of colours of targets."""
 
 LINE_PX = 320
-"""Width in which the panels are drawn; they are scaled to the width that there is."""
+"""Width in which drawings are made; they are scaled to the panel."""
 
 LETTER_PX = 13.2
 """Size of letters in a drawing: 13 px in the narrowest drawer."""
 
 
 def pill(text: str, kind: str = "") -> str:
-    """Return words on a coloured ground; kind: the name of its colour."""
+    """Return text on a coloured background; kind: name of the colour."""
     return f"<span class='pill-word {escape(kind)}'>{escape(text)}</span>"
 
 
 def chip(text: str) -> str:
-    """Return words in a frame."""
+    """Return text in a frame."""
     return f"<span class='chip'>{escape(text)}</span>"
 
 
@@ -39,7 +39,7 @@ def banner(text: str, kind: str, reasons: Iterable[str] = ()) -> str:
 
 
 def heading(text: str, aside: str = "") -> str:
-    """Return a line above a drawing or table, with something smaller at its right end."""
+    """Return a line above a drawing or table, with a smaller text at its right end."""
     return f"<div class='heading'>{escape(text)}<span>{escape(aside)}</span></div>"
 
 
@@ -49,12 +49,12 @@ def counted(n: int, what: str) -> str:
 
 
 def note(text: str) -> str:
-    """Return a small line, for sources and explanations."""
+    """Return a small text, for sources and explanations."""
     return f"<div class='note'>{escape(text)}</div>"
 
 
 def svg(height: float, parts: Iterable[str], says: str) -> str:
-    """Return a drawing LINE_PX wide, scaled to the panel; says: what it shows, in words."""
+    """Return a drawing of width LINE_PX, scaled to the panel; says: its description as text."""
     return (
         f"<svg viewBox='0 0 {LINE_PX} {height:.0f}' role='img' aria-label='{escape(says)}'>"
         f"{''.join(parts)}</svg>"
@@ -62,7 +62,7 @@ def svg(height: float, parts: Iterable[str], says: str) -> str:
 
 
 def box(x: float, y: float, width: float, height: float, colour: str, says: str = "") -> str:
-    """Return a filled rectangle; colour: a name of panels.css; ``says`` is shown by the mouse."""
+    """Return a filled rectangle; colour: a name of panels.css; says: its tooltip."""
     title = f"<title>{escape(says)}</title>" if says else ""
     return (
         f"<rect x='{x:.1f}' y='{y:.1f}' width='{max(width, 0.4):.1f}' height='{height:.1f}' "
@@ -78,7 +78,7 @@ def line(points: Iterable[tuple[float, float]], kind: str, dash: str = "") -> st
 
 
 def text(x: float, y: float, text: str, anchor: str = "start", size: float = LETTER_PX) -> str:
-    """Return words whose baseline begins, ends or is centred at a point."""
+    """Return text whose baseline starts, ends or is centred at a point."""
     return (
         f"<text x='{x:.1f}' y='{y:.1f}' font-size='{size}' text-anchor='{anchor}' "
         f"class='svg-text'>{escape(text)}</text>"

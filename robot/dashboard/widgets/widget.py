@@ -1,6 +1,6 @@
-"""The elements of the page's panels, as this program holds them; browsers draw them natively.
+"""Elements of the page's panels; browsers draw them with native controls.
 
-A change of an element goes to every browser that shows it. What a browser sends is checked by the
+A change of an element goes to every browser that shows it. Input of a browser is checked by the
 element before it counts.
 """
 
@@ -12,11 +12,11 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 T = TypeVar("T")
 
 MOST_TEXT = 4000
-"""Characters of a text that a browser may send."""
+"""Longest text that a browser may send, characters."""
 
 
 class WidgetPlace(NamedTuple):
-    """Where an element stands.
+    """Position of an element.
 
     number: its own; parent: name of the panel or number of the section that holds it
     panel: name of the panel that it is in, at whatever depth
@@ -30,22 +30,22 @@ class WidgetPlace(NamedTuple):
 
 
 class WidgetPublisher(Protocol):
-    """Sends changes to the browsers; from any thread."""
+    """Sender of changes to the browsers; safe to call from any thread."""
 
     def changed(self, widget: "Widget", props: Mapping[str, object], but: str = "") -> None:
-        """Send changed properties to all that see the element, except one client."""
+        """Send changed properties to all viewers of the element, except one client."""
 
     def removed(self, widget: "Widget") -> None:
-        """Remove the element, and what stands in it, from all browsers."""
+        """Remove the element and its children from all browsers."""
 
     def image_changed(self, widget: "Widget") -> None:
         """Send an element's new image."""
 
 
 class Widget:
-    """An element of a panel.
+    """Element of a panel.
 
-    place: where it stands; props: what browsers are told of it
+    place: position of the element; props: properties that are sent to browsers
     """
 
     def __init__(
@@ -56,14 +56,14 @@ class Widget:
         self.data = b""
 
     def _set(self, but: str = "", **props: object) -> None:
-        """Change properties; those that are as they were are not sent."""
+        """Change properties; unchanged ones are not sent."""
         new = {name: value for name, value in props.items() if self.props.get(name) != value}
         if new:
             self.props.update(new)
             self._page.changed(self, new, but)
 
     def _words(self, prop: str) -> tuple[str, ...]:
-        """Return a property that is a list of words."""
+        """Return a property that is a list of text."""
         words = self.props[prop]
         assert isinstance(words, list)
         return tuple(words)
@@ -73,20 +73,20 @@ class Widget:
         self._page.removed(self)
 
     def arrived(self, value: object, client: str) -> None:
-        """Apply what a browser sends for this element.
+        """Apply the input of a browser for this element.
 
         Raises:
-            ValueError: nothing can be sent for it, or not this; the message says what can.
+            ValueError: the input is not valid; the message describes valid input.
         """
         raise ValueError("nothing can be set there")
 
 
 class Html(Widget):
-    """A piece of HTML; names in it must be escaped by who writes it."""
+    """HTML; the caller must escape names in it."""
 
     @property
     def content(self) -> str:
-        """What is shown; it is sent only where it differs from what was."""
+        """HTML that is shown; it is sent only if it has changed."""
         return str(self.props["content"])
 
     @content.setter
@@ -95,7 +95,7 @@ class Html(Widget):
 
 
 class Image(Widget):
-    """An image: JPEG or PNG."""
+    """JPEG or PNG image."""
 
     def show(self, data: bytes) -> None:
         """Show another image."""
@@ -105,14 +105,14 @@ class Image(Widget):
 
 
 class Chart(Widget):
-    """Lines over an axis.
+    """Chart of lines over an axis.
 
     Its props are title, unit, x (n numbers) and lines: (name, style, n numbers) each, where style
     names a colour of the page. A browser that cannot be looked at reads the last values.
     """
 
     def draw(self, x: Sequence[float], lines: Mapping[str, Sequence[float]]) -> None:
-        """Draw lines anew; x: common to all, lines: by name, those of the chart."""
+        """Replace the lines; x: common to all, lines: name -> values."""
         self._set(x=list(x), y=[list(lines[name]) for name in self.names()])
 
     def names(self) -> list[str]:
@@ -123,12 +123,12 @@ class Chart(Widget):
 
     @property
     def title(self) -> str:
-        """What stands above the chart."""
+        """Text above the chart."""
         return str(self.props["title"])
 
 
 class Field(Widget, ABC, Generic[T]):
-    """An element with a value that people can change."""
+    """Element with a value that users can change."""
 
     def __init__(
         self, page: WidgetPublisher, place: WidgetPlace, kind: str, props: dict[str, object]
@@ -138,7 +138,7 @@ class Field(Widget, ABC, Generic[T]):
 
     @property
     def value(self) -> T:
-        """The value shown in all browsers; setting it calls no handler."""
+        """Value shown in all browsers; setting it calls no handler."""
         return self.props["value"]  # type: ignore[return-value]
 
     @value.setter
@@ -147,7 +147,7 @@ class Field(Widget, ABC, Generic[T]):
 
     @property
     def label(self) -> str:
-        """The name of the field."""
+        """Name of the field."""
         return str(self.props["label"])
 
     @label.setter
@@ -155,12 +155,12 @@ class Field(Widget, ABC, Generic[T]):
         self._set(label=label)
 
     def on_change(self, do: Callable[[T, str], object]) -> None:
-        """Call ``do`` with the value and the client whenever a person changes it."""
+        """Call ``do`` with the value and the client when a user changes it."""
         self._handlers.append(do)
 
     @abstractmethod
     def checked(self, value: object) -> T:
-        """Return what a browser sent as a value of this field.
+        """Return the input of a browser as a value of this field.
 
         Raises:
             ValueError: it is none.
@@ -175,7 +175,7 @@ class Field(Widget, ABC, Generic[T]):
 
 
 class Checkbox(Field[bool]):
-    """A box to tick."""
+    """Checkbox."""
 
     def checked(self, value: object) -> bool:
         """Return a boolean."""
@@ -185,7 +185,7 @@ class Checkbox(Field[bool]):
 
 
 class TextField(Field[str]):
-    """A line of text; ``on`` says when it counts: at "enter", when "left" too, or by each "key"."""
+    """Line of text, sent ``on`` "enter", also when the focus has "left", or at each "key"."""
 
     def checked(self, value: object) -> str:
         """Return a text without control characters."""
@@ -195,14 +195,14 @@ class TextField(Field[str]):
 
 
 class Slider(Field[float]):
-    """A number between two ends: to drag, or to type.
+    """Slider between two ends, whose number can also be typed.
 
     A number that is typed counts at Enter, when its field is left, or by the arrow keys.
     """
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The least and the greatest value."""
+        """Smallest and largest value."""
         low, high = self.props["low"], self.props["high"]
         assert isinstance(low, int | float) and isinstance(high, int | float)
         return low, high
@@ -212,7 +212,7 @@ class Slider(Field[float]):
         self._set(low=ends[0], high=ends[1])
 
     def checked(self, value: object) -> float:
-        """Return a number between the ends, whole where the slider is."""
+        """Return a number between the ends, whole if the slider's step is."""
         low, high = self.ends
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise ValueError(f"{self.label} is a number from {low:g} to {high:g}")
@@ -226,11 +226,11 @@ class Slider(Field[float]):
 
 
 class Choice(Field[str]):
-    """A menu of which one is chosen."""
+    """Menu with one chosen option."""
 
     @property
     def options(self) -> tuple[str, ...]:
-        """What there is to choose from; a value that is no longer there becomes the first."""
+        """Options; a value that is not among new ones becomes the first."""
         return self._words("options")
 
     @options.setter
@@ -246,7 +246,7 @@ class Choice(Field[str]):
 
 
 class Buttons(Widget):
-    """A row of buttons; one of them may be marked as in force."""
+    """Row of buttons; one of them may be marked as present."""
 
     def __init__(
         self, page: WidgetPublisher, place: WidgetPlace, kind: str, props: dict[str, object]
@@ -256,7 +256,7 @@ class Buttons(Widget):
 
     @property
     def options(self) -> tuple[str, ...]:
-        """What the buttons say."""
+        """Labels of the buttons."""
         return self._words("options")
 
     @options.setter
@@ -265,7 +265,7 @@ class Buttons(Widget):
 
     @property
     def current(self) -> str:
-        """The button that is marked as in force, "" for none."""
+        """Button that is marked as present, "" for none."""
         return str(self.props["current"])
 
     @current.setter
@@ -273,7 +273,7 @@ class Buttons(Widget):
         self._set(current=option)
 
     def on_press(self, do: Callable[[str, str], object]) -> None:
-        """Call ``do`` with the button and the client whenever one is pressed."""
+        """Call ``do`` with the button and the client when one is pressed."""
         self._handlers.append(do)
 
     def arrived(self, value: object, client: str) -> None:

@@ -1,8 +1,8 @@
-"""The page's panels: elements that are added here and drawn by browser/widgets.js there.
+"""Panels of the page: elements are added here and drawn by browser/widgets.js.
 
-Every browser is sent what changed since it took the last message, the newest of each element only:
-one that is slow misses what came in between and holds up nobody. A browser that shows only some
-panels is not sent the others.
+Every browser receives the changes since its last message, only the newest of each element: a slow
+browser misses the values in between and delays no other. A browser that shows only some panels
+does not receive the others.
 """
 
 import json
@@ -16,29 +16,29 @@ from gazerig.robot.dashboard.widgets.container import Container, Make, W
 from gazerig.robot.dashboard.widgets.widget import Widget, WidgetPlace
 
 PANELS = ("headline", "camera", "replay", "watch", "steer", "tune", "health", "report")
-"""Names of the places of the page that hold panels, as in browser/index.html."""
+"""Names of the panels, as in browser/index.html."""
 RECEIVED_BYTES = 16_384
-"""The longest message of a browser."""
+"""Longest message of a browser, bytes."""
 _NOTICES = 8
 _NUMBER_BYTES = 4
 
 
 class Notice(NamedTuple):
-    """Words for a person that go away by themselves."""
+    """Message for a user that disappears after some seconds."""
 
     text: str
     refused: bool
 
 
 class Outgoing(NamedTuple):
-    """What a client is sent next: one message of text, and one of bytes for each image."""
+    """Next messages to a client: one of text, and one of bytes for each image."""
 
     text: str
     images: tuple[bytes, ...]
 
 
 class Client:
-    """A browser's tab that shows panels.
+    """Tab of a browser that shows panels.
 
     name: e.g. "panels-3", unique; browser: the name of its browser
     """
@@ -47,25 +47,25 @@ class Client:
         self.name, self.browser = name, browser
         self._wake = wake
         self._awake = False
-        # Number of an element -> its changed properties, None where it was removed.
+        # Number of an element -> its changed properties, None if it was removed.
         self.changes: dict[int, dict[str, object] | None] = {}
         self.images: set[int] = set()
         self.notices: deque[Notice] = deque(maxlen=_NOTICES)
         self.seen: frozenset[str] = frozenset(PANELS)
 
     def wake(self) -> None:
-        """Announce that something waits, once until it is taken."""
+        """Announce waiting data, once until it is taken."""
         if not self._awake:
             self._awake = True
             self._wake()
 
     def taken(self) -> None:
-        """Note that what waited is being sent."""
+        """Record that the waiting data is being sent."""
         self._awake = False
 
 
 class Widgets:
-    """All panels of a page, and the clients that show them; from any thread."""
+    """All panels of a page and their clients; safe to call from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -76,7 +76,7 @@ class Widgets:
         self._on_join: list[Callable[[str], object]] = []
         self._on_leave: list[Callable[[str], object]] = []
 
-    # --- what is shown ---------------------------------------------------------------------
+    # --- elements --------------------------------------------------------------------------
 
     def panel(self, name: str) -> Container:
         """Return the panel of a name, one of PANELS."""
@@ -96,7 +96,7 @@ class Widgets:
             return widget
 
     def changed(self, widget: Widget, props: Mapping[str, object], but: str = "") -> None:
-        """Send changed properties to all that see an element, except one client."""
+        """Send changed properties to all viewers of an element, except one client."""
         with self._lock:
             if widget.place.number not in self._widgets:
                 return
@@ -108,7 +108,7 @@ class Widgets:
             self._wake()
 
     def removed(self, widget: Widget) -> None:
-        """Remove an element and what stands in it."""
+        """Remove an element and its children."""
         with self._lock:
             if self._widgets.pop(widget.place.number, None) is None:
                 return
@@ -128,7 +128,7 @@ class Widgets:
 
     @contextmanager
     def hold(self) -> Iterator[None]:
-        """Send nothing within the block: browsers see all that it changes at once."""
+        """Send nothing within the block, so that browsers receive all its changes together."""
         with self._lock:
             self._held += 1
         try:
@@ -139,7 +139,7 @@ class Widgets:
                 self._wake()
 
     def clear(self, parent: str | int) -> None:
-        """Remove everything from a panel or section."""
+        """Remove all elements of a panel or section."""
         with self._lock:
             for one in [w for w in self._widgets.values() if w.place.parent == parent]:
                 self.removed(one)
@@ -147,7 +147,7 @@ class Widgets:
     def notify(
         self, text: str, client: str = "", browser: str = "", *, refused: bool = False
     ) -> None:
-        """Show words for some seconds to a client, else to a browser, else to all."""
+        """Show a message for some seconds to a client, else to a browser, else to all."""
         with self._lock:
             everyone = list(self._clients.values())
             receivers = (
@@ -161,7 +161,7 @@ class Widgets:
 
     @property
     def watched(self) -> bool:
-        """Whether any client is there."""
+        """Whether any client is connected."""
         return bool(self._clients)
 
     def _viewers(self, widget: Widget) -> list[Client]:
@@ -175,18 +175,18 @@ class Widgets:
             if client.changes or client.images or client.notices:
                 client.wake()
 
-    # --- who sees it -----------------------------------------------------------------------
+    # --- clients ---------------------------------------------------------------------------
 
     def on_join(self, do: Callable[[str], object]) -> None:
-        """Call ``do`` with the name of every client that comes."""
+        """Call ``do`` with the name of every client that connects."""
         self._on_join.append(do)
 
     def on_leave(self, do: Callable[[str], object]) -> None:
-        """Call ``do`` with the name of every client that has gone."""
+        """Call ``do`` with the name of every client that has disconnected."""
         self._on_leave.append(do)
 
     def join(self, browser: str, wake: Callable[[], None]) -> Client:
-        """Add a client, which is owed all that is shown; wake: called when something waits."""
+        """Add a client and queue all elements for it; wake: called when data waits."""
         with self._lock:
             self._client_numbers += 1
             client = Client(f"panels-{self._client_numbers}", browser, wake)
@@ -203,7 +203,7 @@ class Widgets:
         return client
 
     def leave(self, client: Client) -> None:
-        """Remove a client and what was shown to it alone."""
+        """Remove a client and its own elements."""
         with self._lock:
             self._clients.pop(client.name, None)
             for widget in list(self._widgets.values()):
@@ -213,7 +213,7 @@ class Widgets:
             do(client.name)
 
     def browser(self, client: str) -> str:
-        """Return the name of a client's browser, "" where the client is not there."""
+        """Return the name of a client's browser, "" if it is not connected."""
         with self._lock:
             found = self._clients.get(client)
             return found.browser if found is not None else ""
@@ -226,7 +226,7 @@ class Widgets:
     # --- messages --------------------------------------------------------------------------
 
     def outgoing(self, client: Client) -> Outgoing | None:
-        """Return what a client is sent now, None for nothing."""
+        """Return the next messages to a client, None if there are none."""
         with self._lock:
             client.taken()
             if self._held:  # the end of the block wakes it again
@@ -260,7 +260,7 @@ class Widgets:
     def received(self, client: Client, text: str) -> None:
         """Handle a message of a client: {"set": [number, value]} or {"seen": [names of panels]}.
 
-        What cannot be taken is refused in words to that client.
+        Input that is not valid is refused by a message to that client.
         """
         try:
             self._take(client, json.loads(text, parse_constant=_no_number))
@@ -272,7 +272,7 @@ class Widgets:
             case {"set": [int() as number, value]} if not isinstance(number, bool):
                 with self._lock:
                     widget = self._widgets.get(number)
-                # One that was removed a moment ago is pressed in good faith.
+                # It may have been removed a moment ago.
                 if widget is None or widget.place.owner not in ("", client.name):
                     return
                 try:
@@ -288,12 +288,12 @@ class Widgets:
                 raise ValueError("a browser sends the number of an element and its new value")
 
     def _send_again(self, client: Client, widget: Widget) -> None:
-        """Send a client the value in force in place of one that was refused."""
+        """Send a client the present value after another one was refused."""
         with self._lock:
             if (now := client.changes.setdefault(widget.place.number, {})) is not None:
                 now["value"] = widget.props.get("value")
 
 
 def _no_number(word: str) -> NoReturn:
-    """Refuse NaN and Infinity, which are no JSON."""
+    """Refuse NaN and Infinity, which are not JSON."""
     raise ValueError(f"{word} is no number of JSON")
