@@ -107,13 +107,13 @@ def test_after_trouble_views_differ_until_it_has_been_calm_for_a_while():
     assert turns.next().length == 10
     seen = []
     for k in range(4):
-        turns.trouble(5.0 + k)
+        turns.record_trouble(5.0 + k)
         seen.append(turns.next().length)
     assert len(set(seen)) == 4
     assert not {10, 11}.intersection(seen)
-    turns.calm(8.0 + 0.9 * CALM_S)
+    turns.end_trouble(8.0 + 0.9 * CALM_S)
     assert turns.next().length not in (10, 11)
-    turns.calm(8.0 + CALM_S)
+    turns.end_trouble(8.0 + CALM_S)
     assert turns.next().length in (10, 11)
 
 
@@ -126,18 +126,18 @@ def test_the_indirect_map_fits_every_window():
 
 def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
     link = Reconnect()
-    link.lost(10.0)
+    link.record_lost(10.0)
     tries, now_s = [], 10.0
     while now_s < 16.0:
         now_s = round(now_s + 0.0625, 4)
         if link.due(now_s):
             tries.append(now_s - 10.0)
-            link.failed(now_s)
+            link.record_failed(now_s)
     waits = [b - a for a, b in zip([0.0, *tries], tries, strict=False)]
     doubled = [0.1, 0.2, 0.4, 0.8, 1.0, 1.0]
     assert all(0.0 <= w - d <= 0.0625 for w, d in zip(waits, doubled, strict=False))
     assert max(waits) <= 1.0625
-    assert round(link.back(16.0), 6) == 6.0
+    assert round(link.record_reopened(16.0), 6) == 6.0
     assert not link.down
 
 
@@ -145,9 +145,9 @@ def test_the_fourth_restart_within_ten_seconds_is_one_too_many():
     health = ServoHealth({3: ServoConfig(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, EventLog())
     for t_s in (0.0, 4.0, 8.0):
         assert not health.exhausted(3, t_s)
-        health.restarted(3, t_s)
+        health.record_restarted(3, t_s)
     assert not health.exhausted(3, 10.1)
-    health.restarted(3, 10.1)
+    health.record_restarted(3, 10.1)
     assert health.exhausted(3, 11.0)
     assert health.faults == {3: AGAIN_AND_AGAIN}
 

@@ -31,7 +31,7 @@ def picture(*people: tuple[DetectedFace, list[float]]) -> ImageArray:
 
 
 def worn(image: ImageArray, *faces: DetectedFace) -> list[Clothing | None]:
-    return [one.clothing for one in ClothingReader().dressed(image, 0.0, faces)[0]]
+    return [one.clothing for one in ClothingReader().add_clothing(image, 0.0, faces)[0]]
 
 
 def apart(one: Clothing | None, other: Clothing | None) -> float:
@@ -64,9 +64,9 @@ def test_what_somebody_nearer_covers_does_not_count() -> None:
 def test_a_cover_whose_face_is_missed_in_a_frame_still_covers() -> None:
     far, near = face(0.0, 2.4), face(0.05, 1.4)
     image, reader = picture((far, RED), (near, GREEN)), ClothingReader()
-    reader.dressed(image, 0.0, (far, near))
-    assert reader.dressed(image, 0.03, (far,))[0][0].clothing is None
-    assert reader.dressed(image, 1.0, (far,))[0][0].clothing is not None
+    reader.add_clothing(image, 0.0, (far, near))
+    assert reader.add_clothing(image, 0.03, (far,))[0][0].clothing is None
+    assert reader.add_clothing(image, 1.0, (far,))[0][0].clothing is not None
 
 
 def test_clothes_below_the_picture_are_not_seen() -> None:
@@ -82,7 +82,7 @@ def test_a_person_without_a_face_wears_the_same() -> None:
     one, ((x, y),) = face(0.1, 2.0), project(p[None], LENS).tolist()
     px_m = LENS.fx_px / 2.0
     body = DetectedPerson((0, 0, 1, 1), (x, y - 0.05 * px_m), 0.83 * px_m, 0.9)
-    (dressed,), (person,) = ClothingReader().dressed(picture((one, RED)), 0.0, (one,), (body,))
+    (dressed,), (person,) = ClothingReader().add_clothing(picture((one, RED)), 0.0, (one,), (body,))
     assert apart(dressed.clothing, person.clothing) < 0.05
 
 

@@ -408,14 +408,14 @@ def test_a_servo_whose_answers_are_never_confirmed_is_named_and_believed_later(r
     """As if a second servo with its id answered one question of two."""
     rig.run(0.1, [2000] * 4)
     reader = rig.bus._reader
-    second = reader.again
-    reader.again = lambda ids: {i: one for i, one in second(ids).items() if i != 2}
+    second = reader.reread
+    reader.reread = lambda ids: {i: one for i, one in second(ids).items() if i != 2}
     rig.bus.events()
     for _ in range(150):
         rig.command("corrupt 3 count 1")  # the line is disturbed, so answers are read twice
         rig.tick([2000] * 4)
     assert any("(servo 2) answers, but its bytes arrive damaged" in e for e in rig.bus.events())
-    reader.again = second
+    reader.reread = second
     rig.command("clear")
     rig.run(0.1, [2000] * 4)
     assert any("(servo 2) answers again" in event for event in rig.bus.events())

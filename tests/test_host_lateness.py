@@ -24,9 +24,9 @@ SYNC_READ = 0x82
 def test_few_late_answers_are_no_busy_computer():
     lateness = HostLateness()
     for k in range(BUSY - 1):
-        lateness.late_answer(5.0 + 0.01 * k)
+        lateness.record_late_answer(5.0 + 0.01 * k)
     assert lateness.busy(5.1) == 0
-    lateness.late_answer(5.1)
+    lateness.record_late_answer(5.1)
     assert lateness.busy(5.1) == BUSY
     assert lateness.busy(5.2 + WITHIN_S) == 0
 
@@ -34,14 +34,14 @@ def test_few_late_answers_are_no_busy_computer():
 def test_what_servos_do_soon_after_a_late_computer_is_put_down_to_it():
     lateness = HostLateness()
     assert lateness.cause(0.0) == ""
-    lateness.own_silence(0.7, 5.0)
-    lateness.own_silence(0.12, 5.1)  # the longest of one episode is told
+    lateness.record_own_silence(0.7, 5.0)
+    lateness.record_own_silence(0.12, 5.1)  # the longest of one episode is told
     assert lateness.cause(5.2) == "this computer was late: it sent nothing for 0.70 s"
     assert lateness.cause(5.2 + AFTERMATH_S) == ""
-    lateness.own_silence(0.2, 9.0)
+    lateness.record_own_silence(0.2, 9.0)
     assert "0.20 s" in lateness.cause(9.0)
     starved = HostLateness()
-    starved.late_answer(3.0)
+    starved.record_late_answer(3.0)
     assert "the emulator stood still" in starved.cause(3.5)
     assert starved.cause(3.0 + 2 * AFTERMATH_S) == ""
 

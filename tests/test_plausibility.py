@@ -26,36 +26,38 @@ STEP = 47_835 * 4096 // 360
 def known(*places):
     plausible = Plausibility([SPEED] * len(places))
     for slot, place in enumerate(places):
-        assert plausible.one(slot, place, 1.0)
+        assert plausible.is_plausible(slot, place, 1.0)
     return plausible
 
 
 def test_a_place_out_of_reach_is_not_believed_and_changes_nothing():
     plausible = known(1000, 2000)
-    assert not plausible.whole((1010, STEP), 1.005)
-    assert plausible.whole((1010, 2010), 1.005)
-    assert not plausible.one(0, STEP, 1.01)
-    assert plausible.one(0, 1020, 1.015)
+    assert not plausible.are_plausible((1010, STEP), 1.005)
+    assert plausible.are_plausible((1010, 2010), 1.005)
+    assert not plausible.is_plausible(0, STEP, 1.01)
+    assert plausible.is_plausible(0, 1020, 1.015)
 
 
 def test_who_says_so_again_and_again_is_believed():
     plausible = known(1000, 2000)
-    said = [plausible.one(1, 3500 + k, 1.0 + 0.005 * k) for k in range(1, AGREEING + 1)]
+    said = [plausible.is_plausible(1, 3500 + k, 1.0 + 0.005 * k) for k in range(1, AGREEING + 1)]
     assert said == [False] * (AGREEING - 1) + [True]
-    assert plausible.one(1, 3500, 1.1)
+    assert plausible.is_plausible(1, 3500, 1.1)
 
 
 def test_values_that_disagree_with_each_other_are_never_believed():
     plausible = known(1000)
-    assert not any(plausible.one(0, 3000 + 900 * (k % 2), 1.0 + 0.005 * k) for k in range(1, 40))
+    assert not any(
+        plausible.is_plausible(0, 3000 + 900 * (k % 2), 1.0 + 0.005 * k) for k in range(1, 40)
+    )
 
 
 def test_reach_grows_with_time_and_all_is_believed_after_a_port_was_gone():
     plausible = known(1000)
-    assert not plausible.one(0, 3000, 1.1)
-    assert plausible.one(0, 3000, 1.6)
+    assert not plausible.is_plausible(0, 3000, 1.1)
+    assert plausible.is_plausible(0, 3000, 1.6)
     plausible.forget()
-    assert plausible.one(0, -40_000, 1.61)
+    assert plausible.is_plausible(0, -40_000, 1.61)
 
 
 @settings(deadline=None, max_examples=60)
@@ -65,25 +67,25 @@ def test_no_motion_that_the_motor_can_make_is_refused(speeds, data):
     for speed in speeds:
         dt_s = data.draw(st.floats(0.001, 0.05))
         at_s, place = at_s + dt_s, place + speed * dt_s
-        assert plausible.whole((round(place), 2000), at_s)
+        assert plausible.are_plausible((round(place), 2000), at_s)
 
 
 def test_on_a_disturbed_line_a_joint_comes_no_farther_than_its_motor_can_turn_it():
     """Two servos with one id answer at the same time: what both say passes the sum twice."""
     within, beyond = SPEED * (0.019 + LATE_S), SPEED * (0.019 + LATE_S) + PAIR_STEPS + 1
-    assert known(1000).one(0, round(1000 + beyond), 1.019)
+    assert known(1000).is_plausible(0, round(1000 + beyond), 1.019)
     for way, believed in ((within, True), (beyond, False), (-beyond, False)):
         plausible = known(1000)
-        plausible.damaged(1.0)
-        assert plausible.one(0, round(1000 + way), 1.019) == believed
+        plausible.record_damaged(1.0)
+        assert plausible.is_plausible(0, round(1000 + way), 1.019) == believed
 
 
 def test_a_line_is_disturbed_for_a_while_after_a_damaged_answer():
     plausible = known(1000)
-    assert not plausible.disturbed(1.0)
-    plausible.damaged(1.0)
-    assert plausible.disturbed(1.0 + DISTURBED_S)
-    assert not plausible.disturbed(1.1 + DISTURBED_S)
+    assert not plausible.is_disturbed(1.0)
+    plausible.record_damaged(1.0)
+    assert plausible.is_disturbed(1.0 + DISTURBED_S)
+    assert not plausible.is_disturbed(1.1 + DISTURBED_S)
 
 
 def test_two_answers_right_after_one_another_agree_within_the_way_of_their_speeds():
@@ -96,7 +98,7 @@ def test_two_answers_right_after_one_another_agree_within_the_way_of_their_speed
     ):
         low, high = low - PAIR_STEPS, high + PAIR_STEPS
         for way, agree in ((low, True), (high, True), (low - 1, False), (high + 1, False)):
-            assert plausible.pair(0, way, 0.02, speeds) == agree
+            assert plausible.agree(0, way, 0.02, speeds) == agree
 
 
 @pytest.mark.parametrize(

@@ -187,13 +187,13 @@ def test_after_trouble_no_reading_has_the_length_of_the_one_before():
     assert tells == ([True] + [False] * 7) * 2
     lengths = []
     for k in range(5):
-        together.trouble(0.01 * k)
+        together.record_trouble(0.01 * k)
         lengths.append(together.next().length)
     usual = {SENSED.length, ARMED.length}
     assert len(set(lengths)) == 5 and not usual & set(lengths)
-    together.calm(0.28)
+    together.end_trouble(0.28)
     assert together.next().length not in usual
-    together.calm(0.30)
+    together.end_trouble(0.30)
     assert together.next().length in usual
     others = {alone.next().length for _ in range(10)}
     assert len(others) == 10 and not others & (usual | set(lengths))
@@ -258,8 +258,8 @@ def both_ways(group, raw, *columns):
     one, other = columns
     for each in columns:
         for slot in range(len(group.ids)):
-            each.places.place(slot, 900, 0.99)
-            assert each.places.one(slot, 900, 1.0)
+            each.places.record(slot, 900, 0.99)
+            assert each.places.is_plausible(slot, 900, 1.0)
     taken, each = one.apply_whole(group, raw, 1.01), group.pieces(raw).samples
     for slot, servo_id in enumerate(group.ids):
         other.take(slot, ServoReply(each[servo_id], 1.01))
@@ -358,50 +358,50 @@ def test_only_those_who_kept_silent_themselves_are_blamed(heard, blamed):
 def test_a_silent_servo_is_asked_at_once_then_ever_more_seldom():
     polled = PollList(IDS)
     now_s = 10.0
-    polled.silent(1, now_s)
+    polled.record_silent(1, now_s)
     assert (polled.group, polled.due(now_s)) == ((4, 9), 1)
     waits = []
     for _ in range(6):
-        polled.silent(1, now_s)
+        polled.record_silent(1, now_s)
         start_s = now_s
         while polled.due(now_s) is None:
             now_s += AGAIN_FIRST_S / 4
         waits.append(now_s - start_s)
     assert waits == [0.0625, 0.125, 0.25, 0.5, 0.5, AGAIN_LAST_S]
-    assert polled.answered(1)
+    assert polled.record_answer(1)
     assert (polled.group, polled.troubled) == (IDS, False)
-    assert not polled.answered(1)
+    assert not polled.record_answer(1)
 
 
 def test_where_all_are_out_somebody_is_always_asked_and_one_answer_calls_all_back():
     polled = PollList(IDS)
     for servo_id in IDS:
-        polled.silent(servo_id, 1.0)
-        polled.silent(servo_id, 1.0)
+        polled.record_silent(servo_id, 1.0)
+        polled.record_silent(servo_id, 1.0)
     assert polled.group == ()
     assert polled.due(1.0) == 4
-    polled.silent(4, 1.0)
+    polled.record_silent(4, 1.0)
     assert polled.due(1.0) == 1
-    assert polled.answered(1)
+    assert polled.record_answer(1)
     assert (polled.group, polled.due(1.0)) == (IDS, None)
 
 
 def test_damage_three_times_in_a_row_takes_a_servo_out():
     polled = PollList(IDS)
     for _ in range(2):
-        polled.damaged(9, 0.0)
-    polled.answered(9)
+        polled.record_damaged(9, 0.0)
+    polled.record_answer(9)
     for _ in range(2):
-        polled.damaged(9, 0.0)
+        polled.record_damaged(9, 0.0)
     assert polled.group == IDS
-    polled.damaged(9, 0.0)
+    polled.record_damaged(9, 0.0)
     assert polled.group == (4, 1)
 
 
 def test_several_out_take_turns():
     polled = PollList(IDS)
-    polled.silent(4, 1.0)
-    polled.silent(9, 1.1)
+    polled.record_silent(4, 1.0)
+    polled.record_silent(9, 1.1)
     assert polled.due(2.0) == 4
-    polled.silent(4, 2.0)
+    polled.record_silent(4, 2.0)
     assert polled.due(2.0) == 9

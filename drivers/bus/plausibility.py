@@ -58,7 +58,7 @@ class Plausibility:
         self._odd: list[list[tuple[int, float]]] = [[] for _ in range(count)]
         self._whole_s = float("nan")
 
-    def place(self, slot: int, position: int, at_s: float) -> None:
+    def record(self, slot: int, position: int, at_s: float) -> None:
         """Record a position of a servo that comes from another source than its cyclic answer."""
         last = self._last = list(self._last)
         if not isnan(self._whole_s):
@@ -67,7 +67,7 @@ class Plausibility:
         self._odd[slot].clear()
         self._whole_s = float("nan")
 
-    def whole(self, positions: Sequence[int], at_s: float) -> bool:
+    def are_plausible(self, positions: Sequence[int], at_s: float) -> bool:
         """Return whether all positions of one answer are plausible; only then are they recorded."""
         # Fast path of every tick: servos last read together have one common time.
         since_s = at_s - self._whole_s
@@ -81,7 +81,7 @@ class Plausibility:
         self._last, self._whole_s = positions, at_s
         return True
 
-    def one(self, slot: int, position: int, at_s: float) -> bool:
+    def is_plausible(self, slot: int, position: int, at_s: float) -> bool:
         """Return whether one servo's position is plausible; call it once for every answer."""
         last, odd = self._last[slot], self._odd[slot]
         last_s = self._at_s[slot] if isnan(self._whole_s) else self._whole_s
@@ -91,14 +91,14 @@ class Plausibility:
             odd.append((position, at_s))
             if len(odd) < AGREEING:
                 return False
-        self.place(slot, position, at_s)
+        self.record(slot, position, at_s)
         if all(at == at_s for at in self._at_s) and None not in self._last:
             self._whole_s = at_s
         return True
 
     def _near(self, slot: int, before: int, before_s: float, now: int, now_s: float) -> bool:
         since_s = max(0.0, now_s - before_s)
-        if self.disturbed(now_s):  # two servos with one id report the same wrong position twice
+        if self.is_disturbed(now_s):  # two servos with one id report the same wrong position twice
             reach = PAIR_STEPS + self._fastest[slot] * (LATE_S + since_s)
         else:
             reach = self._free[slot] + self._pace[slot] * since_s
@@ -106,15 +106,15 @@ class Plausibility:
 
     # --- a line with recently damaged answers
 
-    def damaged(self, at_s: float) -> None:
+    def record_damaged(self, at_s: float) -> None:
         """Record that an answer was damaged or not plausible."""
         self.damaged_s = at_s
 
-    def disturbed(self, now_s: float) -> bool:
+    def is_disturbed(self, now_s: float) -> bool:
         """Return whether an answer was damaged recently."""
         return now_s - self.damaged_s <= DISTURBED_S
 
-    def pair(self, slot: int, way: int, since_s: float, speeds_steps_s: Sequence[float]) -> bool:
+    def agree(self, slot: int, way: int, since_s: float, speeds_steps_s: Sequence[float]) -> bool:
         """Return whether two consecutive answers are plausible together.
 
         Args:

@@ -135,7 +135,7 @@ class PortBus(ABC):
             BusLost: it has been lost for longer than ``give_up_s``.
         """
         self._now_s = now_s
-        if self._link.down and not self._link.returned(now_s):
+        if self._link.down and not self._link.try_reopen(now_s):
             return False
         if self._link.release_due:
             try:
@@ -166,4 +166,4 @@ class PortBus(ABC):
                 self._log.add(f"{self._servo_label(servo_id)}: {what}: {CUT}")
 
     def _lose(self, lost: BusLost) -> None:
-        self._link.lose(lost, self._now_s)
+        self._link.record_loss(lost, self._now_s)

@@ -62,7 +62,7 @@ class FrameAnalyzer:
         find_palms = getattr(self._detector, "palms", None)
         seen = shot.image, shot.captured_s, faces, people
         palms = None if find_palms is None else find_palms(*seen)
-        faces, people = self._clothing.dressed(shot.image, shot.captured_s, faces, people)
+        faces, people = self._clothing.add_clothing(shot.image, shot.captured_s, faces, people)
         bodies_s = perf_counter()
         blobs = self._motion(shot) if self._motion is not None else ()
         spent_s = {

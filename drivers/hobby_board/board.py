@@ -146,7 +146,7 @@ class Board(Protocol):
         """Send the goals of channels."""
         ...
 
-    def steady(self, channels: Sequence[Channel]) -> None:
+    def resend_pulses(self, channels: Sequence[Channel]) -> None:
         """Hold the pulses while the board does not answer, if that is safe."""
         ...
 

@@ -194,7 +194,7 @@ class HobbyBoardBus(PortBus):
         now_s = self._port.now_s()
         try:
             if not self._supervisor.sure:
-                self._board.steady(held)
+                self._board.resend_pulses(held)
                 return
             for channel, goal in zip(self._channels, goals, strict=True):
                 if channel.held:

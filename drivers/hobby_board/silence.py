@@ -63,7 +63,7 @@ class SilenceMonitor:
             return
         silent_s = self._back_s - self._since_s
         noise = self._spoilt >= IN_A_ROW
-        if silent_s >= SILENCE_S and not noise and self._lateness.any_since(self._since_s):
+        if silent_s >= SILENCE_S and not noise and self._lateness.was_late_since(self._since_s):
             self._log.add(STOOD_STILL.format(silent_s))
         elif self._reported:
             self._log.add(f"the board answers again after {silent_s:.1f} s")

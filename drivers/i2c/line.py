@@ -47,7 +47,7 @@ class I2cLine:
         if self._late:
             dropped = port.drain()
             if dropped and self.failure == "timeout":
-                self.lateness.late_answer(port.now_s())
+                self.lateness.record_late_answer(port.now_s())
         packet = b"".join([transfer + READ_STATUS for transfer, _ in transfers])
         lengths = [length for _, length in transfers]
         wanted = sum(lengths) + len(lengths)

@@ -139,7 +139,7 @@ class MaestroBoard:
         """Send the goals of channels."""
         self.line.send(self.line.speech.targets(goals_of(channels)))
 
-    def steady(self, channels: Sequence[Channel]) -> None:
+    def resend_pulses(self, channels: Sequence[Channel]) -> None:
         """Do nothing: a board that may have restarted would apply goals without any ramp."""
 
     def lead(self, channels: Sequence[Channel]) -> None:

@@ -60,7 +60,7 @@ class MaestroLink:
             # After a silence answers to earlier requests may come first.
             dropped = port.drain()
             if 0 < dropped <= self._owed:
-                self.lateness.late_answer(port.now_s())
+                self.lateness.record_late_answer(port.now_s())
             if not self._late and not dropped:
                 self._owed = 0
         wire_s = (len(packet) + length) * self._byte_s

@@ -315,7 +315,7 @@ class Pca9685Board:
         self.line.send(packet)
         self._sent_s = self.line.port.now_s()
 
-    def steady(self, channels: Sequence[Channel]) -> None:
+    def resend_pulses(self, channels: Sequence[Channel]) -> None:
         """Send the last pulses once more, as a byte lost in a series of them shifts the rest."""
         self._send({c.id: self._sent[c.id][0] for c in channels if c.id in self._sent})
 

@@ -45,16 +45,16 @@ class HostLateness:
         self._late: deque[float] = deque(maxlen=1000)
         self._last_s = -inf
 
-    def late_answer(self, at_s: float) -> None:
+    def record_late_answer(self, at_s: float) -> None:
         """Record a late answer."""
         self._late.append(at_s)
         self._last_s = at_s
 
-    def any_since(self, begin_s: float) -> bool:
+    def was_late_since(self, begin_s: float) -> bool:
         """Return whether an answer was late since ``begin_s``, with or without noise."""
         return self._last_s >= begin_s
 
-    def own_silence(self, silent_s: float, until_s: float) -> None:
+    def record_own_silence(self, silent_s: float, until_s: float) -> None:
         """Record that this computer has sent nothing for ``silent_s`` seconds."""
         if until_s - self._silent_until_s >= AFTERMATH_S or silent_s > self._silent_s:
             self._silent_s = silent_s
@@ -64,7 +64,7 @@ class HostLateness:
         """Return the recent delay of this computer as text, "" for none."""
         if now_s - self._silent_until_s < AFTERMATH_S:
             return f"this computer was late: it sent nothing for {self._silent_s:.2f} s"
-        if self.any_since(now_s - AFTERMATH_S):
+        if self.was_late_since(now_s - AFTERMATH_S):
             return "this computer was busy, or the emulator stood still: answers came late"
         return ""
 

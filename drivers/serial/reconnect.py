@@ -21,7 +21,7 @@ class Reconnect:
         self._since_s = self._next_s = 0.0
         self._wait_s = FIRST_S
 
-    def lost(self, now_s: float) -> None:
+    def record_lost(self, now_s: float) -> None:
         """Record that the port is lost."""
         self.down = True
         self._since_s, self._wait_s = now_s, FIRST_S
@@ -31,12 +31,12 @@ class Reconnect:
         """Return whether an attempt is due."""
         return now_s >= self._next_s
 
-    def failed(self, now_s: float, longest_s: float = LAST_S) -> None:
+    def record_failed(self, now_s: float, longest_s: float = LAST_S) -> None:
         """Record a failed attempt; the next one follows within ``longest_s``."""
         self._wait_s = min(longest_s, 2.0 * self._wait_s)
         self._next_s = now_s + self._wait_s
 
-    def back(self, now_s: float) -> float:
+    def record_reopened(self, now_s: float) -> float:
         """Record that the port is open again; return the time for which it was lost, seconds."""
         self.down = False
         return now_s - self._since_s
@@ -74,14 +74,14 @@ class ReconnectingPort:
         self._link = Reconnect()
         self.down = self.release_due = False
 
-    def lose(self, lost: BusLost, now_s: float) -> None:
+    def record_loss(self, lost: BusLost, now_s: float) -> None:
         """Record that the port is lost."""
-        self._link.lost(now_s)
+        self._link.record_lost(now_s)
         self.down = True
         self._port.closePort()
         self._log.add(f"port lost: {lost}")
 
-    def returned(self, now_s: float) -> bool:
+    def try_reopen(self, now_s: float) -> bool:
         """Try to open the port if an attempt is due; return whether it is open.
 
         Raises:
@@ -93,9 +93,9 @@ class ReconnectingPort:
                 self.down = False
                 where = getattr(self._port, "opened_as", self._port.port_name)
                 renamed = f" as {where}" if where != self._port.port_name else ""
-                self._log.add(f"port back after {self._link.back(now_s):.1f} s{renamed}")
+                self._log.add(f"port back after {self._link.record_reopened(now_s):.1f} s{renamed}")
                 return True
-            self._link.failed(now_s, FIRST_S if self.release_due else LAST_S)
+            self._link.record_failed(now_s, FIRST_S if self.release_due else LAST_S)
         if gone_s >= self._give_up_s:
             raise BusLost(
                 f"{self._port.port_name} has been gone for {gone_s:.1f} s: check the USB cable"
@@ -116,7 +116,7 @@ class ReconnectingPort:
         """Try to open the port now, even if no attempt is due; return whether it is open."""
         if not self._open():
             return False
-        self._link.back(now_s)
+        self._link.record_reopened(now_s)
         self.down = False
         return True
 

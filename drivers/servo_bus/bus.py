@@ -138,7 +138,7 @@ class SmartServoBus(PortBus):
         for servo_id, one in replies.items():
             slot = self._slot[servo_id]
             garbled = servo_id in self._poll_list.garbling
-            was_out = self._poll_list.answered(servo_id)
+            was_out = self._poll_list.record_answer(servo_id)
             if was_out:
                 supervisor.check_after_silence(servo_id)
             if one.sample.error & self._family.codec.REFUSAL:
@@ -171,8 +171,8 @@ class SmartServoBus(PortBus):
         damaged = self._line.errors.get("corrupt", 0)
         if damaged != self._damaged or self._reader.stray_s == now_s:
             self._damaged = damaged
-            places.damaged(now_s)
-        return places.disturbed(now_s)
+            places.record_damaged(now_s)
+        return places.is_disturbed(now_s)
 
     def _confirm_doubtful(
         self, replies: dict[int, ServoReply], now_s: float
@@ -184,10 +184,10 @@ class SmartServoBus(PortBus):
         """
         disturbed = self._disturbed(now_s)
         doubtful = [i for i in replies if disturbed or self._reader.is_reply_pending(i, now_s)]
-        again = self._reader.again(doubtful) if doubtful else {}
+        again = self._reader.reread(doubtful) if doubtful else {}
         kept = {i: one for i, one in replies.items() if i not in doubtful}
         for servo_id in doubtful:
-            self._poll_list.answered(servo_id)
+            self._poll_list.record_answer(servo_id)
             second = again.get(servo_id)
             slot, first = self._slot[servo_id], replies[servo_id]
             both = second and self._feedback.confirmed(slot, first, second)
@@ -276,7 +276,7 @@ class SmartServoBus(PortBus):
                 if doubtful or not feedback.apply_whole(group, raw, at_s):
                     self._take(reader.salvage(group, raw, at_s, now_s), now_s)
                 elif self._health.all_silent_since_s is not None:
-                    self._health.answered_again(now_s, line.lateness)
+                    self._health.record_answered_again(now_s, line.lateness)
             if now_s >= supervisor.due_s:
                 supervisor.service(self._poll_list.group, now_s)
         except BusLost as lost:

@@ -51,21 +51,21 @@ class ServoHealth:
         self._back_s: float | None = None
         self._seldom = RateLimitedLog(log)
 
-    def latched(self, servo_id: int, errors: Sequence[str]) -> bool:
+    def record_latched(self, servo_id: int, errors: Sequence[str]) -> bool:
         """Record latched errors; return whether they are new."""
         fault = " and ".join(errors)
         if self.faults.get(servo_id) == fault:
             return False
-        self.name(servo_id, fault)
+        self.record_fault(servo_id, fault)
         self.latches.add(servo_id)
         return True
 
-    def name(self, servo_id: int, fault: str) -> None:
+    def record_fault(self, servo_id: int, fault: str) -> None:
         """Record a fault that stays until the servo is restarted."""
         self.faults[servo_id] = fault
         self._log.add(f"{self._setups[servo_id].label()}: {fault}")
 
-    def cleared(self, servo_id: int) -> None:
+    def record_cleared(self, servo_id: int) -> None:
         """Record that a servo's latched error has ended."""
         if servo_id in self.latches:
             self.latches.discard(servo_id)
@@ -78,21 +78,21 @@ class ServoHealth:
         self._restarts[servo_id] = lately
         if len(lately) < MOST_RESTARTS:
             return False
-        self.name(servo_id, AGAIN_AND_AGAIN)
+        self.record_fault(servo_id, AGAIN_AND_AGAIN)
         return True
 
-    def restarted(self, servo_id: int, now_s: float) -> None:
+    def record_restarted(self, servo_id: int, now_s: float) -> None:
         """Record that a servo restarted and works again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
         self._log.add(f"{self._setups[servo_id].label()} restarted: set up again")
 
-    def not_set_up(self, servo_id: int) -> None:
+    def record_not_set_up(self, servo_id: int) -> None:
         """Record that a servo, alone, could not be set up again."""
         self._failed[servo_id] = failed = self._failed.get(servo_id, 0) + 1
         if failed == FAILED_IN_A_ROW:
             self._log.add(f"{self._setups[servo_id].label()} {NOT_SET_UP}")
 
-    def set_up(self, servo_id: int) -> None:
+    def record_set_up(self, servo_id: int) -> None:
         """Record that a servo has been set up again."""
         self._failed.pop(servo_id, None)
 
@@ -114,7 +114,7 @@ class ServoHealth:
             if self.all_silent_since_s is None:
                 self.all_silent_since_s = now_s
         elif answered and self.all_silent_since_s is not None:
-            self.answered_again(now_s, lateness)
+            self.record_answered_again(now_s, lateness)
             # While no servo answered, none in particular was silent.
             self._silent_since = {i: max(t, now_s) for i, t in self._silent_since.items()}
         for servo_id in [i for i in self._silent_since if i not in out]:
@@ -135,7 +135,7 @@ class ServoHealth:
             self._all_silent = True
             self._log.add("no servo answers: check servo power and cable")
 
-    def answered_again(self, now_s: float, lateness: HostLateness) -> None:
+    def record_answered_again(self, now_s: float, lateness: HostLateness) -> None:
         """Report the cause of a silence of all servos, after late answers have arrived."""
         if self.all_silent_since_s is None:
             return
@@ -144,7 +144,7 @@ class ServoHealth:
         if now_s - self._back_s < OWED_S:
             return
         silent_s = self._back_s - self.all_silent_since_s
-        if silent_s >= SILENCE_S and lateness.any_since(self.all_silent_since_s):
+        if silent_s >= SILENCE_S and lateness.was_late_since(self.all_silent_since_s):
             self._log.add(STOOD_STILL.format(silent_s))
         elif self._all_silent:
             who = "servos" if self._silent_since else "all servos"
@@ -154,7 +154,7 @@ class ServoHealth:
         self.all_silent_since_s = self._back_s = None
         self._all_silent = False
 
-    def stopped(self, count: int, late: str, now_s: float) -> None:
+    def record_stopped(self, count: int, late: str, now_s: float) -> None:
         """Record that servos were stopped by their own watchdog and continue from their position.
 
         late: recent lateness of this computer as text, "" for none

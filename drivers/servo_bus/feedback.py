@@ -132,7 +132,7 @@ class FeedbackColumns:
             if max(celsius) > MOST_CELSIUS:
                 return False
             warm = celsius
-        if not self.places.whole(position, at_s):
+        if not self.places.are_plausible(position, at_s):
             return False
         if at_voltage is not None and (tenths := values[at_voltage]) != self._tenths:
             self._tenths, volts = tenths, tuple([0.1 * one for one in tenths])
@@ -168,15 +168,15 @@ class FeedbackColumns:
             return False
         answers = [replies[i] for i in self._ids]
         at_s = answers[0].at_s
-        if self.places.disturbed(at_s) or any(one.at_s != at_s for one in answers):
+        if self.places.is_disturbed(at_s) or any(one.at_s != at_s for one in answers):
             return False
-        return self.places.whole(
+        return self.places.are_plausible(
             [self._near(slot, one.sample.position) for slot, one in enumerate(answers)], at_s
         )
 
     def is_plausible(self, slot: int, reply: ServoReply) -> bool:
         """Return whether one servo's answer is plausible; call it once for every answer."""
-        return self.places.one(slot, self._near(slot, reply.sample.position), reply.at_s)
+        return self.places.is_plausible(slot, self._near(slot, reply.sample.position), reply.at_s)
 
     def confirmed(self, slot: int, first: ServoReply, second: ServoReply) -> ServoReply | None:
         """Return the values that two consecutive answers agree on, None if they differ."""
@@ -186,7 +186,7 @@ class FeedbackColumns:
         alike = (
             warmer <= ALIKE_C
             and stronger <= ALIKE_TENTH_V
-            and self.places.pair(
+            and self.places.agree(
                 slot,
                 other.position - one.position,
                 second.at_s - first.at_s,
@@ -269,7 +269,7 @@ class FeedbackColumns:
         """Set the position of a servo that was just recovered and does not move."""
         near = self._near(slot, position)
         self.set_torque(slot, torque)
-        self.places.place(slot, near, at_s)
+        self.places.record(slot, near, at_s)
         self._apply_one(slot, near, 0.0, 0.0, at_s)
 
 

@@ -75,7 +75,7 @@ class LatchedFaultSupervisor(Supervisor):
         self.due_s = -inf
 
     def _latched(self, servo_id: int, status: int) -> None:
-        if self._health.latched(servo_id, self._family.name_errors(status)):
+        if self._health.record_latched(servo_id, self._family.name_errors(status)):
             self._line.errors["alert"] += 1
             self._name_fault(servo_id)
 

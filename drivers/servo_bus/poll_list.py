@@ -42,7 +42,7 @@ class PollList:
         ready = [i for i, due_s in waiting.items() if due_s <= now_s or not self.group]
         return min(ready, key=waiting.__getitem__, default=None)
 
-    def silent(self, servo_id: int, now_s: float) -> None:
+    def record_silent(self, servo_id: int, now_s: float) -> None:
         """Record that a servo did not answer; it is due immediately the first time."""
         if servo_id in self._due_s:
             wait_s = self._wait_s.get(servo_id, AGAIN_FIRST_S)
@@ -52,15 +52,15 @@ class PollList:
             self._due_s[servo_id] = now_s
         self._regroup()
 
-    def damaged(self, servo_id: int, now_s: float) -> None:
+    def record_damaged(self, servo_id: int, now_s: float) -> None:
         """Record that a servo's answer arrived damaged."""
         self._damaged[servo_id] = self._damaged.get(servo_id, 0) + 1
         self.troubled = True
         if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._due_s:
             self.garbling.add(servo_id)
-            self.silent(servo_id, now_s)
+            self.record_silent(servo_id, now_s)
 
-    def answered(self, servo_id: int) -> bool:
+    def record_answer(self, servo_id: int) -> bool:
         """Record a good answer; return whether the servo had been out."""
         self.garbling.discard(servo_id)
         if self._damaged.pop(servo_id, None) is not None:

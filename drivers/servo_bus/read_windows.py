@@ -114,13 +114,13 @@ class WindowSchedule:
             self._at = 0
         return self._usual[self._at]
 
-    def trouble(self, now_s: float) -> None:
+    def record_trouble(self, now_s: float) -> None:
         """Record that an answer is missing: the next reads have other lengths."""
         self.troubled = True
         self._pair, self._odd = (self._pair + 2) % len(self._spare), 1
         self._calm_at_s = now_s + CALM_S
 
-    def calm(self, now_s: float) -> None:
+    def end_trouble(self, now_s: float) -> None:
         """Return to the usual windows once no answer can be late any more."""
         if now_s >= self._calm_at_s:
             self.troubled = False

@@ -108,10 +108,10 @@ class Recovery:
             return None
         for servo_id in well:
             if self._family.faults_latch:
-                health.cleared(servo_id)
+                health.record_cleared(servo_id)
             if engaged and not torque[servo_id]:
                 line.errors["restarted"] += 1
-                health.restarted(servo_id, now_s)
+                health.record_restarted(servo_id, now_s)
         return found
 
     def _same_models(self, ids: tuple[int, ...]) -> tuple[int, ...]:
@@ -126,7 +126,7 @@ class Recovery:
         for servo_id in numbers:
             if numbers[servo_id] != expected[servo_id]:
                 model = self._setups[servo_id].model
-                self._health.name(servo_id, f"is not {model} any more: exchanged?")
+                self._health.record_fault(servo_id, f"is not {model} any more: exchanged?")
         return tuple(i for i in ids if numbers.get(i) == expected[i])
 
     def _without_faults(self, ids: tuple[int, ...], torque: Mapping[int, int]) -> tuple[int, ...]:
@@ -138,7 +138,7 @@ class Recovery:
         found = find_faults(self._line, ids)
         if family.faults_latch:
             for servo_id, bits in found.items():
-                self._health.latched(servo_id, family.name_errors(bits))
+                self._health.record_latched(servo_id, family.name_errors(bits))
             return tuple(i for i in ids if i not in found)
         denied = {i for i, bits in found.items() if bits & family.torque_faults}
         return tuple(i for i in ids if i not in denied or torque.get(i, 1))
@@ -158,7 +158,7 @@ class Recovery:
             again = dict(zip(astray, read_positions(self._line, astray), strict=True))
             astray = [i for i in astray if self.is_lost(i, again[i])]
         for servo_id in astray:
-            self._health.name(servo_id, FAR_SIDE)
+            self._health.record_fault(servo_id, FAR_SIDE)
         if astray:
             switch_off(self._line, astray)
         return tuple(i for i in ids if i not in astray)

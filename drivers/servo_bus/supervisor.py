@@ -139,7 +139,7 @@ class Supervisor(ABC):
         found = self._recovery.recover(ids, self.engaged, now_s)
         if found is None:
             if self._failures:
-                self._health.not_set_up(ids[0])
+                self._health.record_not_set_up(ids[0])
             self._failures += 1
             return
         self._suspects.difference_update(ids)
@@ -149,7 +149,7 @@ class Supervisor(ABC):
             self._recover_at_s = now_s
         at_s = self._line.port.now_s()
         for servo_id in ids:
-            self._health.set_up(servo_id)
+            self._health.record_set_up(servo_id)
             self._name_fault(servo_id)
         for servo_id, position in found.items():
             self._line.errors["rearmed"] += 1
@@ -176,7 +176,7 @@ class Supervisor(ABC):
             now_s = self._line.port.now_s()
             late = self._line.lateness.cause(now_s)
             self._line.errors[LATE_COMPUTER if late else "watchdog"] += len(healed)
-            self._health.stopped(len(healed), late, now_s)
+            self._health.record_stopped(len(healed), late, now_s)
 
     def _name_fault(self, servo_id: int) -> None:
         """Copy a servo's fault to the feedback."""

@@ -58,7 +58,7 @@ class SyncReader:
         """Return the due read of all servos; None if they are not all read in one exchange."""
         polled, turns = self.poll_list, self._together
         if turns.troubled:
-            turns.calm(now_s)
+            turns.end_trouble(now_s)
         if polled.troubled or not self._sync_read:
             return None
         window = turns.next()
@@ -92,7 +92,7 @@ class SyncReader:
         """
         return now_s - self._unanswered_s.get(servo_id, -inf) <= OWED_S
 
-    def again(self, ids: Sequence[int]) -> dict[int, ServoReply]:
+    def reread(self, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Read some servos once more, in one exchange; absent servos gave no good answer.
 
         Raises:
@@ -192,7 +192,7 @@ class SyncReader:
                     self._unanswered_s[servo_id] = now_s
             silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
             if not samples and not damaged and self._header in raw:
-                self._line.lateness.late_answer(now_s)  # to an earlier request
+                self._line.lateness.record_late_answer(now_s)  # to an earlier request
             self._record_failures(damaged, silent, now_s, turns)
             done = replies.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
@@ -210,11 +210,11 @@ class SyncReader:
             line.lateness.forget()  # noise looks like a late answer
         for servo_id in damaged:
             line.errors["corrupt"] += 1
-            polled.damaged(servo_id, now_s)
+            polled.record_damaged(servo_id, now_s)
         for servo_id in silent:
             line.errors["timeout"] += 1
-            polled.silent(servo_id, now_s)
-        turns.trouble(now_s)
+            polled.record_silent(servo_id, now_s)
+        turns.record_trouble(now_s)
         if not line.quiet and line.drain(line.timeout.seconds):
             line.timeout.missed()
 

@@ -83,7 +83,7 @@ class Transactions:
     def _record_starvation(self, silent_s: float) -> None:
         """Record a silence of this computer that tripped the servos' watchdogs."""
         self.starved = True
-        self.lateness.own_silence(silent_s, self.port.now_s())
+        self.lateness.record_own_silence(silent_s, self.port.now_s())
 
     def exchange(self, request: bytes, length: int, reserve: bool = True) -> tuple[bytes, float]:
         """Send a request and wait for ``length`` bytes.
@@ -179,7 +179,7 @@ class Transactions:
     def _record_late(self, raw: bytes) -> None:
         """Record answers that arrived after their time-outs; noise does not count."""
         if any(status.intact for status in self.family.codec.statuses(raw)):
-            self.lateness.late_answer(self.port.now_s())
+            self.lateness.record_late_answer(self.port.now_s())
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
         """Read the same bytes of several servos.

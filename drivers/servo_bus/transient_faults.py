@@ -120,18 +120,18 @@ class TransientFaultSupervisor(Supervisor):
         if servo_id in health.faults and servo_id not in health.latches:
             return  # a worse fault is recorded
         if bits:
-            health.name(servo_id, " and ".join(self._family.name_errors(bits)))
+            health.record_fault(servo_id, " and ".join(self._family.name_errors(bits)))
             health.latches.add(servo_id)
             self._line.errors["alert"] += 1
         else:
-            health.cleared(servo_id)
+            health.record_cleared(servo_id)
         self._name_fault(servo_id)
 
     def _check_far_side(self, servo_id: int, steps: int) -> None:
         """Check whether a joint was turned back into its range by hand."""
         if not self._recovery.is_lost(servo_id, steps):
             self._health.latches.add(servo_id)
-            self._health.cleared(servo_id)
+            self._health.record_cleared(servo_id)
             self._name_fault(servo_id)
             self._suspects.add(servo_id)
 

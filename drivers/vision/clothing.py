@@ -64,7 +64,7 @@ class ClothingReader:
     def __init__(self) -> None:
         self._before: list[tuple[float, _Head]] = []
 
-    def dressed(
+    def add_clothing(
         self,
         image: ImageArray,
         captured_s: float,

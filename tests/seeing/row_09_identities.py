@@ -139,7 +139,7 @@ def pictures(ways: list[Way], seconds: float, rng: np.random.Generator, drawn: b
         faces = [detected(p, rng) for p in seen.values() if rng.random() >= _MISSED]
         found = tuple(faces[n] for n in rng.permutation(len(faces)))
         if crowd is not None:
-            found, _ = reader.dressed(crowd.image(places, k), k / RATE_HZ, found)
+            found, _ = reader.add_clothing(crowd.image(places, k), k / RATE_HZ, found)
         yield Detections(k / RATE_HZ, k, *SIZE, faces=found), places, set(seen)
 
 

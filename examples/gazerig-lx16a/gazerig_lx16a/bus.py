@@ -157,7 +157,7 @@ class Lx16aBus(PortBus):
         steps = line.ask(setup.id, p.POSITION)
         loaded = None if steps is None else line.ask(setup.id, p.LOADED)
         at_s, label = self._port.now_s(), setup.label()
-        if steps is None or loaded is None or not self._sure.one(i, steps, at_s):
+        if steps is None or loaded is None or not self._sure.is_plausible(i, steps, at_s):
             silent_s = now_s - self._heard_s[i]
             self._due_s[i] = now_s + AGAIN_S if silent_s > SILENT_S else -inf
             if silent_s > SILENT_S and not self._told[i]:
