@@ -22,7 +22,7 @@ from gazerig.drivers.types import Camera, Detections
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.borrowed_camera import SILENT_S, BorrowedCamera
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.model.frames import CameraMount, standing_still
+from gazerig.robot.model.frames import CameraMount, fixed_mount
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -170,7 +170,7 @@ def test_an_emulated_rig_can_be_lent_a_camera_that_stands_still() -> None:
         assert isinstance(camera, BorrowedCamera) and made.mount.on_head
         camera.lent = True
         camera._place()
-        still = CameraMount(standing_still(rig.camera, made.shown().kinematics))
+        still = CameraMount(fixed_mount(rig.camera, made.shown().kinematics))
         level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         assert not made.mount.on_head
         assert made.mount.pose(level, (0.0, 0.0, 9.0)) == still.pose(level, (0.0, 0.0, 0.0))

@@ -74,7 +74,7 @@ def test_orders_cross_processes_as_json(order: Command) -> None:
         ({"do": "look_at", "p_world_m": [1.0, 2.0]}, "three finite numbers"),
         ({"do": "look_at", "p_world_m": [1.0, nan, 2.0]}, "three finite numbers"),
         ({"do": "look_at", "p_world_m": [1.0, True, 2.0]}, "three finite numbers"),
-        ({"do": "jog", "angles_rad": [["the nose", 0.1]]}, "no name of a joint"),
+        ({"do": "jog", "angles_rad": [["the nose", 0.1]]}, "not a joint name"),
         ({"do": "jog", "angles_rad": [["neck_yaw", inf]]}, "finite angle"),
         ({"do": "jog", "angles_rad": "neck"}, "pairs"),
         ({"do": "stop", "why": None}, "text"),

@@ -167,7 +167,7 @@ def test_a_coupling_that_cannot_be_is_refused() -> None:
     with pytest.raises(ValueError, match="once; missing is -35, 25 deg"):
         replace(KINDS["measured"], points=tuple(p for p in grid(RODS, 3) if p[:2] != (-35.0, 25.0)))
     back = [(f, s, abs(f), s) for f in (-10.0, 0.0, 10.0) for s in (-10.0, 10.0)]
-    with pytest.raises(ValueError, match="turn back beside 0, -10 deg"):
+    with pytest.raises(ValueError, match="reverse next to 0, -10 deg"):
         CouplingParams("measured", "neck_pitch", "neck_roll", points=tuple(back))
     with pytest.raises(ValueError, match="name two joints"):
         CouplingParams("differential", "jaw", "jaw")

@@ -16,8 +16,8 @@ from gazerig.robot.model.frames import (
     CameraParams,
     LensParams,
     PoseHistory,
+    fixed_mount,
     mounted_at,
-    standing_still,
 )
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
@@ -115,16 +115,16 @@ def test_half_a_lens_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_film_sees_from_where_the_head_camera_rests() -> None:
-    still = standing_still(CameraParams("head", (20.0, 0.0, 45.0)), KINEMATICS)
+    still = fixed_mount(CameraParams("head", (20.0, 0.0, 45.0)), KINEMATICS)
     assert still.mount == "base"
     resting = CameraMount(CameraParams("head", (20.0, 0.0, 45.0)))
     expected = resting.pose(*KINEMATICS.head_pose((0.0, 0.0, 0.0)))
     assert CameraMount(still).pose(*KINEMATICS.head_pose((1.0, 0.0, 0.0)))[1] == pytest.approx(
         expected[1]
     )
-    assert standing_still(still, KINEMATICS) is still
+    assert fixed_mount(still, KINEMATICS) is still
     rolled = CameraParams(roll_deg=3.0, lens=LensParams(640, 400, 480.0, 480.0, 320.0, 200.0))
-    kept = standing_still(rolled, KINEMATICS)
+    kept = fixed_mount(rolled, KINEMATICS)
     assert (kept.roll_deg, kept.lens) == (3.0, rolled.lens)
 
 

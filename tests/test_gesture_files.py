@@ -16,7 +16,7 @@ from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
 from gazerig.robot.app.key_frame_table import read_table
 from gazerig.robot.cli.gestures import app
-from gazerig.robot.model.key_frames import fitted_keys, smoothed
+from gazerig.robot.model.key_frames import fit_keys, smoothed
 
 DESK = load_rig("desk")
 
@@ -91,12 +91,12 @@ def test_a_motion_sampled_densely_becomes_few_keys_within_the_tolerance() -> Non
     times = np.cumsum(random.uniform(0.015, 0.025, 200))
     truth = 12.0 * np.sin(2 * pi * 0.6 * times) * np.minimum(1.0, times)
     even, smooth = smoothed(times, truth + random.normal(0.0, 0.15, 200))
-    found, values = fitted_keys(even, smooth, TOLERANCE_DEG)
+    found, values = fit_keys(even, smooth, TOLERANCE_DEG)
     assert 4 <= len(found) <= 30
     curve = MinimumJerkCurve(float(smooth[0]), found.tolist(), values.tolist())
     assert np.abs(curve.sampled(even)[0] - smooth).max() <= TOLERANCE_DEG
     assert np.abs(curve.sampled(times - times[0])[0] - truth).max() < TOLERANCE_DEG + 0.6
-    still = fitted_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
+    still = fit_keys(even, np.full(len(even), 3.0), TOLERANCE_DEG)
     assert len(still[0]) == 0
 
 

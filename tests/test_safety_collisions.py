@@ -241,7 +241,7 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
     params, errors = validate(GuardParams, {"collisions": (pair,)})
     assert errors == [] and params is not None and params.collisions == (LID,)
     wrong: list[tuple[dict[str, object], str]] = [
-        ({"first": "the ear"}, "no name of a joint"),
+        ({"first": "the ear"}, "not a joint name"),
         ({"second": "neck_pitch"}, "first and second are both neck_pitch"),
         ({"first_max_deg": -30}, "first_min_deg -30.0 must be below first_max_deg -30.0"),
         ({"second_min_deg": 26}, "second_min_deg 26.0 must be below second_max_deg 25.0"),
@@ -250,7 +250,7 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
         params, errors = validate(GuardParams, {"collisions": ({**pair, **change},)})
         assert params is None and len(errors) == 1
         assert says in str(errors[0].get("ctx"))
-    with pytest.raises(ValueError, match="'the ear' is no name of a joint"):
+    with pytest.raises(ValueError, match="'the ear' is not a joint name"):
         CollisionParams("the ear", 0.0, 1.0, "neck_yaw", 0.0, 1.0)
 
 

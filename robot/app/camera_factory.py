@@ -50,7 +50,7 @@ from gazerig.robot.model.frames import (
     CameraParams,
     NewestPose,
     PoseHistory,
-    standing_still,
+    fixed_mount,
 )
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
@@ -222,13 +222,13 @@ def placed_camera(
     """
     what = options.looks_through
     if isinstance(seen, BorrowedCamera) and seen.lent:
-        return standing_still(rig.camera, kinematics), ()
+        return fixed_mount(rig.camera, kinematics), ()
     turns = options.video is None and options.replay is None and not options.mock
     if what is None or turns or rig.camera.mount == "base":
         return rig.camera, ()
     beside = "" if options.video or options.replay else " beside an emulated head"
     note = f"{what}{beside} does not turn with the head: the camera counts as standing still"
-    return standing_still(rig.camera, kinematics), (note,)
+    return fixed_mount(rig.camera, kinematics), (note,)
 
 
 def lendable(own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]) -> BorrowedCamera:

@@ -14,7 +14,7 @@ from gazerig.gaze.gesture.gesture import HEAD_TRACKS, Gesture
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
 from gazerig.robot.model.gesture_fit import FittedGesture, GestureFit, GestureRefused, motions
-from gazerig.robot.model.key_frames import GRID_S, fitted_keys, smoothed
+from gazerig.robot.model.key_frames import GRID_S, fit_keys, smoothed
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
 
@@ -118,7 +118,7 @@ def _keys(
     if np.abs(values).max() <= _STILL_DEG:
         return []
     if dense:
-        times, values = fitted_keys(*smoothed(times_s, values), TOLERANCE_DEG)
+        times, values = fit_keys(*smoothed(times_s, values), TOLERANCE_DEG)
         times = times + float(times_s[0]) - start_s
     else:
         times = times_s - start_s

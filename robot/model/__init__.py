@@ -1,1 +1,1 @@
-"""What the robot is made of: values and pure geometry, which everything else may import."""
+"""Values and pure geometry of the robot, which every other module may import."""

@@ -1,4 +1,4 @@
-"""A round body about a line: what a part of the head fills, and whether it is in the way."""
+"""Capsule: the volume of a part of the head, for tests of points and rays."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from gazerig.gaze.types import Vec3
 
 
 class Capsule(NamedTuple):
-    """All within ``radius_m`` of the line from ``start_m`` to ``end_m``, in one frame."""
+    """All points within ``radius_m`` of the line from ``start_m`` to ``end_m``, in one frame."""
 
     start_m: Vec3
     end_m: Vec3
@@ -22,9 +22,9 @@ class Capsule(NamedTuple):
         return norm(sub(p_m, nearest)) < self.radius_m
 
     def hit_m(self, p_m: Vec3, direction: Vec3) -> float | None:
-        """Return how far from a point outside it is along a unit vector, None where it is not.
+        """Return the distance from an outside point along a unit vector, None without a hit.
 
-        The distance is that of the sphere about the point of the line nearest to the ray.
+        The distance is that to the sphere about the point of the line nearest to the ray.
         """
         axis, off = sub(self.end_m, self.start_m), sub(self.start_m, p_m)
         aa, ad = dot(axis, axis), dot(axis, direction)

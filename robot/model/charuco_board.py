@@ -1,9 +1,9 @@
-"""The ChArUco board that cameras are calibrated with: its measures, and finding it in images.
+"""ChArUco board for camera calibration: its dimensions and its detection in images.
 
-A chessboard whose white squares carry ArUco markers, so that every corner is known by
-number even where part of the board is outside the image (OpenCV manual, "Detection of
-ChArUco Boards"). Board frame: origin at its upper left corner, x right, y down, z into
-the board, metres. Pixels have their centres at whole numbers.
+It is a chessboard whose white squares carry ArUco markers, so that every corner has a known
+number even if a part of the board is outside the image (OpenCV manual, "Detection of ChArUco
+Boards"). Board frame: origin at its upper left corner, x right, y down, z into the board, in m.
+Pixels have their centres at whole numbers.
 """
 
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ from gazerig.params import Bounds
 
 Floats = NDArray[np.float64]
 
-# Markers of few and large modules can be read from farther away.
+# Markers with few and large modules can be read from farther away.
 _MARKERS = cv2.aruco.DICT_4X4_50
 _MOST_MARKERS = 50
-# Fewer corners, or corners on one line, tell neither lens nor pose.
+# Fewer corners, or corners on one line, determine neither lens nor pose.
 LEAST_CORNERS = 6
 
 
 @dataclass(frozen=True)
 class BoardParams:
-    """Measures of the board. As it is, it fits on A4 and on Letter, laid crosswise."""
+    """Dimensions of the board. The default fits on A4 and on Letter in landscape format."""
 
     columns: Annotated[int, Bounds(3, 20), "squares from left to right"] = 7
     rows: Annotated[int, Bounds(3, 20), "squares from top to bottom"] = 5
@@ -38,7 +38,7 @@ class BoardParams:
         """Check that the markers fit and that there are enough of them.
 
         Raises:
-            ValueError: they do not.
+            ValueError: The markers do not fit, or there are too few.
         """
         if not 0.4 * self.square_mm <= self.marker_mm <= 0.9 * self.square_mm:
             raise ValueError(
@@ -50,10 +50,10 @@ class BoardParams:
             )
 
     def scaled(self, factor: float) -> "BoardParams":
-        """Return the same board as a printer made it that prints everything so much larger.
+        """Return the board as printed with a scale factor.
 
         Raises:
-            ValueError: the factor is no sensible one.
+            ValueError: The factor is outside 0.2 to 5.
         """
         if not 0.2 <= factor <= 5.0:
             raise ValueError(f"a printer scales by 0.2 to 5, not by {factor}")
@@ -63,10 +63,12 @@ class BoardParams:
 
 
 class SeenBoard(NamedTuple):
-    """Corners of the board found in one image.
+    """The corners of the board found in one image.
 
-    ids: (n,) numbers of the inner corners, row by row from 0
-    corners_px: (n, 2); corners_board_m: (n, 3), z = 0
+    Attributes:
+        ids: (n,) Numbers of the inner corners, row by row from 0.
+        corners_px: (n, 2) Pixels.
+        corners_board_m: (n, 3) Positions in the board frame, z = 0.
     """
 
     ids: NDArray[np.int64]
@@ -75,7 +77,7 @@ class SeenBoard(NamedTuple):
 
 
 class CharucoBoard:
-    """One board: what it looks like, and where it is in an image."""
+    """A ChArUco board, which can be drawn and found in images."""
 
     def __init__(self, params: BoardParams | None = None) -> None:
         self.params = par = params if params is not None else BoardParams()
@@ -90,9 +92,10 @@ class CharucoBoard:
         self.size_m = (par.columns * par.square_mm / 1e3, par.rows * par.square_mm / 1e3)
 
     def find(self, image: ImageArray) -> SeenBoard | None:
-        """Find the board's inner corners, None where too few are seen.
+        """Find the board's inner corners; return None if too few are visible.
 
-        image: (h, w), (h, w, 1), BGR or BGRA
+        Args:
+            image: (h, w), (h, w, 1), BGR or BGRA.
         """
         grey = _grey(image)
         if grey is None:
@@ -106,9 +109,11 @@ class CharucoBoard:
         return seen if _spread(seen.corners_board_m) and np.isfinite(places).all() else None
 
     def image(self, px_per_mm: float) -> ImageArray:
-        """Draw the board itself, edge to edge, black on white.
+        """Draw the board, edge to edge, black on white.
 
-        px_per_mm: squares and marker modules are exact where their sides are whole pixels
+        Args:
+            px_per_mm: Scale. Squares and marker modules are exact if their sides are whole
+                pixels.
         """
         par = self.params
         width = round(par.columns * par.square_mm * px_per_mm)
@@ -117,7 +122,7 @@ class CharucoBoard:
 
 
 def _grey(image: ImageArray) -> ImageArray | None:
-    """Return a grey image, None where there is none to speak of."""
+    """Return the image in grey, None if it is too small or not an image."""
     if image.ndim not in (2, 3) or min(image.shape[:2]) < 16:
         return None
     if image.ndim == 2 or image.shape[2] == 1:
@@ -127,6 +132,6 @@ def _grey(image: ImageArray) -> ImageArray | None:
 
 
 def _spread(corners_m: Floats) -> bool:
-    """Return whether corners lie in a plane, not on a line."""
+    """Return whether the corners span a plane, not only a line."""
     flat = corners_m[:, :2] - corners_m[:, :2].mean(axis=0)
     return bool(np.linalg.matrix_rank(flat, tol=1e-6) == 2)

@@ -1,18 +1,18 @@
-"""The only places where time passes: the real clock waits, the simulated one is set."""
+"""Clocks: the real one waits, the simulated one is set."""
 
 import time
 from typing import Protocol
 
 
 class Clock(Protocol):
-    """Monotonic seconds, and waiting for an absolute instant."""
+    """A monotonic clock in seconds that can wait for an absolute time."""
 
     def now_s(self) -> float:
         """Return the time."""
         ...
 
     def sleep_until(self, t_s: float) -> None:
-        """Return no earlier than ``t_s``; at once when it is past."""
+        """Wait until ``t_s``; return immediately if it is past."""
         ...
 
 
@@ -24,23 +24,23 @@ class RealClock:
         return time.monotonic()
 
     def sleep_until(self, t_s: float) -> None:
-        """Wait in the kernel."""
+        """Sleep until ``t_s``."""
         wait = t_s - time.monotonic()
         if wait > 0.0:
             time.sleep(wait)
 
 
 class SimulatedClock:
-    """A number that is set: a simulated minute takes as long as its arithmetic."""
+    """A clock whose time is set: a simulated minute takes only its computation."""
 
     def __init__(self, start_s: float = 0.0) -> None:
         self._now_s = start_s
 
     def now_s(self) -> float:
-        """Return the number."""
+        """Return the simulated time."""
         return self._now_s
 
     def sleep_until(self, t_s: float) -> None:
-        """Set the number, never backwards."""
+        """Set the time, never backwards."""
         if t_s > self._now_s:
             self._now_s = t_s

@@ -1,4 +1,4 @@
-"""What the values of a command may be; whoever takes a command in checks it first."""
+"""Checks of the values in a command; every receiver of commands calls them first."""
 
 from math import pi
 
@@ -25,25 +25,25 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.model.types import JOINT_NAME
 
 MAX_COORDINATE_M = 1000.0
-"""No point to look at lies farther away along any axis."""
+"""Largest coordinate of a point to look at."""
 MAX_ANGLE_RAD = 2.0 * pi
-"""No joint is sent farther than a turn to either side."""
+"""Largest angle of a joint command to either side."""
 MAX_JOINTS = 64
-"""A command moves no more joints than this."""
+"""Largest number of joints in a command."""
 MAX_WORDS = 200
-"""Longest name or reason that a command may carry, in characters."""
+"""Longest name or reason in a command, in characters."""
 MAX_LEAD_S = 86400.0
-"""Longest time that a lead may be given."""
+"""Longest duration of a client's control."""
 MAX_PIXEL = 20000.0
-"""No pixel lies farther from the corner of its frame."""
+"""Largest coordinate of a pixel."""
 _MAX_TIME_S = 1e12
 
 
 def check(command: Command) -> None:
-    """See that a command's values can be meant.
+    """Check that a command's values are valid.
 
     Raises:
-        ValueError: with the rule.
+        ValueError: A value is invalid; the message states the rule.
     """
     match command:
         case Ask(menu, choice):
@@ -79,7 +79,7 @@ def check(command: Command) -> None:
 
 
 def _check_look(command: Look) -> None:
-    """See that what is to be looked at can be."""
+    """Check the target of a look command."""
     match command:
         case LookAt(pointer=pointer) if not isinstance(pointer, bool):
             raise ValueError("pointer is true or false")
@@ -148,7 +148,7 @@ def _check_angles(angles: object) -> None:
                 "angles are pairs of a joint and a finite angle in radians within +-360 deg"
             )
         if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
-            raise ValueError(f"{pair[0]!r:.40} is no name of a joint: such as neck_yaw or jaw")
+            raise ValueError(f"{pair[0]!r:.40} is not a joint name such as neck_yaw or jaw")
 
 
 def _check_play(gesture: object, speed: object, times: object) -> None:
@@ -168,12 +168,12 @@ def _check_share(what: str, key: str, name: object, value: object) -> None:
 
 
 def _numbers(values: object, count: int, most: float) -> bool:
-    """Return whether it is a tuple of so many finite numbers within +-most."""
+    """Return whether this is a tuple of ``count`` finite numbers within +-most."""
     of_them = isinstance(values, tuple) and len(values) == count
     return of_them and all(_within(value, most) for value in values)  # type: ignore[attr-defined]
 
 
 def _within(value: object, most: float) -> bool:
-    # A comparison is false of NaN, and takes whole numbers that no float can hold.
+    # A comparison is false for NaN, and accepts integers too large for a float.
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return number and -most <= value <= most  # type: ignore[operator]

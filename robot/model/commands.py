@@ -1,7 +1,7 @@
-"""What people ask of a running robot, from the page, another program or the command line.
+"""Commands to a running robot from the page, another program or the command line.
 
-A command is plain data: it crosses processes as JSON, is obeyed at the next tick, and a
-recording of a run holds it, so that the run can be done again.
+A command is plain data. It is sent between processes as JSON and executed at the next tick. A
+recording of a run contains it, so that the run can be repeated.
 """
 
 from collections.abc import Mapping
@@ -10,30 +10,32 @@ from typing import Literal, NamedTuple
 from gazerig.gaze.angles import Angles2, Vec3
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
-"""What a key of a rig's YAML can hold."""
+"""Value of a key in a rig's YAML."""
 
 Frame = Literal["world", "head"]
 HEARTBEAT_S = 1.0
-"""A lead that is not to stay lapses when it was not renewed for so long."""
+"""A control without ``stay`` ends if it is not renewed for this time."""
 FAR_M = 100.0
-"""From here on the eyes look straight ahead, to what can be told."""
+"""Distance beyond which the eyes are practically parallel."""
 
 
 class Ask(NamedTuple):
-    """Choose from a menu: a behaviour, a mode of conversation, what the lids do."""
+    """A choice from a menu: a behaviour, a mode of conversation, a motion of the lids."""
 
     menu: str
     choice: str
 
 
 class LookAt(NamedTuple):
-    """Look at a point of the world instead of the models' target; None: choose freely again.
+    """Look at a point in the world instead of the models' target; None frees the gaze.
 
-    p_world_m: metres, x ahead, y left, z up of the neck base
-    who: who asks, in words; stay: until another command; else for as long as ``Renew`` comes
-        at least every ``HEARTBEAT_S``
-    for_s: ends after so many seconds; None: without such an end
-    pointer: the point is somebody's mouse pointer, which is said of who leads
+    Attributes:
+        p_world_m: Point in m, x ahead, y left, z up of the neck base.
+        who: Name of the client.
+        stay: Keep the target until another command; if False, it needs a ``Renew`` at least
+            every ``HEARTBEAT_S``.
+        for_s: Duration in s, None if unlimited.
+        pointer: Whether the point is a person's mouse pointer, for texts.
     """
 
     p_world_m: Vec3 | None
@@ -44,11 +46,12 @@ class LookAt(NamedTuple):
 
 
 class LookAtInHead(NamedTuple):
-    """Look at the point of the world that is now at a place in the head's frame.
+    """Look at the world point that is now at a position in the head's frame.
 
-    p_head_m: metres, x ahead, y left, z up of the point midway between the eyes, along the head's
-        axes at the time of the command
-    who, stay, for_s: as in LookAt
+    Attributes:
+        p_head_m: Position in m, x ahead, y left, z up of the point midway between the eyes, along
+            the head's axes at the time of the command.
+        who, stay, for_s: As in LookAt.
     """
 
     p_head_m: Vec3
@@ -58,12 +61,13 @@ class LookAtInHead(NamedTuple):
 
 
 class LookAtDirection(NamedTuple):
-    """Look in a direction from where the head is now.
+    """Look in a direction from the head's present position.
 
-    direction_rad: (yaw, pitch), yaw + left, pitch + up
-    frame: whose axes: the neck base's, or the head's at the time of the command
-    distance_m: on what the eyes converge
-    who, stay, for_s: as in LookAt
+    Attributes:
+        direction_rad: (yaw, pitch), yaw + left, pitch + up.
+        frame: Axes of the neck base, or of the head at the time of the command.
+        distance_m: Distance at which the eyes converge.
+        who, stay, for_s: As in LookAt.
     """
 
     direction_rad: Angles2
@@ -75,10 +79,11 @@ class LookAtDirection(NamedTuple):
 
 
 class LookAtPerson(NamedTuple):
-    """Look at a person and follow, until the person was out of sight for some time.
+    """Look at a person and follow until the person has been out of sight for some time.
 
-    id: of the person, as perception counts them
-    who, stay, for_s: as in LookAt
+    Attributes:
+        id: Perception's number of the person.
+        who, stay, for_s: As in LookAt.
     """
 
     id: int
@@ -88,14 +93,15 @@ class LookAtPerson(NamedTuple):
 
 
 class LookAtPixel(NamedTuple):
-    """Look at what is at a pixel of a camera frame.
+    """Look at the object at a pixel of a camera frame.
 
-    pixel_px: (x, y), from the centre of the upper left pixel, x right, y down
-    distance_m: of it from the camera; None: its depth where the camera measures it, else as far
-        as what is seen there
-    captured_s: the frame's time of exposure; None: the newest frame
-    p_world_m: where it lay; entered when the command is carried out, for the recording
-    who, stay, for_s: as in LookAt
+    Attributes:
+        pixel_px: (x, y) from the centre of the upper left pixel, x right, y down.
+        distance_m: Distance from the camera; None for the measured depth, or without depth for
+            the distance of the object detected there.
+        captured_s: The frame's time of exposure, None for the newest frame.
+        p_world_m: World point of the pixel, set on execution for the recording.
+        who, stay, for_s: As in LookAt.
     """
 
     pixel_px: tuple[float, float]
@@ -108,10 +114,11 @@ class LookAtPixel(NamedTuple):
 
 
 class Jog(NamedTuple):
-    """Hold all joints, with these at the given angles; without any, the gaze is free again.
+    """Hold all joints, these at the given angles; without any, free the gaze again.
 
-    angles_rad: (joint, angle) pairs
-    who, stay, for_s: as in LookAt
+    Attributes:
+        angles_rad: (joint, angle) pairs.
+        who, stay, for_s: As in LookAt.
     """
 
     angles_rad: tuple[tuple[str, float], ...]
@@ -123,7 +130,9 @@ class Jog(NamedTuple):
 class Express(NamedTuple):
     """Move to a facial expression of the rig's table.
 
-    strength: 1 as written, 0 none of it
+    Attributes:
+        expression: Name of the expression.
+        strength: 1 as defined .. 0 none.
     """
 
     expression: str
@@ -131,22 +140,24 @@ class Express(NamedTuple):
 
 
 class SetLevel(NamedTuple):
-    """Set a level of the rig's table, 0..1; without another within half a second it falls to 0."""
+    """Set a level of the rig's table, 0..1; if it is not set again within 0.5 s it falls to 0."""
 
     level: str
     value: float
 
 
 NO_GESTURE = "none"
-"""Chosen from the menu of gestures, it ends the one under way."""
+"""Choice in the menu of gestures that ends the present one."""
 
 
 class Play(NamedTuple):
-    """Play a gesture once; "" ends the one under way.
+    """Play a gesture; "" ends the present one.
 
-    speed: factor on the speed at which it was written
-    times: how often it is repeated; 0: as the gesture says
-    who: who asks, in words
+    Attributes:
+        gesture: Name of the gesture.
+        speed: Factor on its defined speed.
+        times: Number of repetitions, 0 for the gesture's own.
+        who: Name of the client.
     """
 
     gesture: str
@@ -156,25 +167,27 @@ class Play(NamedTuple):
 
 
 class Renew(NamedTuple):
-    """The heartbeat of one who leads the gaze or the joints; from others it does nothing."""
+    """The heartbeat of the client in control of gaze or joints; others' have no effect."""
 
     who: str = ""
 
 
 class Stop(NamedTuple):
-    """Switch the torque off at once, without parking; the program goes on reading."""
+    """Switch the torque off immediately, without parking; the program continues reading."""
 
     why: str
     who: str = ""
 
 
 class Resume(NamedTuple):
-    """Switch the torque on again after a stop, where the joints are, and go on slowly.
+    """Switch the torque on again after a stop, at the present angles, and continue slowly.
 
-    Obeyed by the rules of ``gazerig.robot.model.stop_latch``: of the one who stopped, or confirmed.
+    Only the client that stopped may resume, or one with ``confirmed``; the rules are in
+    ``gazerig.robot.model.stop_latch``.
 
-    who: who asks, in words
-    confirmed: a person has said that no hand is in the mechanism
+    Attributes:
+        who: Name of the client.
+        confirmed: A person has confirmed that no hand is in the mechanism.
     """
 
     who: str = ""
@@ -184,7 +197,8 @@ class Resume(NamedTuple):
 class Tune(NamedTuple):
     """Apply parameters.
 
-    changes: (dotted key of the rig's YAML, value) pairs, checked beforehand
+    Attributes:
+        changes: (dotted key of the rig's YAML, value) pairs that have been checked.
     """
 
     changes: tuple[tuple[str, Value], ...]
@@ -192,11 +206,11 @@ class Tune(NamedTuple):
 
 Look = LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel
 Leading = Look | Jog
-"""Commands that take the lead of gaze or joints."""
+"""Commands that take control of gaze or joints."""
 Command = Ask | Leading | Express | SetLevel | Play | Renew | Stop | Resume | Tune
 
 REPEATED = (Renew, SetLevel)
-"""Commands that programs send many times a second: no message or mark tells of each."""
+"""Commands that programs send many times per second; they give no message and no mark."""
 
 COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,

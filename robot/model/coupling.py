@@ -1,7 +1,7 @@
-"""Two servos that move two joints together: a differential, two push rods, a measured table. Pure.
+"""Couplings of two servos that together move two joints: differential, push rods, measured table.
 
-Joints are called first and second, in radians; servos a and b, as angles of their shafts (or of
-whatever their sign, ratio and zero are given for). A neck's pitch and roll are the usual pair.
+The joints are called first and second, the servos a and b. All angles are in rad; those of the
+servos are at their shafts, after sign, ratio and zero. The usual pair is a neck's pitch and roll.
 """
 
 from bisect import bisect_right
@@ -13,33 +13,33 @@ from gazerig.gaze.types import Vec3
 
 Pair = tuple[float, float]
 Rates = tuple[Pair, Pair]
-"""How much a, and how much b turns per radian of the first and of the second joint."""
+"""Rotation of servo a and of servo b per rad of the first and of the second joint."""
 
 
 class Unreachable(ValueError):
-    """No angle of the servos makes these angles of the joints; the message says why."""
+    """Joint angles that no servo angles produce; the message gives the reason."""
 
 
 class Coupling(Protocol):
-    """What lies between two servos and two joints."""
+    """A mechanism between two servos and two joints."""
 
     def servo_rad(self, joints: Pair) -> Pair:
         """Return the servo angles of joint angles.
 
         Raises:
-            Unreachable: there are none.
+            Unreachable: There are none.
         """
         ...
 
     def joint_rad(self, servos: Pair) -> Pair:
-        """Return the joint angles of servo angles; of impossible ones, some finite angles."""
+        """Return the joint angles of servo angles; for impossible ones, any finite angles."""
         ...
 
     def rates(self, joints: Pair) -> Rates:
-        """Return how fast the servos turn for each joint's speed, at joint angles.
+        """Return the servo speeds per joint speed at joint angles.
 
         Raises:
-            Unreachable: there are no such servo angles.
+            Unreachable: There are no servo angles.
         """
         ...
 
@@ -48,8 +48,8 @@ class Differential:
     """Bevel gears: the servos' sum turns the first joint, their difference the second.
 
     Args:
-        first_ratio: turns of the servos for one turn of the first joint.
-        second_ratio: turns of the servos, against each other, for one of the second.
+        first_ratio: Turns of the servos for one turn of the first joint.
+        second_ratio: Turns of the servos, in opposite directions, for one of the second.
     """
 
     def __init__(self, first_ratio: float = 1.0, second_ratio: float = 1.0) -> None:
@@ -66,12 +66,12 @@ class Differential:
         return 0.5 * (a + b) / self._first, 0.5 * (a - b) / self._second
 
     def rates(self, joints: Pair) -> Rates:
-        """Return how fast the servos turn for each joint's speed: the same everywhere."""
+        """Return the servo speeds per joint speed, which are constant."""
         return (self._first, self._second), (self._first, -self._second)
 
 
 _NEAR_LINE = 0.98
-"""A rod nearer to the line through its horn (sine of the angle) has no force and two solutions."""
+"""Sine of the angle between rod and horn above which the rod has no force and two solutions."""
 
 
 class PushRods:
@@ -81,13 +81,13 @@ class PushRods:
     roll. The horns turn about axes parallel to y; at 0 they are level.
 
     Args:
-        anchor_m: where the left rod holds the head, with the head level; the right one mirrored.
-        servo_m: the axis of the left servo's horn; the right one mirrored.
-        horn_m: length of the horns; negative where they point back.
-        rod_m: length of the rods.
+        anchor_m: Left rod's anchor on the level head; the right one is mirrored.
+        servo_m: Axis of the left servo's horn; the right one is mirrored.
+        horn_m: Length of the horns, negative if they point back.
+        rod_m: Length of the rods.
 
     Raises:
-        Unreachable: the rods do not fit with the head level.
+        Unreachable: The rods do not fit with the head level.
     """
 
     def __init__(self, anchor_m: Vec3, servo_m: Vec3, horn_m: float, rod_m: float) -> None:
@@ -98,7 +98,7 @@ class PushRods:
         if abs(one) < abs(self.servo_rad((0.0, 0.0))[0]):
             self._branch = 1.0
         self._level = self.servo_rad((0.0, 0.0))
-        self._inverse = _inverted(self.rates((0.0, 0.0)))
+        self._inverse = _invert(self.rates((0.0, 0.0)))
 
     def servo_rad(self, joints: Pair) -> Pair:
         """Return the servo angles of joint angles."""
@@ -107,7 +107,7 @@ class PushRods:
     def joint_rad(self, servos: Pair) -> Pair:
         """Return the joint angles of servo angles, by Newton's method from the level head."""
         offset = servos[0] - self._level[0], servos[1] - self._level[1]
-        joints = _times(self._inverse, offset)
+        joints = _multiply(self._inverse, offset)
         tip_a, tip_b = self._tip(servos[0], 1.0), self._tip(servos[1], -1.0)
         for _ in range(30):
             fa, a_first, a_second = self._rod_error(joints, 1.0, tip_a)
@@ -117,7 +117,7 @@ class PushRods:
                 break
             first = (fa * b_second - fb * a_second) / det
             second = (fb * a_first - fa * b_first) / det
-            joints = _clipped(joints[0] - first), _clipped(joints[1] - second)
+            joints = _clip(joints[0] - first), _clip(joints[1] - second)
             if abs(first) + abs(second) < 1e-13:
                 break
         return joints
@@ -128,16 +128,16 @@ class PushRods:
         return self._slopes(joints, 1.0, a), self._slopes(joints, -1.0, b)
 
     def _slopes(self, joints: Pair, side: float, horn_rad: float) -> Pair:
-        """Return how fast one horn turns for each joint's speed."""
+        """Return the speed of one horn per joint speed."""
         tip = self._tip(horn_rad, side)
         _, first, second = self._rod_error(joints, side, tip)
-        x, _, z = _tilted(self._anchor, joints, side)
+        x, _, z = _tilt(self._anchor, joints, side)
         across = (x - tip[0]) * self._horn * sin(horn_rad)
         turn = 2.0 * (across - (z - tip[2]) * abs(self._horn) * cos(horn_rad))
         return -first / turn, -second / turn
 
     def _horn_rad(self, joints: Pair, side: float) -> float:
-        """Return the angle of one horn, on the branch that the level head is on."""
+        """Return the angle of one horn, on the branch of the level head."""
         (x, _, z), gap2 = self._gap(joints, side)
         along, up = self._horn * x, abs(self._horn) * z
         cosine = 0.5 * (gap2 + self._horn**2 - self._rod**2) / hypot(along, up)
@@ -149,19 +149,19 @@ class PushRods:
         return turn - 2.0 * pi * round(turn / (2.0 * pi))
 
     def _gap(self, joints: Pair, side: float) -> tuple[Vec3, float]:
-        """Return the way from the horn's axis to the rod's anchor, and its square."""
-        at_x, at_y, at_z = _tilted(self._anchor, joints, side)
+        """Return the vector from the horn's axis to the rod's anchor, and its squared length."""
+        at_x, at_y, at_z = _tilt(self._anchor, joints, side)
         x, y, z = at_x - self._servo[0], at_y - side * self._servo[1], at_z - self._servo[2]
         return (x, y, z), x * x + y * y + z * z
 
     def _tip(self, horn_rad: float, side: float) -> Vec3:
-        """Return where the end of a horn is."""
+        """Return the position of the end of a horn."""
         x, y, z = self._servo
         along, up = self._horn * cos(horn_rad), abs(self._horn) * sin(horn_rad)
         return x + along, side * y, z + up
 
     def _rod_error(self, joints: Pair, side: float, tip: Vec3) -> tuple[float, float, float]:
-        """Return by how much a rod's squared length is off, and its slopes by both joints."""
+        """Return the error of a rod's squared length, and its derivatives by both joints."""
         first, second = joints
         cp, sp = cos(first), sin(first)
         cr, sr = cos(second), sin(second)
@@ -177,15 +177,15 @@ class PushRods:
 
 
 class MeasuredGrid:
-    """Servo angles measured at a grid of joint angles, plane between them: two triangles a field.
+    """A table of servo angles on a grid of joint angles, with two plane triangles per cell.
 
-    Beyond the grid the outermost triangles go on.
+    The outermost triangles extrapolate beyond the grid.
 
     Args:
         points: (first, second, a, b) of every point of the grid, in any order.
 
     Raises:
-        ValueError: they are no grid, or the servos turn back somewhere; the message says where.
+        ValueError: The points are not a grid, or a servo reverses; the message says where.
     """
 
     def __init__(self, points: Sequence[tuple[float, float, float, float]]) -> None:
@@ -212,8 +212,8 @@ class MeasuredGrid:
         for triangle in self._triangles:
             if triangle.turn * turns[0] <= 0.0:
                 raise ValueError(
-                    "the servos of a measured coupling turn back beside "
-                    f"{_degrees(triangle.at)}: measure it anew"
+                    "the servos of a measured coupling reverse next to "
+                    f"{_degrees(triangle.at)}: measure it again"
                 )
 
     def _corners(self, i: int, j: int) -> tuple[tuple[Pair, Pair, Pair], ...]:
@@ -241,7 +241,7 @@ class MeasuredGrid:
         return self._at(joints).slopes
 
     def holds(self, joints: Pair) -> bool:
-        """True if joint angles lie within the grid."""
+        """Return whether joint angles are within the grid."""
         return (
             self._firsts[0] <= joints[0] <= self._firsts[-1]
             and self._seconds[0] <= joints[1] <= self._seconds[-1]
@@ -257,16 +257,19 @@ class MeasuredGrid:
 
 
 class _Triangle:
-    """One plane piece of a measured grid.
+    """A triangle of a measured grid.
 
-    at: its first corner; slopes: servo angles by joint angles; turn: their determinant
-    low, high: the servo angles between which it lies
+    Attributes:
+        at: First corner.
+        slopes: Derivatives of servo angles by joint angles.
+        turn: Determinant of the slopes.
+        low, high: Bounds of its servo angles.
     """
 
     def __init__(self, corners: tuple[Pair, Pair, Pair], known: dict[Pair, Pair]) -> None:
         self.at, self._base = corners[0], known[corners[0]]
-        (u1, v1), (u2, v2) = (_less(corner, self.at) for corner in corners[1:])
-        (a1, b1), (a2, b2) = (_less(known[corner], self._base) for corner in corners[1:])
+        (u1, v1), (u2, v2) = (_subtract(corner, self.at) for corner in corners[1:])
+        (a1, b1), (a2, b2) = (_subtract(known[corner], self._base) for corner in corners[1:])
         area = u1 * v2 - u2 * v1
         self.slopes: Rates = (
             ((a1 * v2 - a2 * v1) / area, (u1 * a2 - u2 * a1) / area),
@@ -274,19 +277,19 @@ class _Triangle:
         )
         (p, q), (r, s) = self.slopes
         self.turn = p * s - q * r
-        self._back = _inverted(self.slopes) if self.turn else None
+        self._back = _invert(self.slopes) if self.turn else None
         self._legs = (u1, v1), (u2, v2), area
         places = [known[corner] for corner in corners]
         self.low = min(a for a, _ in places), min(b for _, b in places)
         self.high = max(a for a, _ in places), max(b for _, b in places)
 
     def servos(self, joints: Pair) -> Pair:
-        a, b = _times(self.slopes, _less(joints, self.at))
+        a, b = _multiply(self.slopes, _subtract(joints, self.at))
         return self._base[0] + a, self._base[1] + b
 
     def joints(self, servos: Pair) -> Pair:
         assert self._back is not None
-        first, second = _times(self._back, _less(servos, self._base))
+        first, second = _multiply(self._back, _subtract(servos, self._base))
         return self.at[0] + first, self.at[1] + second
 
     def inside(self, servos: Pair) -> float:
@@ -301,7 +304,7 @@ class _Triangle:
 
 
 class _Cells:
-    """The triangles of a grid by where they lie: servo angles in rows and columns of cells."""
+    """An index of a grid's triangles by cells of servo angles."""
 
     def __init__(self, triangles: Sequence[_Triangle]) -> None:
         self._low = min(one.low[0] for one in triangles), min(one.low[1] for one in triangles)
@@ -318,7 +321,7 @@ class _Cells:
                     self._cells.setdefault((i, j), []).append(one)
 
     def near(self, servos: Pair) -> Sequence[_Triangle]:
-        """Return all triangles that may hold a point, none beyond the grid."""
+        """Return all triangles that may contain a point, none beyond the grid."""
         if not (isfinite(servos[0]) and isfinite(servos[1])):
             return ()
         return self._cells.get(self._cell(servos), ())
@@ -330,32 +333,32 @@ class _Cells:
         )
 
 
-def _less(one: Pair, other: Pair) -> Pair:
+def _subtract(one: Pair, other: Pair) -> Pair:
     return one[0] - other[0], one[1] - other[1]
 
 
-def _times(rates: Rates, by: Pair) -> Pair:
+def _multiply(rates: Rates, by: Pair) -> Pair:
     (p, q), (r, s) = rates
     return p * by[0] + q * by[1], r * by[0] + s * by[1]
 
 
-def _inverted(rates: Rates) -> Rates:
+def _invert(rates: Rates) -> Rates:
     (p, q), (r, s) = rates
     det = p * s - q * r
     return (s / det, -q / det), (-r / det, p / det)
 
 
 def joint_rates(rates: Rates, servo_rates: Pair) -> Pair:
-    """Return the joints' speeds of servo speeds, 0 where the mechanism jams."""
+    """Return the joint speeds of servo speeds, 0 if the mechanism jams."""
     (p, q), (r, s) = rates
-    return _times(_inverted(rates), servo_rates) if p * s - q * r else (0.0, 0.0)
+    return _multiply(_invert(rates), servo_rates) if p * s - q * r else (0.0, 0.0)
 
 
-def _clipped(angle: float) -> float:
+def _clip(angle: float) -> float:
     return min(max(angle, -0.5 * pi), 0.5 * pi) if isfinite(angle) else 0.0
 
 
-def _tilted(p: Vec3, joints: Pair, side: float) -> Vec3:
+def _tilt(p: Vec3, joints: Pair, side: float) -> Vec3:
     """Return a point, mirrored for the right side, pitched and rolled.
 
     The rotation is that of ``gazerig.gaze.angles.rotation`` without yaw.

@@ -1,4 +1,4 @@
-"""The couplings of a rig's file, and what their servos need for the joints' whole range."""
+"""Couplings in a rig's file, and the configuration of their servos for the whole range."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from gazerig.robot.model.joint import JointParams
 
 CouplingKind = Literal["differential", "parallel", "measured"]
 _GRID = 12
-"""Fields a side into which the joints' range is divided to find the servos' extremes."""
+"""Cells per side of the joints' range in the search for the servos' extremes."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,10 @@ class CouplingParams:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that all measures of its kind are there.
+        """Check that all dimensions of its kind are given.
 
         Raises:
-            ValueError: they are not; the message says which are missing or wrong.
+            ValueError: Dimensions are missing or wrong; the message names them.
         """
         if self.first == self.second:
             raise ValueError(f"first and second are both {self.first}; name two joints")
@@ -61,10 +61,10 @@ class CouplingParams:
         self.made()
 
     def made(self) -> Coupling:
-        """Return what lies between the servos and the joints.
+        """Build the coupling.
 
         Raises:
-            ValueError: it cannot be; the message says why.
+            ValueError: The coupling is impossible; the message gives the reason.
         """
         if self.kind == "differential":
             return Differential(self.first_ratio, self.second_ratio)
@@ -84,7 +84,7 @@ class CouplingParams:
 
 
 class CoupledPair(NamedTuple):
-    """A coupling of a rig between its two joints."""
+    """A coupling with the names of its two joints."""
 
     first: str
     second: str
@@ -97,16 +97,16 @@ def pairs_of(couplings: Mapping[str, CouplingParams]) -> tuple[CoupledPair, ...]
 
 
 def partners(pairs: Iterable[CoupledPair]) -> dict[str, str]:
-    """Return for each coupled joint the other one of its pair."""
+    """Return the partner of each coupled joint."""
     return {a: b for first, second, _ in pairs for a, b in ((first, second), (second, first))}
 
 
 def unreachable(pair: CoupledPair, joints: Mapping[str, JointParams]) -> str | None:
-    """Return which part of the joints' range the servos cannot do, None where they can do all.
+    """Return a text about joint angles that the servos cannot reach, None if they reach all.
 
     Args:
-        pair: two of the joints.
-        joints: the rig's, of known models.
+        pair: The coupled pair.
+        joints: Joints of the rig, with known servo models.
     """
     for at in _range(pair, joints):
         where = f"{pair.first} {degrees(at[0]):g}, {pair.second} {degrees(at[1]):g} deg"
@@ -135,13 +135,13 @@ def pair_setups(
     park_rad: Mapping[str, float],
     gentle_deg_s: float = ENTRY_DEG_S,
 ) -> dict[str, ServoConfig]:
-    """Return what the bus must know of both servos, for the whole range of both joints.
+    """Return the configuration of both servos for the whole range of both joints.
 
     Args:
-        pair: two of the joints.
-        joints: the rig's.
-        park_rad: parking pose of joints, 0 where not given.
-        gentle_deg_s: servos are led into their ranges no faster.
+        pair: The coupled pair.
+        joints: Joints of the rig.
+        park_rad: Parking pose by joint, default 0.
+        gentle_deg_s: Highest speed at which servos outside their ranges move inside.
     """
     names = pair.first, pair.second
     grid = tuple(_range(pair, joints))

@@ -1,6 +1,6 @@
-"""The canonical adult face: where its parts and landmarks lie.
+"""Canonical adult face: positions of its parts and landmarks.
 
-Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up. Metres.
+Face frame: origin at the tip of the nose, x out of the face, y to the person's left, z up, in m.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ _PUPIL = (-0.033, PUPIL_DISTANCE_M / 2, 0.035)
 _MOUTH_CORNER = (-0.029, 0.0255, -0.036)
 
 
-# Centres of the parts a look moves between (Nakamoto & Tsuruno 3.2.2).
+# Centres of the parts between which the gaze moves (Nakamoto & Tsuruno 3.2.2).
 PARTS_FACE_M: dict[str, Vec3] = {
     "DN": (-0.018, 0.0, -0.080),
     "FL": (-0.055, 0.058, -0.005),

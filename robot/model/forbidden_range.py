@@ -1,4 +1,4 @@
-"""Ranges of two joints that may not be taken together: a lid and a frame, chin and chest."""
+"""Ranges of two joints that collide, such as a lid and a frame, chin and chest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from gazerig.robot.model.types import JOINT_NAME
 
 @dataclass(frozen=True)
 class CollisionParams:
-    """Two joints that touch when both are in these ranges."""
+    """Two joints that collide if both are in these ranges."""
 
     first: Annotated[str, "a joint"]
     first_min_deg: Annotated[float, Bounds(-180, 180), "from this angle"]
@@ -25,11 +25,11 @@ class CollisionParams:
         """Check that these are two ranges of two joints.
 
         Raises:
-            ValueError: they are not; the message says why.
+            ValueError: They are not; the message gives the reason.
         """
         for name in (self.first, self.second):
             if not JOINT_NAME.fullmatch(name):
-                raise ValueError(f"{name!r} is no name of a joint: such as neck_yaw or jaw")
+                raise ValueError(f"{name!r} is not a joint name such as neck_yaw or jaw")
         if self.first == self.second:
             raise ValueError(f"first and second are both {self.first}; name two joints")
         for key in ("first", "second"):
@@ -39,7 +39,7 @@ class CollisionParams:
 
 
 class ForbiddenRange(NamedTuple):
-    """One joint's half of a forbidden box, and the walls a margin outside it."""
+    """One joint's range of a forbidden box, and the walls at a margin outside it."""
 
     joint: int
     low: float
@@ -57,14 +57,13 @@ def forbidden_pairs(
     """Return the two ranges of every collision.
 
     Args:
-        params: the joint ranges that may not be taken together.
-        margin_deg: distance kept from them; servos round and lag.
-        limits: one a joint.
-        joints: their names, in the order of the limits.
+        params: The forbidden pairs of ranges.
+        margin_deg: Distance to them, as servos round and lag.
+        limits: One limit per joint.
+        joints: Names of the joints, in the order of the limits.
 
     Raises:
-        ValueError: a pair leaves no pose at all inside the limits, or names a joint that is
-            not there.
+        ValueError: A pair leaves no pose inside the limits, or names an unknown joint.
     """
     pairs = [
         (
@@ -94,7 +93,7 @@ def _range(joint: int, low_deg: float, high_deg: float, margin_deg: float) -> Fo
 
 
 def _room(span: ForbiddenRange, limit: JointLimit) -> bool:
-    """Return whether a joint can be outside its half of the box."""
+    """Return whether a joint can be outside its range of the box."""
     return limit.low_rad <= span.below or limit.high_rad >= span.above
 
 

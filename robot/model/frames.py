@@ -1,7 +1,7 @@
-"""Where the head was at an instant in the past, and where the camera sits on it. Pure.
+"""Past poses of the head and the pose of the camera.
 
-A frame tells of the moment of its exposure. Placing it with the head's pose of now
-throws targets off by the head's motion in between, so poses are remembered.
+A frame shows the moment of its exposure. If the head's present pose were used to locate it,
+targets would be off by the head's motion since then. Therefore past poses are stored.
 """
 
 from bisect import bisect_left
@@ -28,7 +28,7 @@ MountedOn = Literal["head", "base"]
 
 @dataclass(frozen=True)
 class LensParams:
-    """A lens as measured, on images of one size."""
+    """A calibrated lens, for images of one size."""
 
     # fmt: off
     width_px: Annotated[int, Bounds(16, 16384), "image width at which the lens was calibrated"]
@@ -44,7 +44,7 @@ class LensParams:
 
 @dataclass(frozen=True)
 class CameraParams:
-    """Where the camera sits and what it covers."""
+    """The camera's pose and field of view."""
 
     # fmt: off
     mount: Annotated[MountedOn, "head: the camera turns with the head; base: it stands still"] = "head"
@@ -63,7 +63,7 @@ class CameraParams:
 
 
 class PoseHistory:
-    """The head's angles of the last seconds, and its pose at any instant among them."""
+    """A history of the head's angles over the last seconds, with its pose at any time in it."""
 
     def __init__(
         self,
@@ -71,7 +71,13 @@ class PoseHistory:
         ticks: int = 600,
         tell: Callable[[float, Mat3], None] | None = None,
     ) -> None:
-        """Keep ``ticks`` entries; ``tell`` gets the time and R_world_head of each as well."""
+        """Create an empty history.
+
+        Args:
+            geometry: Geometry of the head.
+            ticks: Number of stored entries.
+            tell: Called with the time and R_world_head of each entry.
+        """
         self._geometry = geometry
         self._tell = tell
         self._times: deque[float] = deque(maxlen=ticks)
@@ -87,10 +93,10 @@ class PoseHistory:
         """Record the measured angles of neck and lower neck; times must increase.
 
         Args:
-            t_s: time of the measurement.
+            t_s: Time of the measurement.
             head_rad: (yaw, pitch, roll) of the neck.
             base_rad: (yaw, pitch) of a lower neck.
-            R_world_head: of these angles, where it is known already.
+            R_world_head: Orientation at these angles, if already computed.
         """
         self._times.append(t_s)
         self._angles.append((head_rad, base_rad))
@@ -98,10 +104,10 @@ class PoseHistory:
             self._tell(t_s, R_world_head or self._geometry.head_pose(head_rad, base_rad)[0])
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Return R_world_head and p_world_head_m at an instant, as ``angles`` gives them.
+        """Return R_world_head and p_world_head_m at a time, from ``angles``.
 
         Raises:
-            LookupError: nothing has been remembered yet.
+            LookupError: The history is empty.
         """
         return self._geometry.head_pose(*self.angles(t_s))
 
@@ -110,12 +116,12 @@ class PoseHistory:
         return self._geometry.head_pose(*angles)
 
     def angles(self, t_s: float) -> NeckAngles:
-        """Return the angles at an instant, interpolated between ticks.
+        """Return the angles at a time, interpolated between ticks.
 
         Before the oldest and after the newest entry that entry's angles are returned.
 
         Raises:
-            LookupError: nothing has been remembered yet.
+            LookupError: The history is empty.
         """
         times, angles = self._times, self._angles
         if not times:
@@ -142,29 +148,28 @@ class PoseHistory:
 
 
 class NewestPose(PoseHistory):
-    """Returns the newest pose for any time: for comparison only, it makes heads overshoot.
+    """A history that always returns the newest pose; for comparison, as heads overshoot with it.
 
-    This is what placing a frame by where the head is now does, instead of by where it
-    was when the frame was taken.
+    Frames are then located by the head's present pose instead of its pose at the exposure.
     """
 
     def angles(self, t_s: float) -> NeckAngles:
-        """Return the angles as remembered last.
+        """Return the newest angles.
 
         Raises:
-            LookupError: nothing has been remembered yet.
+            LookupError: The history is empty.
         """
         return super().angles(inf)
 
 
 class CameraMount:
-    """Places the camera in the world."""
+    """The mount of the camera, which gives its pose in the world."""
 
     def __init__(self, params: CameraParams) -> None:
         self.retune(params)
 
     def retune(self, params: CameraParams) -> None:
-        """Change the camera's placement."""
+        """Change the camera's mount."""
         self.on_head = params.mount == "head"
         x, y, z = params.position_mm
         self._p: Vec3 = (x / 1e3, y / 1e3, z / 1e3)
@@ -187,9 +192,12 @@ class CameraMount:
 def mounted_at(
     params: CameraParams, R_parent_camera: Mat3, p_parent_camera_m: Vec3
 ) -> CameraParams:
-    """Return the camera at another place: the inverse of what ``CameraMount`` makes of it.
+    """Return the parameters of a camera at another pose: the inverse of ``CameraMount``.
 
-    R_parent_camera, p_parent_camera_m: its pose in the head, or in the world for a base mount
+    Args:
+        params: Present parameters.
+        R_parent_camera: Orientation in the head, or in the world for a base mount.
+        p_parent_camera_m: Position in the same frame.
     """
     from_optical: Mat3 = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
     yaw, pitch, roll = map(degrees, angles_of(compose(R_parent_camera, from_optical)))
@@ -203,10 +211,10 @@ def mounted_at(
     )
 
 
-def standing_still(params: CameraParams, geometry: HeadGeometry) -> CameraParams:
-    """Return the mount on the base where a head camera is while the head looks straight ahead.
+def fixed_mount(params: CameraParams, geometry: HeadGeometry) -> CameraParams:
+    """Return a base mount at the pose of a head camera while the head looks straight ahead.
 
-    Films, and webcams beside an emulated head, do not turn with the head.
+    Films, and webcams next to an emulated head, do not turn with the head.
     """
     if params.mount == "base":
         return params

@@ -1,4 +1,4 @@
-"""How far beside a point the eyes look."""
+"""Angular error between a point and the lines of sight."""
 
 from typing import NamedTuple
 
@@ -8,11 +8,12 @@ from gazerig.gaze.types import GazeState, Vec3
 
 
 class GazeError(NamedTuple):
-    """Angles in radians.
+    """The gaze error in rad.
 
-    left, right: between each eye's line of sight and the point
-    whole: the larger of both; where one linkage turns both eyes to the sides, that of their
-        mean line of sight, from midway between them
+    Attributes:
+        left, right: Angle between each eye's line of sight and the point.
+        whole: The larger of both; if one linkage pans both eyes, that of their mean line of
+            sight, from midway between them.
     """
 
     left: float
@@ -21,9 +22,12 @@ class GazeError(NamedTuple):
 
 
 def gaze_error(p_world_m: Vec3, pose: GazeState, converges: bool = True) -> GazeError:
-    """Return how far beside a point the eyes look.
+    """Return the angular error between a point and the lines of sight.
 
-    converges: each eye turns to the sides by itself
+    Args:
+        p_world_m: The point.
+        pose: Poses of head and eyes.
+        converges: Whether each eye pans separately.
     """
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     to_left = sub(p_world_m, pose.p_world_eye_left_m)

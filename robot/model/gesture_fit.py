@@ -1,4 +1,4 @@
-"""What a rig can do of a gesture: which joints it has, how far, how fast; before it moves."""
+"""Fit of a gesture to a rig's joints, ranges, speeds and accelerations."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -22,21 +22,24 @@ from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import further
 
 _SMALLEST = 0.2
-"""A gesture of which a range leaves less than this share is not played: nobody would see it."""
+"""A gesture of which a range leaves less than this share is not played, as it is hardly visible."""
 _ROUNDING = 1e-6
 _LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class GestureRefused(ValueError):
-    """A rig cannot do a gesture; the message says which joint, when, and the limit."""
+    """A gesture that a rig cannot do; the message gives the joint, the time and the limit."""
 
 
 class FittedGesture(NamedTuple):
-    """A gesture as this rig can do it.
+    """A gesture fitted to this rig.
 
-    slowed_by: factor by which it takes longer than asked; slow_joint: which joint needs that
-    smaller: (joint, share of its motion that is left) where a range ends
+    Attributes:
+        played: The gesture to play.
+        slowed_by: Factor by which it takes longer than requested.
+        slow_joint: Joint that needs this factor.
+        smaller: (joint, remaining share of its motion) for joints whose ranges are too small.
     """
 
     played: PlayedGesture
@@ -46,7 +49,7 @@ class FittedGesture(NamedTuple):
 
 
 class GestureMotions(NamedTuple):
-    """A gesture's curves on one rig; left_out: joints that it names and the rig lacks."""
+    """A gesture's curves on one rig, and the joints that the rig lacks."""
 
     gesture: Gesture
     motion: GestureMotion
@@ -54,19 +57,19 @@ class GestureMotions(NamedTuple):
 
 
 def motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureMotions:
-    """Return a gesture as curves of the joints that a rig has.
+    """Return a gesture as curves of a rig's joints.
 
     Args:
-        gesture: as written.
-        joints: the rig's.
-        count: how often; 0: as the gesture says.
+        gesture: The gesture.
+        joints: Joints of the rig.
+        count: Number of repetitions, 0 for the gesture's own.
 
     Raises:
-        GestureRefused: it needs a joint that the rig lacks.
+        GestureRefused: It needs a joint that the rig lacks.
     """
     frames, left_out = _frames_for(gesture, joints)
     tracks = keys_of(gesture, frames, count or gesture.count)
-    kept = {name: keys for name, keys in tracks.items() if _is_there(name, joints)}
+    kept = {name: keys for name, keys in tracks.items() if _is_available(name, joints)}
     if not kept:
         raise GestureRefused(f"this rig has none of the joints that it moves: {', '.join(tracks)}")
     motion = GestureMotion(kept, further(joints), gesture.space == "joint")
@@ -76,12 +79,12 @@ def motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureM
 def _frames_for(
     gesture: Gesture, joints: Sequence[str]
 ) -> tuple[tuple[KeyFrame, ...], tuple[str, ...]]:
-    """Return the frames that a rig plays, and the joints that it lacks for them."""
-    frames, lacking = gesture.frames, _lacking(gesture.frames, joints)
+    """Return the frames that a rig plays, and the joints that it lacks."""
+    frames, lacking = gesture.frames, _missing_joints(gesture.frames, joints)
     needed = [name for name in lacking if name not in gesture.optional]
     if gesture.frames_without_neck and any(name.startswith("neck_") for name in needed):
         frames, neck = gesture.frames_without_neck, lacking
-        lacking = [*neck, *_lacking(frames, joints)]
+        lacking = [*neck, *_missing_joints(frames, joints)]
         needed = [n for n in lacking if n not in gesture.optional and n not in neck]
     if needed:
         raise GestureRefused(
@@ -91,14 +94,14 @@ def _frames_for(
     return frames, tuple(lacking)
 
 
-def _lacking(frames: tuple[KeyFrame, ...], joints: Sequence[str]) -> list[str]:
-    """Return the joints that frames name and a rig lacks."""
-    named = [name for frame in frames for name in _named(frame)]
+def _missing_joints(frames: tuple[KeyFrame, ...], joints: Sequence[str]) -> list[str]:
+    """Return the joints in frames that a rig lacks."""
+    named = [name for frame in frames for name in _joints_in(frame)]
     return [name for name in dict.fromkeys(named) if name not in joints]
 
 
-def _named(frame: KeyFrame) -> list[str]:
-    """Return the joints that a frame names; a group of lids names those that are there."""
+def _joints_in(frame: KeyFrame) -> list[str]:
+    """Return the joints in a frame; groups of lids are left out, as they adapt to the rig."""
     heads = [_neck(track) for track in HEAD_TRACKS if getattr(frame, f"{track}_deg") is not None]
     return [*heads, *(lid for lid in frame.lids if lid in LID_TRACKS), *frame.joints_deg]
 
@@ -108,21 +111,21 @@ def _neck(track: str) -> str:
     return track.replace("head", "neck")
 
 
-def _is_there(track: str, joints: Sequence[str]) -> bool:
+def _is_available(track: str, joints: Sequence[str]) -> bool:
     if track in HEAD_TRACKS:
         return _neck(track) in joints
     return track in EYE_TRACKS or track in joints
 
 
 class GestureFit:
-    """Compares gestures with the limits of one rig.
+    """The fit of gestures to the limits of one rig.
 
     Joint angles are linear in the offset: the eyes turn against the head, and a lid turns by
-    its factor times its whole way.
+    its factor times its full range.
 
     Args:
-        joints: the rig's, in the order of all sequences of joints.
-        lid_spans_rad: way of each lid from shut to open, by joint.
+        joints: Joints of the rig, in the order of all sequences of joints.
+        lid_spans_rad: Range of each lid from shut to open, by joint.
     """
 
     def __init__(self, joints: tuple[str, ...], lid_spans_rad: Mapping[str, float]) -> None:
@@ -138,13 +141,13 @@ class GestureFit:
                 axis = 0 if name.endswith("pan") else 1
                 self._matrix[axis, j] = -1.0
                 self._matrix[channels.index(EYE_TRACKS[axis]), j] = 1.0
-        # A range is checked for what moves a joint by itself; lids are kept within by their
-        # openings, and eyes that compensate the head go as far as they can.
+        # Ranges are checked only for direct motion of a joint: lids are limited by their
+        # openings, and eyes that compensate for the head move as far as they can.
         self._own = np.where(self._matrix > 0.0, self._matrix, 0.0)
         self._own[[channels.index(lid) for lid in LID_TRACKS]] = 0.0
 
     def without(self, commanded_rad: Sequence[float], state: OffsetState) -> Floats:
-        """Return commanded joint angles less what an offset adds to them."""
+        """Return commanded joint angles without the offset's part."""
         angles: Floats = np.array(commanded_rad) - state.value @ self._matrix
         return angles
 
@@ -157,18 +160,18 @@ class GestureFit:
         limits: Sequence[JointLimit],
         share: float,
     ) -> FittedGesture:
-        """Return a gesture as the rig can do it from where it is.
+        """Fit a gesture to the rig at its present angles.
 
         Args:
-            name: of the gesture.
-            made: its curves on this rig.
-            speed: factor on the speed at which it was written.
-            base_rad: joint angles that it is added to.
-            limits: of the joints.
-            share: of speed and acceleration limits that it may use; the rest is for gaze.
+            name: Name of the gesture.
+            made: Its curves on this rig.
+            speed: Factor on its defined speed.
+            base_rad: Joint angles to which it is added.
+            limits: Limits of the joints.
+            share: Share of speed and acceleration limits for gestures; the rest is for gaze.
 
         Raises:
-            GestureRefused: it cannot be done, or not as written and is not to be changed.
+            GestureRefused: It cannot be done, or only with changes that it does not allow.
         """
         slow, motion = made.gesture.fit == "slow", made.motion
         sizes, smaller = self._sizes(motion.samples, base_rad, limits)
@@ -187,7 +190,7 @@ class GestureFit:
     def _sizes(
         self, samples: MotionSamples, base_rad: Floats, limits: Sequence[JointLimit]
     ) -> tuple[Floats, tuple[tuple[str, float], ...]]:
-        """Return the factor of every channel that keeps ranges, and the joints that need one."""
+        """Return each channel's factor that keeps all ranges, and the joints that need one."""
         sizes = np.ones(len(self._matrix))
         smaller = {}
         highest, lowest = samples.value.max(axis=0), samples.value.min(axis=0)
@@ -203,7 +206,7 @@ class GestureFit:
     def _beyond_range(
         self, samples: MotionSamples, base_rad: Floats, limits: Sequence[JointLimit]
     ) -> str:
-        """Return at which joint, when and by how much a range is left first."""
+        """Return a text with joint, time and amount of the first excess of a range."""
         angles = base_rad + samples.value @ self._own
         low, high = (np.array([limit[end] for limit in limits]) for end in (0, 1))
         beyond = (angles > high + _ROUNDING) | (angles < low - _ROUNDING)
@@ -217,7 +220,7 @@ class GestureFit:
     def _too_fast(
         self, samples: MotionSamples, limits: Sequence[JointLimit], share: float
     ) -> tuple[float, str, str]:
-        """Return the factor of time that keeps all limits, the joint that needs it, and why."""
+        """Return the time factor that keeps all limits, its joint and a text with the reason."""
         found = (1.0, "", "")
         for column, power, at, unit in (
             (samples.speed, 1.0, 2, "deg/s"),
@@ -257,7 +260,7 @@ class GestureFit:
         limits: Sequence[JointLimit],
         share: float,
     ) -> float:
-        """Return how long a gesture must wait for what is under way to return to rest."""
+        """Return the time for which a gesture must wait for the present one to fade."""
         if not any(map(np.any, state)):
             return 0.0
         fade = _fade(state, fade_s)
@@ -277,7 +280,7 @@ class GestureFit:
         return fade_s
 
     def _keeps(self, samples: MotionSamples, most: Sequence[Floats]) -> bool:
-        """Return whether speeds and accelerations stay below the given ones."""
+        """Return whether speeds and accelerations stay below given ones."""
         return all(
             bool((np.abs(column @ self._matrix) <= limit).all())
             for column, limit in zip(samples[2:], most, strict=True)

@@ -1,4 +1,4 @@
-"""What the guard goes by beside the joints' own limits."""
+"""Parameters of the guard besides the joints' own limits."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -9,7 +9,7 @@ from gazerig.robot.model.forbidden_range import CollisionParams
 
 @dataclass(frozen=True)
 class HealthParams:
-    """From where servos are slowed down and stopped, before they switch themselves off."""
+    """Thresholds for slowing and stopping servos before they switch themselves off."""
 
     # fmt: off
     warm_c: Annotated[float, Bounds(1, 60), "a joint is slowed down from this far below the servo's own temperature limit"] = 15.0
@@ -26,10 +26,10 @@ class HealthParams:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that there is a way from warm to hot.
+        """Check that the warm temperature is below the hot one.
 
         Raises:
-            ValueError: there is none.
+            ValueError: It is not.
         """
         if self.hot_c >= self.warm_c:
             raise ValueError(f"hot_c {self.hot_c} must be below warm_c {self.warm_c}")
@@ -37,14 +37,14 @@ class HealthParams:
 
 @dataclass(frozen=True)
 class StallParams:
-    """When a joint counts as stuck, and how it tries again."""
+    """Detection of stalled joints, and their next try."""
 
     # fmt: off
     position_error_deg: Annotated[float, Bounds(0.5, 45),
         "a joint at least this far from its commanded angle should be moving; larger than the error that friction and weight leave"] = 3.0
     moved_deg: Annotated[float, Bounds(0.1, 10), "motion towards the commanded angle that counts as moving"] = 0.5
-    # Dead time of a healthy servo is some 30 ms; with an answer's age and one tick more the
-    # joint is found within 200 ms.
+    # The dead time of a healthy servo is about 30 ms. With the age of an answer and one more tick
+    # a stall is found within 200 ms.
     detection_ms: Annotated[float, Bounds(50, 5000), "a joint that has not moved for this long is stalled and stops pushing"] = 150.0
     retry_ms: Annotated[float, Bounds(100, 60000), "a stalled joint tries again, slowly, after this time"] = 1000.0
     retry_deg: Annotated[float, Bounds(0.5, 45),
@@ -52,10 +52,10 @@ class StallParams:
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check that a joint that tries again can be found stuck again.
+        """Check that a joint that tries again can be found stalled again.
 
         Raises:
-            ValueError: it could not; the message says what would do.
+            ValueError: It could not; the message states the required order.
         """
         if self.retry_deg <= self.position_error_deg:
             raise ValueError(
@@ -69,7 +69,7 @@ class StallParams:
 
 @dataclass(frozen=True)
 class GuardParams:
-    """Ages beyond which nothing moves, slow passages, and what the servos bear."""
+    """Timeouts, slow motion, and limits of the servos' strain."""
 
     # fmt: off
     joint_timeout_ms: Annotated[float, Bounds(5, 5000), "a joint whose last measurement is older than this holds still"] = 150.0

@@ -1,8 +1,8 @@
-"""Directions in the camera frame to pixels and back, through the lens as it is best known.
+"""Conversion between directions in the camera frame and pixels, with the best known lens data.
 
-Camera frame: optical, x right, y down, z forward. Metres; pixels have their centres at
-whole numbers. Distortion is that of the OpenCV manual (camera calibration and 3D
-reconstruction): two tangential and three radial coefficients, in the order k1 k2 p1 p2 k3.
+Camera frame: optical, x right, y down, z forward, in m. Pixels have their centres at whole
+numbers. Distortion is that of the OpenCV manual (camera calibration and 3D reconstruction): two
+tangential and three radial coefficients, in the order k1 k2 p1 p2 k3.
 """
 
 from functools import lru_cache
@@ -15,12 +15,12 @@ from gazerig.robot.model.frames import LensParams
 
 Floats = NDArray[np.float64]
 
-# Undistorting is a search; with strong lenses the usual five rounds leave a pixel.
+# Undistortion is iterative; with strong lenses the usual five rounds leave an error of a pixel.
 _ROUNDS, _LEAST_STEP = 40, 1e-12
 # Two sizes of image show the same field if their shapes differ by no more than rounding.
 _SAME_SHAPE = 0.01
-# The optical axis of a camera that uses a part of its sensor may meet the image near an edge, or a
-# little outside: from the middle, in widths and heights.
+# Largest distance of the optical axis from the middle, in widths and heights: a camera that uses
+# a part of its sensor may have its axis near an edge of the image, or a little outside.
 _FARTHEST_AXIS = 0.75
 
 
@@ -32,18 +32,18 @@ def intrinsics_of_lens(
     height_px: int,
     own: Intrinsics | None = None,
 ) -> Intrinsics:
-    """Return the intrinsics of images of a size: as measured, as the camera says, or by its view.
+    """Return the intrinsics of images of a size: measured, reported by the camera, or by the view.
 
-    Images of another size but the same shape are taken for the measured ones scaled.
-    Of another shape it is unknown which edges the camera cut off, so the field of view
-    has to do, as where nothing was measured (see ``lens_fault``).
+    Images of another size with the same shape count as scaled measured ones. For another shape
+    it is unknown which edges the camera has cut off, so the field of view is used, as without a
+    measured lens (see ``lens_fault``).
 
     Args:
-        lens: as measured.
-        view_rad: horizontal field of view, from edge to edge.
-        width_px: of the images.
-        height_px: of the images.
-        own: as the camera says of this image; it counts where nothing was measured that fits.
+        lens: Measured lens.
+        view_rad: Horizontal field of view, from edge to edge.
+        width_px: Width of the images.
+        height_px: Height of the images.
+        own: Intrinsics reported by the camera, used if no measured lens fits.
     """
     if lens is None or not fits(lens, width_px, height_px):
         if own is not None:
@@ -54,12 +54,12 @@ def intrinsics_of_lens(
 
 
 def fits(lens: LensParams, width_px: int, height_px: int) -> bool:
-    """Return whether images of a size show the field that the lens was measured on."""
+    """Return whether images of a size show the field for which the lens was measured."""
     return not lens_fault(lens, width_px, height_px)
 
 
 def lens_fault(lens: LensParams, width_px: int, height_px: int) -> str:
-    """Return why a measured lens is not that of images of a size, "" if it is."""
+    """Return the reason why a measured lens does not fit images of a size, "" if it does."""
     if width_px <= 0 or height_px <= 0:
         return f"images are {width_px} x {height_px}"
     shape = (width_px * lens.height_px) / (height_px * lens.width_px)
@@ -76,42 +76,40 @@ def lens_fault(lens: LensParams, width_px: int, height_px: int) -> str:
 
 
 def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Return where points (n, 3) appear: (n, 2) pixels, nan for points not before the camera."""
+    """Project points (n, 3) to pixels (n, 2), NaN for points not in front of the camera."""
     p = np.asarray(points_camera_m, dtype=np.float64).reshape(-1, 3)
     z = np.where(p[:, 2:] > 0.0, p[:, 2:], np.nan)
     i = intrinsics
     plane = p[:, :2] / z
     if i.distorts:
-        plane = _distorted(plane, i.distortion)
+        plane = _distort(plane, i.distortion)
     pixels: Floats = plane * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
     return pixels
 
 
 def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Return the directions (n, 3) through pixels (n, 2), with z = 1 and distortion undone."""
+    """Return the undistorted directions (n, 3) through pixels (n, 2), with z = 1."""
     points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
     i = intrinsics
     found = np.ones((len(points), 3))
     if i.distorts and len(points):
-        found[:, :2] = _undistorted(
-            (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px), i.distortion
-        )
+        found[:, :2] = _undistort((points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px), i.distortion)
     else:
         found[:, :2] = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)
     return found
 
 
 def undistorted(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
-    """Return where pixels (n, 2) would be if the lens did not distort."""
+    """Return the pixels (n, 2) without the lens's distortion."""
     i = intrinsics
     points: Floats = rays(points_px, i)[:, :2] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
     return points
 
 
-def _undistorted(plane: Floats, distortion: Distortion) -> Floats:
-    """Return the points of the plane z = 1 that the lens moves to these, by fixed-point rounds.
+def _undistort(plane: Floats, distortion: Distortion) -> Floats:
+    """Undistort points of the plane z = 1 by fixed-point iteration.
 
-    Where the model of the lens has no such point, what it moves is returned as it is.
+    Points that the model of the lens cannot produce are returned unchanged.
     """
     k1, k2, p1, p2, k3 = distortion
     found = plane
@@ -131,8 +129,8 @@ def _undistorted(plane: Floats, distortion: Distortion) -> Floats:
     return found
 
 
-def _distorted(plane: Floats, distortion: Distortion) -> Floats:
-    """Move points of the plane z = 1 as the lens does."""
+def _distort(plane: Floats, distortion: Distortion) -> Floats:
+    """Distort points of the plane z = 1."""
     k1, k2, p1, p2, k3 = distortion
     x, y = plane[:, 0], plane[:, 1]
     r2 = x * x + y * y

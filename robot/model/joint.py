@@ -1,4 +1,4 @@
-"""One joint of a rig: its servo, how it is built in, and its limits."""
+"""Parameters of a joint: its servo, its installation and its limits."""
 
 from dataclasses import dataclass
 from math import ceil, floor, pi, radians
@@ -14,7 +14,7 @@ from gazerig.robot.model.transmission import Curve, Linkage, Straight
 
 @dataclass(frozen=True)
 class JointParams:
-    """One joint: its servo, how it is built in, and its limits."""
+    """A joint: its servo, its installation and its limits."""
 
     # fmt: off
     id: Annotated[int, Bounds(0, 252), "servo id; on a Maestro its channel"]
@@ -44,7 +44,7 @@ class JointParams:
         """Check that the limits fit each other and the servo's one turn.
 
         Raises:
-            ValueError: they do not; the message says which.
+            ValueError: They do not; the message names the limit.
         """
         if self.min_deg >= self.max_deg:
             raise ValueError(f"min_deg {self.min_deg} must be below max_deg {self.max_deg}")
@@ -53,10 +53,10 @@ class JointParams:
         self._check_reach()
 
     def _check_reach(self) -> None:
-        """See that the servo can go where the joint may; an unknown model is another's business.
+        """Check that the servo reaches the joint's range; unknown models are checked elsewhere.
 
         Raises:
-            ValueError: it cannot, or the linkage was not measured so far.
+            ValueError: It does not, or the linkage was measured over a smaller range.
         """
         facts = SERVOS.get(self.model)
         if facts is None:
@@ -82,10 +82,10 @@ class JointParams:
 
     @property
     def facts(self) -> ServoModelInfo:
-        """Return what is known of its servo's model.
+        """Return the data of its servo model.
 
         Raises:
-            KeyError: there is no such model; rigs that were checked have none such.
+            KeyError: The model is unknown, which cannot occur in a checked rig.
         """
         return SERVOS[self.model]
 
@@ -95,10 +95,10 @@ class JointParams:
         return self.zero_step if self.zero_step is not None else self.facts.middle
 
     def made(self) -> Linkage:
-        """Return what lies between servo and joint.
+        """Build the linkage between servo and joint.
 
         Raises:
-            ValueError: the linkage cannot be.
+            ValueError: The linkage is impossible.
         """
         facts = self.facts
         if self.transmission_points:
@@ -131,11 +131,12 @@ class JointParams:
     def setup(
         self, name: str = "", rest_rad: float | None = None, gentle_deg_s: float = ENTRY_DEG_S
     ) -> ServoConfig:
-        """Return what the bus must know: the range rounded inwards, speed and acceleration there.
+        """Return the servo's configuration: the range rounded inwards, speed and acceleration.
 
-        rest_rad: where the joint is taken to be when the torque comes on, for a servo that
-            does not tell its place: the parking pose
-        gentle_deg_s: it is led into its range no faster
+        Args:
+            name: Name of the joint.
+            rest_rad: Assumed angle at torque-on of a servo without feedback: the parking pose.
+            gentle_deg_s: Highest speed at which a joint outside its range moves inside.
         """
         linkage, facts = self.made(), self.facts
         ends = sorted(linkage.steps(radians(end)) for end in (self.min_deg, self.max_deg))

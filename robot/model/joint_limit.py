@@ -1,14 +1,14 @@
-"""What a joint may do: its range, speed and acceleration, and what its servo withstands."""
+"""Limits of a joint: range, speed, acceleration, and temperature and voltage of its servo."""
 
 from math import inf
 from typing import NamedTuple
 
 
 class JointLimit(NamedTuple):
-    """One joint's range, top speed and top acceleration (rad, rad/s, rad/s^2).
+    """A joint's range, top speed and top acceleration (rad, rad/s, rad/s^2).
 
-    The rest is what the joint's servo bears before it switches itself off: degrees
-    Celsius, lowest and highest volts.
+    The other fields are the limits at which the joint's servo switches itself off: temperature
+    in deg C, lowest and highest voltage in V.
     """
 
     low_rad: float
@@ -20,7 +20,7 @@ class JointLimit(NamedTuple):
     highest_v: float = inf
 
     def within(self, reach: "JointLimit") -> "JointLimit":
-        """Return the part of this range and speed that a servo's own limits leave."""
+        """Return these limits with range and speed reduced to a servo's own limits."""
         return self._replace(
             low_rad=min(max(self.low_rad, reach.low_rad), reach.high_rad),
             high_rad=max(min(self.high_rad, reach.high_rad), reach.low_rad),

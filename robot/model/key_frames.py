@@ -1,7 +1,7 @@
-"""Key frames fitted to motion that was sampled densely: few keys, least-jerk curves between.
+"""Fit of key frames to a densely sampled motion: few keys with minimum-jerk curves between.
 
-A sampled motion is smoothed first. Its keys are where it turns, and wherever else the curve
-through the keys would be farther from it than a tolerance.
+The sampled motion is smoothed first. Keys are placed at its turning points, and at further points
+until the curve through the keys deviates by less than a tolerance.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
 
 GRID_S = 0.02
-"""Keys lie on whole multiples of this."""
+"""Grid of the keys' times."""
 _SMOOTHED_OVER_S = 0.15
 _MOST_KEYS = 60
 
@@ -19,12 +19,12 @@ def smoothed(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return samples at even times without the jitter of a hand and of encoders.
 
     Args:
-        times_s: (n,), increasing; the first counts as 0.
-        values: (n,).
+        times_s: (n,) Increasing times; the first counts as 0.
+        values: (n,) Values.
 
     Returns:
         Times in steps of ``GRID_S`` from 0, and values by a local cubic (Savitzky and Golay
-        1964), which keeps peaks where a mean would flatten them.
+        1964), which keeps peaks that a mean would flatten.
     """
     from scipy.signal import savgol_filter  # nearly a second of processor
 
@@ -34,16 +34,16 @@ def smoothed(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     return even, savgol_filter(found, window, 3, mode="nearest") if window > 3 else found
 
 
-def fitted_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats, Floats]:
-    """Return times and values of the keys whose curve stays within a tolerance of samples.
+def fit_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floats, Floats]:
+    """Return times and values of keys whose curve stays within a tolerance of the samples.
 
     Args:
-        times_s: (n,) in steps of ``GRID_S`` from 0.
-        values: (n,), the first one is rest.
-        tolerance: largest distance of the curve from the samples.
+        times_s: (n,) Times in steps of ``GRID_S`` from 0.
+        values: (n,) Values; the first one is rest.
+        tolerance: Largest distance of the curve from the samples.
 
     Returns:
-        Keys after time 0; none where nothing moves by more than the tolerance.
+        Keys after time 0; none if nothing moves by more than the tolerance.
     """
     if np.abs(values - values[0]).max() <= tolerance:
         return np.zeros(0), np.zeros(0)
@@ -61,7 +61,7 @@ def fitted_keys(times_s: Floats, values: Floats, tolerance: float) -> tuple[Floa
 
 
 def _turns(values: Floats, tolerance: float) -> list[int]:
-    """Return where the samples turn back by more than the tolerance, and their end."""
+    """Return the indices at which the samples reverse by more than the tolerance, and the last."""
     turns: list[int] = []
     high = low = 0
     heading = 0

@@ -1,10 +1,10 @@
-"""Exact geometry of the head: joint angles to lines of sight and back. Pure.
+"""Exact kinematics of the head: joint angles to lines of sight and back.
 
-The neck turns yaw, then pitch, then roll about axes that may lie apart; each eye pans,
-then tilts about its own centre, so that vergence comes from geometry. Eyes that one
-linkage turns both stay parallel: they take the mean of what each would need. A joint that
-a rig does not have stands at 0, a lid that it does not have is open. Frames and signs as
-in gaze.types; the world's origin is the neck base on the yaw axis.
+The neck rotates in yaw, then pitch, then roll, about axes that may be apart. Each eye pans, then
+tilts about its own centre, so that vergence results from geometry. Eyes on one common linkage
+stay parallel, at the mean of both desired angles. A joint that a rig lacks is at 0, a lid that it
+lacks is open. Frames and signs are those of gaze.types; the world's origin is the neck base on the
+yaw axis.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,7 +22,7 @@ from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_o
 
 @dataclass(frozen=True)
 class GeometryParams:
-    """Measures of the rig, in millimetres, with the neck level and straight."""
+    """Dimensions of the rig in mm, with the neck level and straight."""
 
     # fmt: off
     pitch_axis_height_mm: Annotated[float, Bounds(0, 2000), "height of the neck's pitch and roll axes above the neck base"]
@@ -40,15 +40,17 @@ LidEnds = tuple[float, float]
 
 NECK = ("neck_yaw", "neck_pitch", "neck_roll")
 LOWER_NECK = ("lower_neck_yaw", "lower_neck_pitch")
-"""A second pair below the neck: expressions and gestures move it, and gaze allows for it."""
+"""Two further joints below the neck: expressions and gestures move them, and gaze compensates."""
 LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
 
 
 class Kinematics:
-    """Forward and inverse geometry of one rig.
+    """The forward and inverse kinematics of one rig.
 
-    names: of its joints, in the order of every sequence of them; gaze moves the first of them
-    one_pan, one_tilt: both eyes are turned by one linkage
+    Attributes:
+        names: Names of its joints, in the order of every sequence of joints; the joints that
+            gaze moves come first.
+        one_pan, one_tilt: Whether one linkage pans or tilts both eyes.
     """
 
     def __init__(
@@ -57,7 +59,7 @@ class Kinematics:
         self.names = in_order(joints)
         self.one_pan, self.one_tilt = "eyes_pan" in self.names, "eyes_tilt" in self.names
         place = {name: i for i, name in enumerate(self.names)}
-        # What a rig does not have is looked up behind its joints, where a 0 stands.
+        # A missing joint is looked up behind the rig's joints, at an appended 0.
         absent = len(self.names)
         both = {"pan": place.get("eyes_pan", absent), "tilt": place.get("eyes_tilt", absent)}
         eyes = [
@@ -70,7 +72,7 @@ class Kinematics:
         self._angles_of = itemgetter(*neck, *eyes, *lids_at)
         self._rates_of = itemgetter(*neck)
         self._wanted = tuple(GAZE_JOINTS.index(name) for name in self.names if name in GAZE_JOINTS)
-        self._desired_of = _picker(self._wanted)
+        self._desired_of = _make_picker(self._wanted)
         self._further = (0.0,) * (len(self.names) - len(self._wanted))
         self.retune(params, lids)
 
@@ -80,7 +82,7 @@ class Kinematics:
         self._base: Vec3 = (0.0, 0.0, params.lower_pitch_axis_height_mm / 1e3)
         self._ahead_m, self._above_m = params.eyes_ahead_mm / 1e3, params.eyes_above_mm / 1e3
         self._half = params.interocular_mm / 2e3
-        # Of an absent lid, whose angle is 0, the opening comes out as 1.
+        # The opening of a missing lid, whose angle is 0, is computed as 1.
         ends = [lids[name] if name in self.names else (-1.0, 0.0) for name in LIDS]
         self._shut = tuple(shut for shut, _ in ends)
         self._span = tuple(wide - shut for shut, wide in ends)
@@ -103,28 +105,28 @@ class Kinematics:
         if base_rad == _UPRIGHT:
             return R, p
         R_world_base = rotation((*base_rad, 0.0))
-        return compose(R_world_base, R), self._carried(R_world_base, p)
+        return compose(R_world_base, R), self._rotate_with_base(R_world_base, p)
 
-    def _carried(self, R_world_base: Mat3, p_m: Vec3) -> Vec3:
-        """Return where a lower neck carries a point, which is given for it upright."""
+    def _rotate_with_base(self, R_world_base: Mat3, p_m: Vec3) -> Vec3:
+        """Return the position of a point, given for an upright lower neck, on a rotated one."""
         return add(self._base, rotate(R_world_base, sub(p_m, self._base)))
 
     def own_parts(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Capsule, Capsule]:
-        """Return what head and neck fill in the world, as far as the measures tell.
+        """Return approximate volumes of head and neck in the world.
 
-        The head: from the neck's pitch axis to between the eyes, as thick as the eyes are apart;
-        the neck: from its base to that axis, half as thick.
+        The head extends from the neck's pitch axis to the point between the eyes, with the eyes'
+        distance as radius. The neck extends from its base to that axis, with half that radius.
         """
         pivot = add(p_world_head_m, rotate(R_world_head, (-self._ahead_m, 0.0, -self._above_m)))
         head = Capsule(pivot, p_world_head_m, 2.0 * self._half)
         return head, Capsule(self._base, pivot, self._half)
 
     def facing(self, p_world_m: Vec3, base_rad: Angles2 = _UPRIGHT) -> Angles2:
-        """Return the neck yaw and pitch that lead the head's x axis through a point.
+        """Return the neck yaw and pitch at which the head's x axis passes through a point.
 
-        The axis passes above the pivot by the arm's height, so the pitch is that of the
-        point less the angle which that height takes up. A point nearer to the pivot than
-        the height cannot be faced; it gets the pitch of its own direction.
+        The axis passes above the pivot by the arm's height, so the pitch is that of the point
+        minus the angle of that height. A point nearer to the pivot than the height cannot be
+        faced; the result is then the pitch of its direction.
         """
         if base_rad != _UPRIGHT:
             back = rotate_back(rotation((*base_rad, 0.0)), sub(p_world_m, self._base))
@@ -143,7 +145,7 @@ class Kinematics:
     ) -> tuple[Angles2, Angles2]:
         """Return left and right (yaw, pitch) in the head that fixate a point.
 
-        Eyes that cannot turn each by itself come as near to that as both together can.
+        Eyes on a common linkage come as close to the point as both together can.
         """
         (a, b, c), (d, e, f), (g, h, i) = R_world_head
         p, o = p_world_m, p_world_head_m
@@ -164,7 +166,7 @@ class Kinematics:
         return left, right
 
     def forward(self, joints: JointState) -> GazeState:
-        """Return where head and eyes are for measured joints."""
+        """Return the poses of head and eyes at measured joints."""
         (
             yaw, pitch, roll, base_yaw, base_pitch,
             pan_left, tilt_left, pan_right, tilt_right,
@@ -176,7 +178,7 @@ class Kinematics:
         x, y, z = p_head
         half, shut, span = self._half, self._shut, self._span
         aside_x, aside_y, aside_z = R[0][1] * half, R[1][1] * half, R[2][1] * half
-        # Without the call of a function written in Python that the class itself would cost.
+        # Avoids the call of the class's constructor, a Python function.
         return tuple.__new__(
             GazeState,
             (
@@ -201,8 +203,8 @@ class Kinematics:
         """Return the joint angles of a command.
 
         Args:
-            command: what gaze asks for.
-            further_rad: angles of the joints that gaze does not move; 0 where not given.
+            command: Gaze command.
+            further_rad: Angles of the joints that gaze does not move, default 0.
         """
         head, left, right, lid_left, lid_right = command[:5]
         shut, span = self._shut, self._span
@@ -223,28 +225,28 @@ class Kinematics:
         return (*angles, *(further_rad or self._further)) if self._further else angles
 
     def further_rad(self, base_rad: Angles2) -> JointAngles:
-        """Return the joints that gaze does not move at 0, but a lower neck at its angles."""
+        """Return the angles of the joints that gaze does not move: 0 except for a lower neck."""
         lower = dict(zip(LOWER_NECK, base_rad, strict=True))
         return tuple(lower.get(name, 0.0) for name in self.names[len(self._wanted) :])
 
 
 def _share(value: float) -> float:
-    """Return a number clipped to 0..1; 0 for what is no number."""
+    """Clip a number to 0..1; return 0 for NaN."""
     return value if 0.0 < value < 1.0 else 1.0 if value >= 1.0 else 0.0
 
 
-def _picker(places: Sequence[int]) -> Callable[[Sequence[float]], JointAngles]:
-    """Return the function that picks the values at some places of a sequence."""
+def _make_picker(places: Sequence[int]) -> Callable[[Sequence[float]], JointAngles]:
+    """Return a function that picks the values at some positions of a sequence."""
     if len(places) > 1:
         picked: Any = itemgetter(*places)
-    else:  # of one place ``itemgetter`` returns no tuple
+    else:  # for one position ``itemgetter`` returns no tuple
         picked = lambda values: tuple([values[i] for i in places])  # noqa: E731
     chosen: Callable[[Sequence[float]], JointAngles] = picked
     return chosen
 
 
 def _between(one: float, other: float) -> float:
-    """Return the direction midway between two within -pi..pi, the short way round."""
+    """Return the direction midway between two within -pi..pi, along the shorter arc."""
     middle = 0.5 * (one + other)
     if abs(one - other) <= pi:
         return middle

@@ -1,7 +1,7 @@
-"""Who leads the head in place of what attracts it: something to look at, or joints held by hand.
+"""Control of the head by a client: a target to look at, or joints that are held.
 
-A lead needs a heartbeat unless it is to stay: without one the gaze leads again. Pure: times
-are those of the ticks and heartbeats are commands, so a recorded run lapses as it did.
+Without ``stay`` the control needs a heartbeat; if it is missing, the gaze models take over again.
+Times are those of the ticks and heartbeats are commands, so a repeated run times out as recorded.
 """
 
 from math import degrees, radians
@@ -25,19 +25,20 @@ from gazerig.robot.model.leader import NOBODY_LEADS, LeadState
 from gazerig.robot.model.types import JointAngles
 
 ARRIVED_RAD = radians(1.0)
-"""A gaze or joint that is measured nearer than this to what was asked for is there."""
+"""A gaze or joint has arrived if its measured error is below this."""
 GONE_S = 2.0
-"""Who looks at a person leads no longer when the person was not seen for so long."""
+"""A control that follows a person ends when the person has not been seen for this time."""
 
 
 class Lead:
-    """The lead in force.
+    """The present control of the head by a client.
 
-    point: to look at, world frame; None if none was chosen
-    person: whom to look at, by id; None if none was chosen
-    pose_rad: joints held by hand, empty while the models move them
-    words: who leads and what, "" while no client leads
-    state: as of the last tick
+    Attributes:
+        point: Point to look at, world frame, None without one.
+        person: Id of the person to look at, None without one.
+        pose_rad: Held joint angles, empty while the models move the joints.
+        words: Client and command as text, "" without a client.
+        state: State at the last tick.
     """
 
     def __init__(self) -> None:
@@ -60,35 +61,42 @@ class Lead:
 
     @property
     def active(self) -> bool:
-        """True while a client leads."""
+        """Return whether a client is in control."""
         return bool(self.words)
 
     @property
     def needs_camera(self) -> bool:
-        """True unless a client has chosen a point or joints, which are there without a camera."""
+        """Return False if a client has chosen a point or joints, which need no camera."""
         return not self.words or self.person is not None
 
     def look(self, command: Look, point: Vec3 | None, t_s: float) -> None:
-        """Lead the gaze to a point, or let it be free; joints are no longer held.
+        """Look at a point, or free the gaze; joints are no longer held.
 
-        point: where what the command names is in the world; None: nowhere, the gaze is free
+        Args:
+            command: The command.
+            point: Its point in the world, None to free the gaze.
+            t_s: Present time.
         """
-        self._leave(f"{command.who or 'a client'} looks elsewhere")
+        self._release(f"{command.who or 'a client'} looks elsewhere")
         self.point = point
         self._shifts += 1
-        self._what = _what(command)
-        self._take(command, t_s)
+        self._what = _target_text(command)
+        self._start(command, t_s)
 
     def follow(self, command: LookAtPerson, face: Face, captured_s: float, t_s: float) -> None:
-        """Lead the gaze to a person who is seen."""
+        """Look at a visible person."""
         self.look(command, None, t_s)
         self.person, self._face, self._seen_s = command.id, face, captured_s
-        self._take(command, t_s)
+        self._start(command, t_s)
 
     def jog(self, command: Jog, names: tuple[str, ...], now_rad: JointAngles, t_s: float) -> None:
-        """Hold all joints but those given; without any, return them to the gaze models.
+        """Move the given joints and hold the others; without any, free the joints.
 
-        now_rad: where the joints are held that have not been jogged yet
+        Args:
+            command: The command.
+            names: Names of all joints.
+            now_rad: Angles of joints that have not been jogged yet.
+            t_s: Present time.
         """
         if not command.angles_rad:
             self.pose_rad = ()
@@ -96,9 +104,9 @@ class Lead:
             if self.point is None and self.person is None:
                 self.end(f"{command.who or 'a client'} has returned the joints")
             self._describe()
-            if self.state.active:  # what was to be looked at before is looked at again
+            if self.state.active:  # the previous target is looked at again
                 arrived = self.state.arrived
-                self.state = self._begun(self.state.number, t_s)._replace(arrived=arrived)
+                self.state = self._new_state(self.state.number, t_s)._replace(arrived=arrived)
             return
         if command.who != self._who:
             self.point = self.person = None
@@ -107,17 +115,17 @@ class Lead:
         self.pose_rad = tuple(angles[name] for name in names)
         self._jogged.update(command.angles_rad)
         self._jogged_at = tuple([i for i, name in enumerate(names) if name in self._jogged])
-        self._take(command, t_s)
+        self._start(command, t_s)
 
     def renew(self, command: Renew, t_s: float) -> bool:
-        """Record a heartbeat; return whether it came from the client that leads."""
+        """Record a heartbeat; return whether it came from the client in control."""
         mine = self.active and command.who == self._who
         if mine:
             self._renewed_s = t_s
         return mine
 
     def over(self, t_s: float) -> str:
-        """Return why the lead is to end now, "" while it goes on or no client leads."""
+        """Return the reason for the control to end now, "" if it continues or there is none."""
         if not self.active:
             return ""
         if self._until_s is not None and t_s >= self._until_s:
@@ -129,15 +137,15 @@ class Lead:
         return ""
 
     def end(self, why: str) -> None:
-        """End the lead: the gaze models move the head again."""
+        """End the control: the gaze models move the head again."""
         if self.point is not None or self.person is not None:
             self._shifts += 1
-        self._leave(why)
+        self._release(why)
         self._leads = "", ""
         self._describe()
 
     def target(self, target: Target, percept: Percept | None, t_s: float) -> Target:
-        """Return what a user chose to look at in the place of what attention did."""
+        """Return the client's target instead of attention's, if there is one."""
         if self.point is None and self.person is None:
             return target
         chosen = self.chosen(percept, t_s)
@@ -146,7 +154,7 @@ class Lead:
         return chosen._replace(shift=target.shift + self._shifts, saliences=target.saliences)
 
     def chosen(self, percept: Percept | None, t_s: float) -> Target | None:
-        """Return what a user chose to look at, None if nothing was chosen."""
+        """Return the client's target, None without one."""
         if self.person is not None:
             return self._person(percept)
         if self.point is None:
@@ -159,14 +167,14 @@ class Lead:
     def measure(
         self, target: Target, pose: GazeState, joints_rad: JointAngles, converges: bool, t_s: float
     ) -> LeadState:
-        """Return the state of the lead after a tick.
+        """Return the state of the control after a tick.
 
         Args:
-            target: looked at in this tick.
-            pose: head and eyes as measured.
-            joints_rad: joints as measured.
-            converges: each eye turns to the sides by itself.
-            t_s: time of the tick.
+            target: Gaze target of this tick.
+            pose: Measured poses of head and eyes.
+            joints_rad: Measured joint angles.
+            converges: Whether each eye pans separately.
+            t_s: Time of the tick.
         """
         if not self.state.active:
             return self.state
@@ -181,7 +189,7 @@ class Lead:
         return self.state
 
     def _person(self, percept: Percept | None) -> Target | None:
-        """Return the person who is followed, where last seen."""
+        """Return the followed person at the last observed position."""
         if percept is not None:
             for face in percept.faces:
                 if face.id == self.person:
@@ -194,7 +202,7 @@ class Lead:
             self._shifts, f"face {known.id}: a user chose it",
         )  # fmt: skip
 
-    def _take(self, command: Leading, t_s: float) -> None:
+    def _start(self, command: Leading, t_s: float) -> None:
         self._who, self._stay, self._renewed_s = command.who, command.stay, t_s
         self._until_s = None if command.for_s is None else t_s + command.for_s
         if isinstance(command, LookAt):
@@ -205,23 +213,23 @@ class Lead:
             self._pointer = False
         self._describe()
         if self.words:
-            self.state = self._begun(self.state.number + 1, t_s)
+            self.state = self._new_state(self.state.number + 1, t_s)
 
-    def _begun(self, number: int, t_s: float) -> LeadState:
-        """Return the state of a lead that begins, or goes on with something else."""
+    def _new_state(self, number: int, t_s: float) -> LeadState:
+        """Return the state of a control that begins or changes its target."""
         joints = tuple(self._jogged)
         by: Literal["person", "pointer", "joint"] = (
             "joint" if joints else "pointer" if self._pointer else "person"
         )
         if (by, self._who) != self._leads:
             self._leads, self._since_s = (by, self._who), t_s
-        what = self._held() if joints else self._what
+        what = self._held_text() if joints else self._what
         return LeadState(
             number, True, by=by, who=self._who, what=what, joints=joints, since_s=self._since_s
         )
 
-    def _leave(self, why: str) -> None:
-        """Let go of everything that is led."""
+    def _release(self, why: str) -> None:
+        """Release gaze and joints."""
         self.point = self.person = self._face = None
         self.pose_rad = ()
         self._jogged.clear()
@@ -229,7 +237,7 @@ class Lead:
             self.state = LeadState(self.state.number, arrived=self.state.arrived, ended=why)
 
     def _describe(self) -> None:
-        """Describe who leads and what."""
+        """Update the text of client and command."""
         if self.pose_rad:
             angles = (f"{name} {degrees(angle):.1f}" for name, angle in self._jogged.items())
             what = f"jog {', '.join(angles)}"
@@ -240,13 +248,13 @@ class Lead:
             return
         self.words = f"{self._who or 'a client'}: {what}"
 
-    def _held(self) -> str:
-        """Return the joints that are held and their angles."""
+    def _held_text(self) -> str:
+        """Return the held joints and their angles as text."""
         return ", ".join(f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
 
 
-def _what(command: Look) -> str:
-    """Describe what is to be looked at."""
+def _target_text(command: Look) -> str:
+    """Return the target of a look command as text."""
     match command:
         case LookAt(p):
             return f"look at {_numbers(p)}" if p is not None else ""

@@ -1,6 +1,6 @@
-"""Who leads the head, as one value, and in the words that everybody is shown.
+"""Source of control of the head, as a value and as text.
 
-The page, the status line, other programs and Python all say it with these words.
+The page, the status line, other programs and Python all use these texts.
 """
 
 from typing import Literal, NamedTuple
@@ -8,26 +8,29 @@ from typing import Literal, NamedTuple
 LeaderKind = Literal[
     "gaze", "person", "pointer", "joint", "gesture", "stopped", "parking", "recording"
 ]
-"""gaze: nobody, the head chooses; person: a person or program chose what to look at; pointer: it
-looks at somebody's mouse pointer; joint: joints are held; recording: a recorded run is shown."""
+"""gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
+target is a person's mouse pointer; joint: joints are held; recording: a recorded run is shown."""
 
 _WORTH_TELLING_S = 1.0
-"""How long somebody has led is said from here on."""
+"""Shorter durations of control are not shown."""
 _MINUTE_S = 60.0
 
 
 class LeadState(NamedTuple):
-    """The newest lead, as it is after a tick.
+    """The newest control by a client, after a tick.
 
-    number: counts the leads since the start; 0 before the first
-    active: it is in force
-    arrived: the gaze has been measured on the point, or the joints at their angles, since
-    error_rad: between gaze and point, or of the worst joint, as measured; 0 while not active
-    ended: why it is not in force any more, "" while it is
-    by: what leads while it is in force: a person or program that chose what to look at, somebody's
-        pointer, or joints that are held
-    who: asked for it, as given; what: e.g. "look at 1 0 0.3"; joints: those that are held
-    since_s: since when the same client leads in this way without a break
+    Attributes:
+        number: Number of the control since the start, 0 before the first.
+        active: Whether it is active.
+        arrived: Whether the measured gaze has reached the point, or the joints their angles.
+        error_rad: Measured error of the gaze or of the worst joint, 0 while not active.
+        ended: Reason for its end, "" while it is active.
+        by: Kind while it is active: a person or program that chose the target, a person's mouse
+            pointer, or held joints.
+        who: Name of the client.
+        what: Command as text, e.g. "look at 1 0 0.3".
+        joints: Held joints.
+        since_s: Start of the same client's uninterrupted control of this kind.
     """
 
     number: int = 0
@@ -43,12 +46,14 @@ class LeadState(NamedTuple):
 
 
 class GestureState(NamedTuple):
-    """The newest gesture, as it is after a tick.
+    """The newest gesture, after a tick.
 
-    number: counts the gestures since the start; 0 before the first
-    name: of the one under way, "" where there is none
-    ended: why it is over, "" where it has come to its own end or is under way
-    who: asked for it, "" where that is not known; since_s: when it began
+    Attributes:
+        number: Number of the gesture since the start, 0 before the first.
+        name: Name of the present gesture, "" if there is none.
+        ended: Reason for its end, "" if it is playing or has finished.
+        who: Name of the client, "" if unknown.
+        since_s: Time of its start.
     """
 
     number: int = 0
@@ -63,12 +68,14 @@ NO_GESTURE = GestureState()
 
 
 class Leader(NamedTuple):
-    """Who leads, and with what.
+    """The source of control, and its command.
 
-    who: a name for people, "" where that is nobody or unknown
-    what: e.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg", a gesture's name, why it was stopped
-    joints: those that are held
-    since_s: time of the rig since when; None where that is not known
+    Attributes:
+        kind: Kind of control.
+        who: Name of the client for display, "" for none or unknown.
+        what: E.g. "look at 1 0 0.3", "neck_yaw at 17.2 deg", a gesture's name, a stop's reason.
+        joints: Held joints.
+        since_s: Start of the control on the rig's clock, None if unknown.
     """
 
     kind: LeaderKind = "gaze"
@@ -79,18 +86,18 @@ class Leader(NamedTuple):
 
     @property
     def led(self) -> bool:
-        """Return whether something other than the gaze models moves the head or keeps it still."""
+        """Return whether something other than the gaze models moves or holds the head."""
         return self.kind not in ("gaze", "gesture")
 
 
 def leader_of(stopped: str, parking: bool, lead: LeadState, gesture: GestureState) -> Leader:
-    """Return who leads.
+    """Return the source of control.
 
     Args:
-        stopped: why the robot was stopped, "" while it moves.
-        parking: the run is over, and the head moves to its parking pose.
-        lead: the newest lead.
-        gesture: the newest gesture.
+        stopped: Reason for a stop, "" while the robot moves.
+        parking: Whether the run is over and the head moves to its parking pose.
+        lead: The newest control by a client.
+        gesture: The newest gesture.
     """
     if stopped:
         return Leader("stopped", "", stopped)
@@ -105,7 +112,7 @@ def leader_of(stopped: str, parking: bool, lead: LeadState, gesture: GestureStat
 
 
 def title(leader: Leader) -> str:
-    """Return the leader in two or three words, e.g. "neck_yaw held", "stopped"."""
+    """Return the source of control in two or three words, e.g. "neck_yaw held", "stopped"."""
     match leader.kind:
         case "gaze":
             return "looks by itself"
@@ -122,11 +129,11 @@ def title(leader: Leader) -> str:
 
 
 def sentence(leader: Leader, t_s: float) -> str:
-    """Return who leads in one sentence, e.g. "ann holds neck_yaw at 17.2 deg, for 3 s".
+    """Return the source of control as a sentence, "ann holds neck_yaw at 17.2 deg, for 3 s".
 
     Args:
-        leader: who leads.
-        t_s: now, on the rig's clock.
+        leader: Source of control.
+        t_s: Present time on the rig's clock.
     """
     match leader.kind:
         case "gaze":
@@ -149,7 +156,7 @@ def sentence(leader: Leader, t_s: float) -> str:
 
 
 def _for(since_s: float | None, t_s: float) -> str:
-    """Return how long it has lasted, "" where that is short or unknown."""
+    """Return the duration as text, "" if it is short or unknown."""
     lasted_s = t_s - since_s if since_s is not None else 0.0
     if lasted_s < _WORTH_TELLING_S:
         return ""

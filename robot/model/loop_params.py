@@ -8,7 +8,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class LoopParams:
-    """The control rate."""
+    """The control rate and the time for parking."""
 
     rate_hz: Annotated[float, Bounds(20, 1000), "control rate"] = 200.0
     park_s: Annotated[

@@ -1,25 +1,29 @@
-"""Parameters of a rig, changed values and saved files: one type for file, rig, page and client."""
+"""Parameters of a rig, changed values and saved files, for file, rig, page and client."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 JsonValue = float | int | bool | str | None | list["JsonValue"] | dict[str, "JsonValue"]
-"""A value as it arrives over the wire: lists where the rig has tuples."""
+"""A value in JSON, with lists instead of the rig's tuples."""
 
 
 class Parameter(NamedTuple):
-    """One parameter of a rig, its rule and its default.
+    """A parameter of a rig with its rules and its default.
 
-    key: dotted path in the YAML; group: the path above it, "" at the top
-    unit: "" for a bare number; description: as declared beside the value
-    low, high: bounds, None if there is none; of a list, those of its items
-    choices: the allowed values, empty if any value of its kind is allowed
-    kind: number, whole, bool, text, choice, list or mapping
-    default: its value in the rig of defaults
-    live: "next tick", or "next start: " and why a running rig cannot take it
-    optional: null is allowed
-    length: number of items of a list, None if it is free; items: kind of its items
+    Attributes:
+        key: Dotted path in the YAML.
+        group: Path above it, "" at the top.
+        unit: Unit, "" for a bare number.
+        description: Description from the declaration.
+        low, high: Bounds, of a list those of its items, None if there are none.
+        choices: Allowed values, empty if any value of its kind is allowed.
+        kind: number, whole, bool, text, choice, list or mapping.
+        default: Value in the rig of defaults.
+        live: "next tick", or "next start: " and why a running rig cannot take it.
+        optional: Whether null is allowed.
+        length: Number of items of a list, None if any.
+        items: Kind of the items.
     """
 
     key: str
@@ -44,9 +48,12 @@ class Parameter(NamedTuple):
 
 
 class ParamChange(NamedTuple):
-    """One value that differs: from the file, or from the default.
+    """A value that differs from the file or from the default.
 
-    key: dotted key; old, new: as YAML; ``old`` is None if the key is not in the file
+    Attributes:
+        key: Dotted key.
+        old: Old value as YAML, None if the key is not in the file.
+        new: New value as YAML.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""Rotations as unit quaternions, for files and viewers that want them."""
+"""Rotations as unit quaternions, for files and viewers."""
 
 from math import copysign, sqrt
 

@@ -1,4 +1,4 @@
-"""What became of a command: refused, done, or done as far as the joints reach."""
+"""Replies to commands: refused, done, or done as far as the joints reach."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -8,15 +8,19 @@ from typing import Any, NamedTuple
 from gazerig.gaze.angles import Vec3
 from gazerig.robot.model.commands import Command
 
-_BESIDE_DEG = 1.0
-"""A gaze that rests nearer to its point than this looks there."""
+_ON_POINT_DEG = 1.0
+"""A gaze with a smaller error counts as on its point."""
 
 
 class JointReply(NamedTuple):
-    """One joint that was asked for something, in radians.
+    """The reply for one commanded joint, in rad.
 
-    low_rad, high_rad: the range in force
-    reason: why ``done_rad`` is another angle than ``asked_rad``, "" where it is not
+    Attributes:
+        joint: Name of the joint.
+        asked_rad: Commanded angle.
+        done_rad: Angle that the joint will reach.
+        low_rad, high_rad: Present range.
+        reason: Reason why ``done_rad`` differs from ``asked_rad``, "" if it does not.
     """
 
     joint: str
@@ -27,7 +31,7 @@ class JointReply(NamedTuple):
     reason: str
 
     def text(self) -> str:
-        """Return one phrase for people."""
+        """Return one phrase for users."""
         if self.low_rad == self.high_rad:
             return f"{self.joint}: {self.reason}"
         if not self.reason:
@@ -39,13 +43,16 @@ class JointReply(NamedTuple):
 
 
 class GestureReply(NamedTuple):
-    """A gesture that was begun; name "": the one under way is ended.
+    """The reply for a gesture that starts, or with name "" for the end of the present one.
 
-    duration_s: until everything is at rest again
-    slowed_by: factor by which it takes longer than asked; slow_joint: whose limits need that
-    smaller: (joint, share of its motion that its range leaves)
-    left_out: joints that it names and the rig lacks
-    number: of the gesture (``gazerig.robot.model.lead.GestureState``)
+    Attributes:
+        name: Name of the gesture.
+        duration_s: Time until everything is at rest again.
+        slowed_by: Factor by which it takes longer than requested.
+        slow_joint: Joint whose limits need this factor.
+        smaller: (joint, share of its motion that its range leaves).
+        left_out: Joints of the gesture that the rig lacks.
+        number: Number of the gesture (``gazerig.robot.model.leader.GestureState``).
     """
 
     name: str
@@ -57,7 +64,7 @@ class GestureReply(NamedTuple):
     number: int = 0
 
     def text(self) -> str:
-        """Return one line for people."""
+        """Return one line for users."""
         if not self.name:
             return f"gestures end within {self.duration_s:.2f} s"
         parts = [f"{self.name} takes {self.duration_s:.1f} s"]
@@ -70,16 +77,18 @@ class GestureReply(NamedTuple):
 
 
 class CommandReply(NamedTuple):
-    """What the robot made of one command when it took it up.
+    """The robot's reply to one command on its execution.
 
-    refused: why nothing was done, "" where something was
-    asked_m: the point to look at; done_m: the point as far away that the eyes will rest on;
-        None for other commands
-    joints: those that cannot do what was asked; of a jog, all that were asked for
-    error_rad: angle between the point and the line of sight once head and eyes are there, of
-        the worse eye, or of their mean where one linkage turns both
-    lead: number of the lead that it took (``gazerig.robot.model.lead.LeadState``), 0 for none
-    gesture: what is played, None for other commands
+    Attributes:
+        refused: Reason for a refusal, "" if the command is executed.
+        asked_m: Point to look at, None for other commands.
+        done_m: Point at the same distance that the eyes will reach, None for other commands.
+        joints: Joints that cannot reach their angles; for a jog, all commanded joints.
+        error_rad: Angle between the point and the line of sight at the end of the motion, of the
+            worse eye, or of the mean line of sight if one linkage pans both eyes.
+        lead: Number of the control that it started (``gazerig.robot.model.leader.LeadState``),
+            0 for none.
+        gesture: Gesture that is played, None for other commands.
     """
 
     refused: str = ""
@@ -97,11 +106,11 @@ class CommandReply(NamedTuple):
 
     @property
     def limited(self) -> tuple[JointReply, ...]:
-        """Return the joints that cannot do what was asked."""
+        """Return the joints that cannot reach their angles."""
         return tuple(joint for joint in self.joints if joint.reason)
 
     def text(self) -> str:
-        """Return one line for people, "" where there is nothing to say."""
+        """Return one line for users, "" if there is nothing to report."""
         if self.refused:
             return f"refused: {self.refused}"
         if self.gesture is not None:
@@ -109,12 +118,12 @@ class CommandReply(NamedTuple):
         ends = "; ".join(joint.text() for joint in self.joints)
         if self.asked_m is None:
             return ends
-        if self.error_deg < _BESIDE_DEG:
+        if self.error_deg < _ON_POINT_DEG:
             return "it looks there"
         return f"it looks {self.error_deg:.0f} deg beside it" + (f": {ends}" if ends else "")
 
     def as_json(self) -> dict[str, object]:
-        """Return plain JSON values: angles in degrees, metres, text."""
+        """Return plain JSON values: angles in deg, lengths in m, text."""
         text = self.text()
         return {
             "refused": self.refused,
@@ -139,10 +148,10 @@ class CommandReply(NamedTuple):
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "CommandReply":
-        """Return what ``as_json`` wrote.
+        """Return the reply that ``as_json`` wrote.
 
         Raises:
-            KeyError, TypeError, ValueError: the data is no reply.
+            KeyError, TypeError, ValueError: The data is not a reply.
         """
         joints = tuple(
             JointReply(
@@ -178,21 +187,21 @@ def _point(data: Any) -> Vec3 | None:
 
 
 class Ticket:
-    """Where the reply to one command comes; made by one thread, answered by the loop's."""
+    """A ticket for the reply to one command, which the loop's thread gives."""
 
     def __init__(self) -> None:
         self._answered = threading.Event()
         self._reply = CommandReply()
 
     def answer(self, reply: CommandReply) -> None:
-        """Leave the reply."""
+        """Give the reply."""
         self._reply = reply
         self._answered.set()
 
     def wait(self, within_s: float) -> CommandReply | None:
-        """Wait for the reply; None where the loop has not taken the command up in that time."""
+        """Wait for the reply; return None if the loop has not executed the command in time."""
         return self._reply if self._answered.wait(within_s) else None
 
 
 CommandTaker = Callable[[Command], Ticket | None]
-"""Takes a command for the next tick, as Robot.command does; None: there will be no reply."""
+"""Takes a command for the next tick, like Robot.command; returns None if there is no reply."""

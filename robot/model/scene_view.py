@@ -1,4 +1,4 @@
-"""What a camera without faults sees of something simulated, and who draws that."""
+"""View of a simulated scene through an ideal camera."""
 
 from typing import NamedTuple, Protocol
 
@@ -11,14 +11,14 @@ from gazerig.gaze.types import Mat3, Vec3
 
 
 class PinholeView(NamedTuple):
-    """What a pinhole camera is at an instant.
+    """A pinhole camera at a time.
 
     Attributes:
-        t_s: time since the scene began, seconds.
-        lens: of the camera, for pictures of this size; its distortion is not drawn.
-        size_px: width and height.
-        R: rotation of the camera in the world, its axes optical.
-        p_m: position of the camera in the world.
+        t_s: Time since the start of the scene in s.
+        lens: Intrinsics for pictures of this size; distortion is not drawn.
+        size_px: Width and height.
+        R: Rotation of the camera in the world, with optical axes.
+        p_m: Position of the camera in the world.
     """
 
     t_s: float
@@ -29,14 +29,14 @@ class PinholeView(NamedTuple):
 
 
 class Rendered(NamedTuple):
-    """A picture: image (h, w, 3) BGR; depth_m (h, w) along the axis, inf where nothing is."""
+    """A picture: image (h, w, 3) BGR; depth_m (h, w) along the axis, inf without a surface."""
 
     image: ImageArray
     depth_m: NDArray[np.float32] | None
 
 
 class SceneView(Protocol):
-    """Draws what a pinhole camera sees at an instant."""
+    """A renderer of a scene through a pinhole camera."""
 
     def draw(
         self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
@@ -44,12 +44,12 @@ class SceneView(Protocol):
         """Return a picture.
 
         Args:
-            seen_by: the camera.
-            depth: with distances, where what draws knows them.
-            rows: the first row and the one after the last, where only these are wanted.
+            seen_by: The camera.
+            depth: Include distances, if the renderer has them.
+            rows: First row and the row after the last, to draw only these.
         """
         ...
 
     def close(self) -> None:
-        """Free what drawing needs; safe to call twice."""
+        """Free the renderer's resources; safe to call twice."""
         ...

@@ -1,21 +1,22 @@
-"""A stop that holds: who stopped, for how long at least, and who may lift it.
+"""Latch of a stop: who stopped, its shortest duration, and who may lift it.
 
-Pure: times are those of the ticks, so a recorded run is stopped and resumed as it was.
+Times are those of the ticks, so a repeated run is stopped and resumed as recorded.
 """
 
 from gazerig.robot.model.commands import Resume, Stop
 
 MIN_HOLD_S = 2.0
-"""A stop lasts at least so long, also for its asker."""
+"""Shortest duration of a stop, also for the client that stopped."""
 MIN_RESUME_GAP_S = 1.0
-"""A resume within this of the last one of the same asker is refused, and counts as the last."""
+"""A resume within this time of the same client's last one is refused, and counts as the last."""
 _MAX_ASKERS = 32
 
 
 class StopLatch:
-    """Whether the robot is stopped, and the rules by which it may go on.
+    """The latch of a stop, with the rules for a resume.
 
-    why: the reason of the newest stop, "" while the robot is not stopped
+    Attributes:
+        why: Reason for the newest stop, "" while the robot is not stopped.
     """
 
     def __init__(self) -> None:
@@ -25,7 +26,7 @@ class StopLatch:
         self._asked_s: dict[tuple[str, bool], float] = {}
 
     def stop(self, command: Stop, t_s: float) -> bool:
-        """Stop, or renew a stop; True if it is a new one."""
+        """Stop, or renew a stop; return whether it is a new one."""
         new = not self.why
         if new:
             self._stoppers.clear()
@@ -37,11 +38,11 @@ class StopLatch:
 
     @property
     def by(self) -> str:
-        """Return who stopped, "" if unknown."""
+        """Return the clients that stopped, "" if unknown."""
         return " and ".join(sorted(filter(None, self._stoppers)))
 
     def refusal(self, command: Resume, t_s: float) -> str:
-        """Return why a resume is not obeyed, "" where it is; each call counts as an attempt."""
+        """Return the reason for a refusal of a resume, "" to accept; each call is an attempt."""
         asker = (command.who, command.confirmed)
         last_s = self._asked_s.pop(asker, None)
         self._asked_s[asker] = t_s
@@ -58,5 +59,5 @@ class StopLatch:
         return ""
 
     def lift(self) -> None:
-        """Go on."""
+        """Lift the stop."""
         self.why = ""

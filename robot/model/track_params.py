@@ -1,4 +1,4 @@
-"""What tracking assumes of the motion of people and things."""
+"""Parameters of the tracking of people and things."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,7 +8,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class TrackParams:
-    """What is believed of how people and things move, and times of the tracking."""
+    """Assumed motion of people and things, and times of the tracking."""
 
     # fmt: off
     quiet_accel_m_s2: Annotated[float, Bounds(0.01, 50),

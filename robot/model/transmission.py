@@ -1,8 +1,8 @@
-"""How a servo's steps become a joint's angle: a straight gear, or a push rod as measured. Pure.
+"""Linkages between a servo's steps and a joint's angle: a gear, or a measured push rod.
 
-A push rod turns its joint less the farther the horn is from square to it, so hobby eye
-mechanisms have no one ratio: some places are measured, and between them it is straight.
-Radians at the joint, steps at the servo.
+A push rod turns its joint less, the farther its horn is from a right angle, so hobby eye
+mechanisms have no constant ratio. Some points are measured and interpolated linearly. Angles are
+in rad at the joint, steps at the servo.
 """
 
 from bisect import bisect_right
@@ -11,10 +11,7 @@ from typing import NamedTuple, Protocol
 
 
 class Line(NamedTuple):
-    """A straight linkage.
-
-    steps = zero + slope * angle and angle = (steps - zero) * rate
-    """
+    """A linear linkage: steps = zero + slope * angle and angle = (steps - zero) * rate."""
 
     zero: float
     slope: float
@@ -22,11 +19,12 @@ class Line(NamedTuple):
 
 
 class Linkage(Protocol):
-    """What lies between a servo and its joint.
+    """A linkage between a servo and its joint.
 
-    steepest: most steps a radian anywhere, above 0
-    rising: more steps are a larger angle
-    line: where it is straight everywhere; else None
+    Attributes:
+        steepest: Largest number of steps per rad, above 0.
+        rising: Whether more steps give a larger angle.
+        line: The line of a linear linkage, else None.
     """
 
     steepest: float
@@ -42,14 +40,16 @@ class Linkage(Protocol):
         ...
 
     def rate_rad(self, steps: float) -> float:
-        """Return how many radians a step is at a servo position, with its sign."""
+        """Return the signed angle in rad per step at a servo position."""
         ...
 
 
 class Straight:
-    """A gear: so many steps a radian everywhere; implements Linkage.
+    """A gear with a constant ratio; implements Linkage.
 
-    zero: steps at 0 rad; slope: steps a radian, signed
+    Args:
+        zero: Steps at 0 rad.
+        slope: Signed steps per rad.
     """
 
     def __init__(self, zero: float, slope: float) -> None:
@@ -67,19 +67,21 @@ class Straight:
         return (steps - self._zero) * self._rate
 
     def rate_rad(self, steps: float) -> float:
-        """Return how many radians a step is, with its sign."""
+        """Return the signed angle in rad per step."""
         return self._rate
 
 
 class Curve:
-    """Measured places with straight lines between; implements Linkage.
+    """A linear interpolation of measured points; implements Linkage.
 
-    Beyond the outermost places their lines go on.
+    The outermost lines extrapolate beyond the points.
 
-    angles_rad: rising; steps: all rising or all falling; at least two of each
+    Args:
+        angles_rad: Rising angles, at least two.
+        steps: Steps, all rising or all falling.
 
     Raises:
-        ValueError: they are not; the message says where.
+        ValueError: The points are not of that form; the message gives the position.
     """
 
     def __init__(self, angles_rad: Sequence[float], steps: Sequence[float]) -> None:
@@ -97,7 +99,7 @@ class Curve:
         self.rising = up
         self.line: Line | None = None
         self._angles, self._steps = tuple(angles_rad), tuple(float(s) for s in steps)
-        # Looked up by rising steps, whichever way the rod works.
+        # Keys rise for both directions of the rod.
         self._order = 1.0 if up else -1.0
         self._keys = tuple(self._order * s for s in self._steps)
         self._slopes = tuple(
@@ -118,7 +120,7 @@ class Curve:
         return self._angles[i] + (steps - self._steps[i]) / self._slopes[i]
 
     def rate_rad(self, steps: float) -> float:
-        """Return how many radians a step is at a servo position, with its sign."""
+        """Return the signed angle in rad per step at a servo position."""
         return 1.0 / self._slopes[self._segment(steps)]
 
     def _segment(self, steps: float) -> int:

@@ -1,6 +1,6 @@
-"""Values of the machine: joints as desired, commanded and measured, and what the page is shown.
+"""Values of the machine: desired, commanded and measured joints, and the page's snapshot.
 
-Radians, metres, seconds; joints in the order of ``in_order``.
+Units are rad, m and s. Joints are in the order of ``in_order``.
 """
 
 import re
@@ -29,21 +29,21 @@ GAZE_JOINTS = (
     "neck_pitch",
     "neck_roll",
 )
-"""The joints that gaze moves. A rig has some of them: eyes that turn each by itself or both by
-one linkage (``eyes_pan``, ``eyes_tilt``), any of the lids, any axes of the neck. Joints of any
-other name (jaw, brows, ears) are moved by gestures, expressions, levels and programs."""
+"""The joints that gaze moves. A rig has some of them: eyes that turn separately or on a common
+linkage (``eyes_pan``, ``eyes_tilt``), any of the lids, any axes of the neck. Joints with other
+names (jaw, brows, ears) are moved by gestures, expressions, levels and programs."""
 
 JOINT_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-"""What a joint may be called."""
+"""Pattern of joint names."""
 
 JointAngles = tuple[float, ...]
-"""One angle a joint, in the order of the rig's joints (``in_order``)."""
+"""One angle per joint, in the order of the rig's joints (``in_order``)."""
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Return a rig's joints in the order in which all sequences of joints have them.
+    """Return a rig's joints in the order of all sequences of joints.
 
-    Those that gaze moves come first, in the order of ``GAZE_JOINTS``, then all others by name.
+    Joints that gaze moves come first, in the order of ``GAZE_JOINTS``, then all others by name.
     """
     there = set(names)
     others = sorted(there.difference(GAZE_JOINTS))
@@ -51,7 +51,7 @@ def in_order(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def further(names: Iterable[str]) -> tuple[str, ...]:
-    """Return those of a rig's joints that gaze does not move, in the order of ``in_order``."""
+    """Return a rig's joints that gaze does not move, in the order of ``in_order``."""
     return tuple(name for name in in_order(names) if name not in GAZE_JOINTS)
 
 
@@ -59,21 +59,19 @@ Level = Literal["ok", "limited", "hold", "torque_off"]
 
 
 class JointState(NamedTuple):
-    """Joints as measured.
+    """The measured joints. The fields from ``torque`` on are empty if unknown.
 
-    position_rad, velocity_rad_s: last fresh values
-    measured_s: host time of each joint's last fresh answer
-    missing: joints without a fresh answer in this tick
-
-    What follows is empty where nothing is known, else has one value a joint:
-
-    torque: the torque is on
-    fault: latched hardware errors in words, "" where none
-    load: share of the servo's stall torque, signed, -1..1
-    temperature_c, voltage_v: None before the first reading
-    rearmed: the torque came on again with the measured position as goal
-    measured: False where the servo tells nothing: position and velocity are its goal moved
-        by the speed it is known to have
+    Attributes:
+        position_rad, velocity_rad_s: Last fresh values.
+        measured_s: Host time of each joint's last fresh answer.
+        missing: Joints without a fresh answer in this tick.
+        torque: Whether the torque is on.
+        fault: Latched hardware errors in words, "" for none.
+        load: Share of the servo's stall torque, signed, -1..1.
+        temperature_c, voltage_v: Readings, None before the first.
+        rearmed: Whether the torque came on again with the measured position as goal.
+        measured: False without feedback: position and velocity are then those of the goal,
+            moved at the servo's known speed.
     """
 
     position_rad: JointAngles
@@ -90,10 +88,12 @@ class JointState(NamedTuple):
 
 
 class JointOutcome(NamedTuple):
-    """What became of what was desired of one joint.
+    """The guard's result for one joint.
 
-    desired_rad: as it was asked for; commanded_rad: as it was sent
-    reason: why they differ, "" where nothing stood in the way
+    Attributes:
+        desired_rad: Requested angle.
+        commanded_rad: Sent angle.
+        reason: Reason why they differ, "" if they do not.
     """
 
     desired_rad: float
@@ -102,16 +102,17 @@ class JointOutcome(NamedTuple):
 
 
 class GuardResult(NamedTuple):
-    """What the guard let through.
+    """The guard's result of a tick.
 
-    command_rad: permitted joint angles
-    level: ok, limited (changed), hold (neck or all stand still), torque_off (torque must be
-        switched off)
-    reasons: "joint: reason" for every joint that was changed, empty when ok
-    desired_rad: what was asked for
-    why: one reason a joint, "" where it was not changed; empty when ok
-    critical_reasons: those of the reasons that make the level what it is
-    joints: the names of the joints
+    Attributes:
+        command_rad: Permitted joint angles.
+        level: ok, limited (changed), hold (the neck or all joints hold still), torque_off (the
+            torque must be switched off).
+        reasons: "joint: reason" for every changed joint, empty if ok.
+        desired_rad: Requested joint angles.
+        why: One reason per joint, "" if it was not changed; empty if ok.
+        critical_reasons: The reasons that determine the level.
+        joints: Names of the joints.
     """
 
     command_rad: JointAngles
@@ -123,10 +124,10 @@ class GuardResult(NamedTuple):
     joints: tuple[str, ...] = ()
 
     def applied(self, joint: str) -> JointOutcome:
-        """Return what became of what was desired of one joint.
+        """Return the result for one joint.
 
         Raises:
-            ValueError: there is no such joint; the message lists those there are.
+            ValueError: There is no such joint; the message lists the joints.
         """
         if joint not in self.joints:
             raise ValueError(f"no joint {joint!r}; there is {', '.join(self.joints)}")
@@ -138,11 +139,13 @@ class GuardResult(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SeenFace:
-    """A face as the page draws it: identity, centre, axes and the eight parts, world frame.
+    """A face for the page: identity, centre, axes and the eight parts, world frame.
 
-    v_world_m_s: velocity of the centre; places are those at the frame's capture
-    looks_at_head: whether the person looks at the head, None where that is too uncertain
-    speaks: whether the mouth moves as of a speaking person, None where it is not found
+    Attributes:
+        p_world_m: Centre at the frame's capture, like all positions here.
+        v_world_m_s: Velocity of the centre.
+        looks_at_head: Whether the person looks at the head, None if that is too uncertain.
+        speaks: Whether the mouth moves as in speech, None if the mouth is not found.
     """
 
     id: int
@@ -156,7 +159,7 @@ class SeenFace:
 
 @dataclass(frozen=True, slots=True)
 class SeenBody:
-    """A moving body as the page draws it, world frame."""
+    """A moving body for the page, world frame."""
 
     id: int
     kind: str
@@ -165,7 +168,7 @@ class SeenBody:
 
 
 class CommandedPose(NamedTuple):
-    """Where desired angles would have head and eyes: names and frames are those of Snapshot."""
+    """The poses of head and eyes at the desired angles; names and frames as in Snapshot."""
 
     R_world_head: Mat3
     p_world_head_m: Vec3
@@ -178,8 +181,10 @@ class CommandedPose(NamedTuple):
 class OtherHead(NamedTuple):
     """Another head of the same world.
 
-    name: in the world's script; headline: what it does now, in one sentence
-    level: of its guard
+    Attributes:
+        name: Name in the world's script.
+        headline: Its present activity in one sentence.
+        level: Level of its guard.
     """
 
     name: str
@@ -188,9 +193,11 @@ class OtherHead(NamedTuple):
 
 
 class SeenCamera(NamedTuple):
-    """Where the camera is (optical axes: x right, y down, z forward) and what it covers.
+    """The camera's pose (optical axes: x right, y down, z forward) and field of view.
 
-    horizontal_rad: field of view from side to side; aspect: the image's width over height
+    Attributes:
+        horizontal_rad: Horizontal field of view.
+        aspect: Width of the image over its height.
     """
 
     R_world_camera: Mat3
@@ -209,11 +216,12 @@ class Trail(NamedTuple):
 
 
 class ServoLimits(NamedTuple):
-    """From where one servo's figures are no longer good, each a value a joint.
+    """The limits of the servos' readings, one value per joint.
 
-    warm_c, hot_c: the guard slows the joint down, and stops it
-    low_v, high_v: the guard slows the joint down outside
-    heavy: share of the stall torque that may last
+    Attributes:
+        warm_c, hot_c: Temperatures at which the guard slows the joint down and stops it.
+        low_v, high_v: Voltages outside which the guard slows the joint down.
+        heavy: Share of the stall torque that is allowed continuously.
     """
 
     warm_c: tuple[float, ...]
@@ -224,11 +232,16 @@ class ServoLimits(NamedTuple):
 
 
 class Servos(NamedTuple):
-    """What the servos say of themselves, each a value a joint; empty where nothing is known.
+    """The servos' readings, one value per joint; empty if unknown.
 
-    temperature_c, voltage_v: None before the first reading; load: signed, -1..1
-    fault: latched errors in words; age_s: since the last answer
-    unanswered: ticks without an answer since the start, empty if they are not counted
+    Attributes:
+        temperature_c, voltage_v: Readings, None before the first.
+        load: Signed share of the stall torque, -1..1.
+        torque: Whether the torque is on.
+        fault: Latched errors in words.
+        age_s: Time since the last answer.
+        unanswered: Ticks without an answer since the start, empty if they are not counted.
+        limits: Limits of the readings.
     """
 
     temperature_c: tuple[float | None, ...] = ()
@@ -242,11 +255,14 @@ class Servos(NamedTuple):
 
 
 class LoopFigures(NamedTuple):
-    """How the loop keeps its time, over the last ``over_s`` seconds.
+    """The loop's timing over the last ``over_s`` seconds.
 
-    p50_ms, p99_ms, worst_ms: how far the time between two ticks is off its slots
-    overruns: slots skipped in these seconds; overruns_ever: since the start
-    late_share: slots skipped, of all; latest_ms: how much later than its slot a tick came at worst
+    Attributes:
+        p50_ms, p99_ms, worst_ms: Deviation of the time between two ticks from whole slots.
+        overruns: Slots skipped in these seconds.
+        overruns_ever: Slots skipped since the start.
+        late_share: Share of skipped slots.
+        latest_ms: Largest delay of a tick after its slot.
     """
 
     rate_hz: float
@@ -261,7 +277,7 @@ class LoopFigures(NamedTuple):
 
 
 class SeenSaccade(NamedTuple):
-    """A jump of the eyes, as measured."""
+    """A measured saccade."""
 
     onset_s: float
     duration_s: float
@@ -270,7 +286,7 @@ class SeenSaccade(NamedTuple):
 
 
 class SeenFixation(NamedTuple):
-    """A rest of the eyes; part: face part code where it lay on a face."""
+    """A fixation, with the code of the face part if it was on a face."""
 
     start_s: float
     duration_s: float
@@ -289,36 +305,45 @@ SeenEvent = SeenSaccade | SeenFixation | SeenBlink
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """One frozen look at the running rig, for people to watch.
+    """A snapshot of the running rig for the page.
 
-    joints: names of the joints; measured_rad, desired_rad, commanded_rad: their angles
-    estimated: joints whose servos tell nothing: what stands for a measurement is their goal
-        moved by the speed they are known to have
-    R_world_head, p_world_head_m: measured head frame
-    p_world_eyes_m: left and right eye centres; gaze_world: their unit lines of sight
-    lids: left and right opening 0..1, measured; lower_lids: that of the lower lids, None
-        where the rig has none
-    leader: who leads; leads_words: the same in one sentence
-    headline: what the head does now, in one sentence
-    target_name: e.g. "face 3: left eye", and why it won; while somebody leads, who and with what
-    rate_hz: control rate of the last second; health: bus figures in words
-    behaviour: the behaviour in force; saliences: of the winner and the next bodies, highest first
-    perception: age of the frame, distances and what they rest on, still things that seem to move
-    target_kind, target_id, target_part: the target as in gaze.types.Target; while somebody leads,
-        the kind of leader, -1 and None
-    character, conversation: those in force, "" if unknown
-    stopped: why the robot was stopped, "" while it moves
-    led: who leads gaze or joints and how well the head can follow, "" while no client leads
-    frame_age_s: None before the first frame
-    commanded_pose: head and eyes at the desired angles; camera: where the camera is
-    field_deg: what an eye can see, towards temple, nose, above and below
-    servos, timing: health of servos and loop; busy: that the computer is too busy, and how it
-        shows, "" where it is not
-    worst: the guard's gravest level since the last snapshot
-    trail, events: joints, and eye movements that ended, since the last snapshot, oldest first
-    p_world_pivot_m: where the pitch and roll axes of the neck meet, None where it is not known
-    plan: what the action planner has chosen and why, "" without one and while somebody leads
-    others: the other heads of the same world
+    Attributes:
+        measured_rad, desired_rad, commanded_rad: Angles of the joints.
+        R_world_head, p_world_head_m: Measured head frame.
+        p_world_eyes_m: Left and right eye centres.
+        gaze_world: Unit lines of sight of the left and the right eye.
+        lids: Measured left and right opening, 0..1.
+        target_name, why: Target, e.g. "face 3: left eye", and the reason for it; while a client
+            is in control, the client and its command.
+        rate_hz: Control rate of the last second.
+        health: State of the bus in words.
+        behaviour: Present behaviour.
+        saliences: Saliences of the winner and the next bodies, highest first.
+        perception: Age of the frame, distances and their sources, apparent motion of still things.
+        target_kind, target_id, target_part: Target as in gaze.types.Target; while a client is in
+            control, the kind of control, -1 and None.
+        character, conversation: Present ones, "" if unknown.
+        stopped: Reason for a stop, "" while the robot moves.
+        led: Client in control, its command and how well the head can follow; "" without one.
+        leader: Source of control.
+        leads_words: Source of control in one sentence.
+        headline: Present activity of the head in one sentence.
+        frame_age_s: Age of the newest frame, None before the first.
+        commanded_pose: Poses of head and eyes at the desired angles.
+        camera: Pose and field of view of the camera.
+        field_deg: Field of view of an eye towards temple, nose, above and below.
+        servos, timing: Health of the servos and timing of the loop.
+        busy: Text if the computer is too busy, else "".
+        worst: The guard's worst level since the last snapshot.
+        trail, events: Joints and finished eye movements since the last snapshot, oldest first.
+        joints: Names of the joints.
+        estimated: Joints without feedback, whose measured angle is their goal, moved at their
+            servos' known speed.
+        lower_lids: Openings of the lower lids, None if the rig has none.
+        p_world_pivot_m: Intersection of the neck's pitch and roll axes, None if unknown.
+        plan: Choice of the action planner and its reason, "" without one or under a client's
+            control.
+        others: The other heads of the same world.
     """
 
     t_s: float
