@@ -1,1 +1,1 @@
-"""Where the parts of a run are put together, and run."""
+"""Assembly and execution of a run."""

@@ -1,4 +1,4 @@
-"""Real or simulated parts to one robot: the only room that sees config and sim_mock."""
+"""Assembly of a robot from real or simulated parts, with config and sim_mock."""
 
 from collections.abc import Callable
 from math import radians
@@ -76,12 +76,12 @@ def _unchanged(part: T) -> T:
 
 
 class Assembly(NamedTuple):
-    """A robot with what belongs to running it.
+    """A robot with the parts that run it.
 
-    sent_digest: gives the SHA-256 of all bytes sent to the emulated bus, None elsewhere
-    close: ends what was started for it; notes: what a person should know
-    live: holds the rig in force and puts changes into the running parts
-    fault: carries out a fault command of the emulated servos, None where they are real or ideal
+    sent_digest: returns the SHA-256 of all bytes sent to the emulated bus, None for another bus
+    close: ends the processes started for it; notes: messages for the user
+    live: holds the present rig and applies changes to the running parts
+    fault: executes a fault command of the emulated servos, None for real or ideal ones
     room: the surroundings of --world, None without
     others: the other heads of the same room, which are stopped and resumed with it
     """
@@ -100,7 +100,7 @@ class Assembly(NamedTuple):
     others: tuple[NamedRobot, ...] = ()
 
     def shown(self) -> ShownRig:
-        """Return how the rig is built now, as far as people are shown it."""
+        """Return the visible structure of the present rig."""
         rig, parts = self.live.rig, self.live.parts
         return ShownRig(
             parts.kinematics,
@@ -113,29 +113,29 @@ class Assembly(NamedTuple):
         )
 
     def camera(self) -> CameraParams:
-        """Return lens and place of the camera as they are believed now."""
+        """Return the present lens and placement of the camera."""
         return self.live.camera
 
     @property
     def loop(self) -> LoopParams:
-        """Return the rate and the time for parking in force now."""
+        """Return the present rate and time for parking."""
         return self.live.loop
 
     @property
     def park_rad(self) -> JointAngles:
-        """Return the pose before torque goes off, as it is now."""
+        """Return the present pose for parking, before torque is switched off."""
         return self.live.park_rad
 
     @property
     def horizontal_field_deg(self) -> float:
-        """Return the camera's field of view as it is believed now."""
+        """Return the present field of view of the camera."""
         return self.live.horizontal_field_deg
 
 
 class Substitutes(NamedTuple):
-    """Parts laid around the rig's own, or put in their place; each gets the rig's own part.
+    """Wrappers or replacements of the rig's own parts; each gets the rig's own part.
 
-    program: objects that a program brings, which are checked and watched
+    program: objects of a program, which are checked and supervised
     """
 
     body: Callable[[Body], Body] = _unchanged
@@ -154,18 +154,18 @@ def assemble(
     substitutes: Substitutes = RIGS_OWN,
     room: RunRoom | None = None,
 ) -> Assembly:
-    """Build the robot of a rig, once and whole; nothing is opened but the emulated bus.
+    """Build the robot of a rig once; only the emulated bus is opened.
 
     Args:
         rig: the configuration.
         options: what to run.
-        substitutes: what a recording, a replay or a calibration puts around or in the place
-            of the rig's own parts.
-        room: surroundings that are open, as the caller has other robots in them; None: they are
-            opened if ``options`` name some.
+        substitutes: wrappers or replacements of the rig's own parts, by a recording, a replay or a
+            calibration.
+        room: open surroundings with other robots of the caller; None: they are opened if
+            ``options`` name some.
 
     Raises:
-        gazerig.config.load.ConfigError: the profile or walk that the rig names is at fault.
+        gazerig.config.load.ConfigError: the profile or walk that the rig names is invalid.
         SetupError: a film or model file cannot be used.
     """
     rig = with_options(rig, options)
@@ -224,14 +224,14 @@ def assemble(
 
 
 def _walk_notes(walk: Walk, rig: Rig, options: RunOptions) -> tuple[str, ...]:
-    """Return what is odd about a walk of the user's own; of a shipped one only if asked for."""
+    """Return notes on a walk of the user's own; on a shipped one only if verbose."""
     shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
     note = row_sums_note(walk) if options.verbose or not shipped else None
     return () if note is None else (note,)
 
 
 class _Generators(NamedTuple):
-    """One random generator a model, so that none feels how often another draws."""
+    """One random generator per model, so that no model depends on the draws of another."""
 
     scanpath: np.random.Generator
     lids: np.random.Generator
@@ -301,7 +301,7 @@ def _components(
 
 
 def _gyro_fusion(options: RunOptions, report: Callable[[str], None]) -> GyroFusion | None:
-    """Return what fuses gyro and joints; a recorded camera was on other joints than these."""
+    """Return the fusion of gyro and joints; None for a recorded camera (on other joints)."""
     return GyroFusion(report) if options.replay is None else None
 
 

@@ -1,8 +1,8 @@
-"""An emulated rig's camera in whose place a browser's own camera may stand for a while.
+"""Temporary replacement of an emulated rig's camera by a browser's own camera.
 
-Its pictures come through the page's process and are looked at in a camera process of their own, as
-a webcam's are. While they come, the head looks at who sits before the browser; when they end, the
-simulated scene is there again.
+Its images arrive through the page's process and are analysed in a camera process of their own, like
+a webcam's. While they arrive, the head looks at the person in front of the browser; when they end,
+the simulated scene returns.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, Detections
 
 SILENT_S = 1.5
-"""A browser that has sent nothing for so long has ended."""
+"""Silence after which a browser counts as gone."""
 
 _BEGINS = (
     f"looking through a browser's camera, taken to be {FIELD_DEG:g} deg wide as nothing is known "
@@ -28,19 +28,19 @@ _BEGINS = (
 _ENDS = "the browser's camera has ended: the scene is there again"
 
 Make = Callable[[Callable[[], FrameSource], int], CameraProcess]
-"""Returns a camera process of a source; the number counts those there were before."""
+"""Function that returns a camera process of a source; the number counts the former ones."""
 
 
 class BorrowedCamera:
-    """The rig's own camera, or a browser's while its pictures come.
+    """The rig's own camera, or a browser's while its images arrive.
 
     Args:
         own: the rig's.
-        make: returns the process that looks at the browser's pictures.
+        make: returns the process that analyses the browser's images.
         now_s: the host's clock.
         place: called in the loop's thread when ``lent`` has changed, to place the camera again.
 
-    lent: the browser's camera stands in
+    lent: whether the browser's camera is in use
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class BorrowedCamera:
         self._events: list[str] = []
 
     def take(self, jpeg: bytes) -> None:
-        """Keep a picture of a browser; from one thread, beside the loop."""
+        """Store an image of a browser; called from one thread other than the loop's."""
         if self._closed or not self._pictures.put(jpeg, self._now_s()):
             return
         if self._process is None and (self._starting is None or not self._starting.is_alive()):
@@ -72,7 +72,7 @@ class BorrowedCamera:
             self._starting.start()
 
     def _start(self) -> None:
-        """Start the process, which takes a second; the scene goes on meanwhile."""
+        """Start the process, which takes a second; the scene continues meanwhile."""
         process = self._make(partial(BrowserSource, self._pictures), self._begun)
         self._begun += 1
         try:
@@ -86,11 +86,11 @@ class BorrowedCamera:
             self._process = process
 
     def open(self) -> None:
-        """Start looking with the rig's own camera; raises as it does."""
+        """Start the rig's own camera; raises its errors."""
         self.own.open()
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return what the newest frame showed, None before the first; never blocks."""
+        """Return the detections of the newest frame, None before the first; never blocks."""
         process = self._process
         if process is None:
             return self.own.latest(now_s)
@@ -98,7 +98,7 @@ class BorrowedCamera:
             self._give_back(process)
             return self.own.latest(now_s)
         found = process.latest(now_s)
-        if found is None:  # its networks are being loaded
+        if found is None:  # its networks are loading
             return self.own.latest(now_s)
         if not self.lent:
             self.lent = True
@@ -115,16 +115,16 @@ class BorrowedCamera:
             self._events.append(_ENDS)
 
     def events(self) -> tuple[str, ...]:
-        """Return what has happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         process = self._process
         events, self._events = tuple(self._events), []
         others = process.events() if process is not None else ()
-        # A browser may end at any time: that is told as such, and is no lost camera.
+        # A browser may end at any time: that is reported as such, and not as a lost camera.
         told = [line for line in others if not line.startswith((LOST, BACK))]
         return (*events, *told, *self.own.events())
 
     def close(self) -> None:
-        """Stop looking; safe to call twice."""
+        """Stop both cameras; safe to call twice."""
         self._closed = True
         process, self._process = self._process, None
         with contextlib.ExitStack() as both:

@@ -1,4 +1,4 @@
-"""The buses of a rig: which joints are on which, and one bus made of them all."""
+"""The buses of a rig: their joints, and one bus that joins them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -20,7 +20,7 @@ from gazerig.robot.model.coupling_params import pairs_of
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
-    """Return the names of the buses that joints are on, "" for the one without a name first."""
+    """Return the names of the buses with joints, "" for the one without a name first."""
     used = {joint.bus for joint in rig.joints.values()}
     return tuple(name for name in ("", *rig.buses) if name in used)
 
@@ -31,13 +31,13 @@ def joints_on(rig: Rig, name: str) -> tuple[str, ...]:
 
 
 def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
-    """Return the serial port of every bus: the rig's, or that given instead.
+    """Return the serial port of every bus: the rig's, or the given one.
 
-    given: a port for the bus without a name, or for the only one; NAME=PORT for another, and
-        several with commas between
+    given: a port for the bus without a name, or for the only one; NAME=PORT for another one;
+        several are separated by commas
 
     Raises:
-        SetupError: it names a bus that is not there.
+        SetupError: it names an unknown bus.
     """
     ports = {name: rig.bus_named(name).port for name in bus_names(rig)}
     for one in given.split(",") if given is not None else ():
@@ -52,7 +52,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
 
 
 def rig_setups(rig: Rig) -> tuple[ServoConfig, ...]:
-    """Return what buses must know of a rig's servos, in the order of its joints."""
+    """Return the configuration of a rig's servos for the buses, in the order of its joints."""
     gentle_deg_s = rig.guard.soft_start_speed_deg_s
     return setups(rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
 
@@ -68,9 +68,9 @@ def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
 def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
     """Return the bus of a rig on serial ports, guarded.
 
-    A program that switches torque on through it may die or hang: a guardian process, started as
-    the bus is opened, then switches torque off. A servo's own watchdog would only stop its
-    motion and keep the torque. Nothing is opened here.
+    If a program that switches torque on through it dies or hangs, a guardian process, started as
+    the bus is opened, switches torque off. A servo's own watchdog would only stop its motion and
+    keep the torque. Nothing is opened here.
 
     Args:
         rig: the rig.
@@ -91,9 +91,9 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
 
 
 def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
-    """Return how to switch the servos' torque off, by the name of their bus.
+    """Return the plans to switch the servos' torque off, by the name of their bus.
 
-    A bus of another package that releases its servos by itself has no plan.
+    A bus of another package that releases its own servos has no plan.
 
     Args:
         rig: the rig.
@@ -107,7 +107,7 @@ def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
 
 
 def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
-    """Return how to let go of the servos of one bus.
+    """Return the plan to switch off the torque of one bus.
 
     Args:
         rig: the rig.
@@ -135,7 +135,7 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
 def can_be_released(rig: Rig, name: str) -> bool:
     """Return whether a guardian can switch off the servos of one bus.
 
-    It can for all kinds of this package; another package says how, or that it need not.
+    It can for all kinds of this package; another package defines a plan, or that none is needed.
     """
     kind = rig.bus_named(name).kind
     return is_ours(BUS, kind) or load(BUS, kind, BusPlugin).release is not None
@@ -150,7 +150,7 @@ def has_watchdog(rig: Rig, name: str) -> bool:
 
 
 def _joined(shares: list[BusShare]) -> ServoBus:
-    """Return several buses as one; one stays as it is."""
+    """Return several buses as one; a single one is returned unchanged."""
     return shares[0].bus if len(shares) == 1 else MultiBus(shares)
 
 
@@ -167,7 +167,7 @@ def _bus(config: BusConfig, port: BusPort, own: Sequence[ServoConfig]) -> ServoB
     """Return the bus of a kind.
 
     Raises:
-        PluginError: it is another package's and cannot be made.
+        PluginError: it is another package's and cannot be created.
     """
     part = load(BUS, config.kind, BusPlugin)
     if is_ours(BUS, config.kind):

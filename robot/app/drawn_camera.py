@@ -1,8 +1,8 @@
-"""A drawn scene seen as through a real camera: drawn and looked at in the camera's own process.
+"""Camera on a drawn scene, which is drawn and analysed in the camera's own process.
 
-The control loop only says where the head is. The process draws what is seen from there and looks
-for faces and motion in it, so that neither can delay a tick. For a program's own detector, which
-only that program has, it is a thread.
+The control loop only sends the pose of the head. The process draws the view from there and detects
+faces and motion in it, so that neither can delay a tick. For a program's own detector, which exists
+only in that program, it is a thread.
 """
 
 import threading
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 _LOOK_S = 0.002
 
 HeadPose = Callable[[float], tuple[Mat3, Vec3]]
-"""Returns rotation and place [m] of the head in the world at a time [s]."""
+"""Function that returns rotation and position [m] of the head in the world at a time [s]."""
 
 
 class NewestHead(Protocol):
-    """Where the head is now, as the camera's process knows it."""
+    """Newest pose of the head in the camera's process."""
 
     @property
     def first_s(self) -> float:
-        """Return the time at which the scene begins."""
+        """Return the start time of the scene."""
         ...
 
     def newest(self) -> PoseAt | None:
@@ -43,11 +43,11 @@ class NewestHead(Protocol):
 
 
 class DrawnSource:
-    """Frames of a scene, drawn from where the head is.
+    """Source of a scene's frames, drawn from the head's pose.
 
     Args:
-        make: returns the camera that draws, on a head whose pose it is given.
-        poses: where the head is.
+        make: returns the drawing camera, given the head's pose.
+        poses: of the head.
     """
 
     def __init__(
@@ -63,12 +63,12 @@ class DrawnSource:
         self._due_s = 0.0
 
     def open(self) -> None:
-        """Begin with the first frame."""
+        """Start with the first frame."""
         self._camera.open()
         self._number = 0
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Draw the next frame, as of the newest pose; None where ``stop`` was set."""
+        """Draw the next frame, from the newest pose; None if ``stop`` was set."""
         while not stop.is_set():
             newest, wait_s = self._poses.newest(), self._due_s - now_s()
             if newest is None or wait_s > 0.0:
@@ -76,7 +76,7 @@ class DrawnSource:
                 continue
             self._now = newest
             if self._number == 0:
-                self._camera.latest(self._poses.first_s)  # the scene's own time begins here
+                self._camera.latest(self._poses.first_s)  # the scene's own time starts here
             found = self._camera.latest(newest.t_s)
             if found is None or found.number == self._number:
                 stop.wait(_LOOK_S)
@@ -86,11 +86,11 @@ class DrawnSource:
         return None
 
     def events(self) -> tuple[str, ...]:
-        """Return nothing: nothing can happen to a drawn camera."""
+        """Return no events: a drawn camera has none."""
         return ()
 
     def close(self) -> None:
-        """Free what draws; safe to call twice."""
+        """Free the renderer; safe to call twice."""
         self._camera.close()
 
     def _head(self, t_s: float) -> tuple[Mat3, Vec3]:
@@ -110,11 +110,11 @@ def scene_pixels(
     """Return the camera that draws a scene, for its own process.
 
     Args:
-        scene: what is before the camera.
-        mount: where it sits on the head.
+        scene: in front of the camera.
+        mount: its placement on the head.
         field_deg: its horizontal field of view.
         rng: for the noise of the frames.
-        head: where the head is.
+        head: returns the pose of the head.
     """
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
@@ -123,20 +123,20 @@ def scene_pixels(
 
 
 class NoFaces:
-    """Finds none: the process looks for faces afterwards, as in every camera's frames."""
+    """Detector of no faces: the process detects them later, as in every camera's frames."""
 
     def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
-        """Return none."""
+        """Return no faces."""
         return ()
 
 
 class DrawnCamera:
-    """A camera in a drawn scene, which is told at each look where the head is.
+    """Camera in a drawn scene, which receives the head's pose at each call.
 
     Args:
-        process: draws and looks; or a thread that does.
-        poses: takes where the head is.
-        where: returns rotation and place of the head in the world at a time.
+        process: draws and detects; or a thread that does.
+        poses: receives the pose of the head.
+        where: returns rotation and position of the head in the world at a time.
     """
 
     def __init__(
@@ -152,20 +152,20 @@ class DrawnCamera:
 
     @property
     def frames_with_face(self) -> int:
-        """Return the count of those in which a face was found."""
+        """Return the count of frames with a face."""
         return self.process.frames_with_face
 
     def open(self) -> None:
-        """Start the process; raises as it does."""
+        """Start the process; raises its errors."""
         self.process.open()
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return what the newest frame showed, None before the first."""
+        """Return the detections of the newest frame, None before the first."""
         self._poses.record(now_s, *self._where(now_s))
         return self.process.latest(now_s)
 
     def events(self) -> tuple[str, ...]:
-        """Return what has happened since the last call, one line each."""
+        """Return the events since the last call, one line each."""
         return self.process.events()
 
     def close(self) -> None:

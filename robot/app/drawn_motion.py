@@ -1,4 +1,4 @@
-"""What moves in frames that are drawn of a simulated scene."""
+"""Motion detection in drawn frames of a simulated scene."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ from gazerig.sim_mock.cameras.rendered import Exposure
 
 
 class MotionOfDrawn:
-    """Finds what moves in drawn frames, which know how the camera was turned."""
+    """Motion detector of drawn frames, whose rotation of the camera is known."""
 
     def __init__(self, params: MotionParams) -> None:
         self._enabled = params.enabled
@@ -28,7 +28,7 @@ class MotionOfDrawn:
             self._detector.forget()
 
     def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
-        """Find what has moved since the frame before; nothing while not enabled."""
+        """Find motion since the frame before; empty while not enabled."""
         before, self._before = self._before, shot.R_world_camera
         if not self._enabled:
             return ()
@@ -44,7 +44,7 @@ FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
 
 
 def retuned_drawn(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
-    """Change the parameters of what finds motion in drawn frames."""
+    """Change the parameters of the motion detector of drawn frames."""
     if isinstance(find, MotionOfDrawn):
         find.retune(params)
     return find

@@ -1,4 +1,4 @@
-"""The emulated servos of a rig, byte-true or ideal: built into joints as the rig's YAML says."""
+"""The emulated servos of a rig, byte-true or ideal, built into its joints by its YAML."""
 
 from collections.abc import Callable
 from math import pi, radians
@@ -23,23 +23,23 @@ from gazerig.sim_mock.ideal.bus import IdealBus
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 _CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
-"""Emulated joints start a little crooked, as a head that was moved by hand does."""
+"""Start angles of emulated joints, a little crooked, like those of a head moved by hand."""
 
 STOP_BEYOND_DEG = 4.0
-"""Emulated joints have mechanical stops so far beyond their configured range."""
+"""Distance of an emulated joint's mechanical stops beyond its configured range."""
 
 
 _NECK_SERVO_NM = 1.0
-"""A hobby servo that turns a head is of standard size, 10 kg cm; eyes and lids have small ones."""
+"""Torque of a hobby servo of a head: standard size, 10 kg cm; eyes and lids have small ones."""
 
 
 def emulated_lines(rig: Rig) -> dict[str, Emulated]:
-    """Return what is on each bus of a rig, by the bus's name; servos in the order of joints."""
+    """Return the emulated device of each bus, by the bus's name; servos in the order of joints."""
     return {name: _line(rig, name) for name in bus_names(rig)}
 
 
 def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
-    """Return all servos of a rig without bytes, starting where the emulated ones do."""
+    """Return all servos of a rig without bytes, at the start angles of the emulated ones."""
     measured = [rig.joints[name].facts.measured for name in rig.names]
     return IdealBus(rig_setups(rig), [_start(rig, name) for name in rig.names], measured, now_s)
 
@@ -54,9 +54,9 @@ def emulated_servo(rig: Rig, name: str) -> ServoSpec:
 
 
 def place_of(rig: Rig, joint: str) -> int:
-    """Return the place of a joint's servo among the true positions of what it is emulated on."""
+    """Return the index of a joint's servo in the true positions of its emulated device."""
     bus, servo_id = rig.joints[joint].bus, rig.joints[joint].id
-    # A board tells all its channels, a chain the servos that it was made of.
+    # A board lists all its channels, a chain only its servos.
     return servo_id if rig.bus_of(joint).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
 
 
@@ -96,7 +96,7 @@ def _hobby(rig: Rig, name: str) -> HobbySpec:
         spec = spec._replace(speed_steps_s=joint.servo_speed_deg_s * facts.steps_per_turn / 360.0)
     if "neck" in name:
         spec = spec._replace(stall_torque_nm=_NECK_SERVO_NM)
-    # The board's own range of the channel is set as wide as such servos go.
+    # The board's own range of the channel is as wide as that of such servos.
     return spec._replace(
         start_steps=_start(rig, name),
         stop_low_steps=low,
@@ -112,10 +112,10 @@ def _plain(rig: Rig, name: str) -> EmulatedJoint:
 
 
 def crooked_rad(rig: Rig) -> dict[str, float]:
-    """Return the joint angles at which the emulated joints of a rig start."""
+    """Return the start angles of a rig's emulated joints."""
     crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
     for first, second, _ in pairs_of(rig.couplings):
-        # Push rods know no angles far outside the range.
+        # Push rods have no angles far outside the range.
         for name in (first, second):
             limit = rig.joints[name].limit()
             crooked[name] = min(max(crooked[name], limit.low_rad), limit.high_rad)

@@ -24,7 +24,7 @@ from gazerig.robot.model.kinematics import Kinematics
 
 
 def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
-    """Return a rig's geometry and its oculomotor model, for looking without a camera."""
+    """Return a rig's geometry and its oculomotor model, for gaze without a camera."""
     lid_rng, landing_rng = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
@@ -39,7 +39,7 @@ def kinematics_of(rig: Rig) -> Kinematics:
 
 
 class Deciders(NamedTuple):
-    """What attention decides between."""
+    """Models of attention."""
 
     field_of_view: FieldOfView
     bottom_up: BottomUp
@@ -48,7 +48,7 @@ class Deciders(NamedTuple):
 
 
 def deciders(rig: Rig, idle_rng: np.random.Generator) -> Deciders:
-    """Return what attention decides between."""
+    """Return the models of attention."""
     gaze = rig.gaze
     return Deciders(
         FieldOfView(gaze.field_of_view),
@@ -59,7 +59,7 @@ def deciders(rig: Rig, idle_rng: np.random.Generator) -> Deciders:
 
 
 class Movers(NamedTuple):
-    """What moves eyes and head."""
+    """Models of eye and head movements."""
 
     saccade: SaccadeModel
     pursuit: Pursuit
@@ -68,7 +68,7 @@ class Movers(NamedTuple):
 
 
 def movers(rig: Rig) -> Movers:
-    """Return what moves eyes and head."""
+    """Return the models of eye and head movements."""
     gaze = rig.gaze
     return Movers(
         SaccadeModel(gaze.saccade),
@@ -102,7 +102,7 @@ def oculomotor(
 def chooser_of(
     rig: Rig, own: TargetChooser, say: Callable[[str], None], simulated: bool
 ) -> TargetChooser:
-    """Return who chooses what to look at: the rig's attention, or a package's rule before it.
+    """Return the chooser of the target: the rig's attention, or a package's rule before it.
 
     Args:
         rig: its ``gaze.chooser`` names the rule.
@@ -111,7 +111,7 @@ def chooser_of(
         simulated: time is simulated, so that no answer can be late.
 
     Raises:
-        SetupError: the rule cannot be made.
+        SetupError: the rule cannot be created.
     """
     name = rig.gaze.chooser
     if is_ours(ATTENTION, name):

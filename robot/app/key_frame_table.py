@@ -1,4 +1,4 @@
-"""Tables of key frames as animation programs export them: CSV, one row a frame or a key.
+"""Tables of key frames from animation programs: CSV, one row per frame or key.
 
 Wide: a column of times and one of angles for each joint. Long: columns time, joint, angle, one
 row for each key. Times are in seconds (time, time_s) or numbers of frames (frame), angles in
@@ -31,7 +31,7 @@ def read_table(path: Path, fps: float | None) -> dict[str, Series]:
 
     Args:
         path: of the file.
-        fps: frames a second, for a column of frame numbers.
+        fps: frames per second, for a column of frame numbers.
 
     Raises:
         SetupError: the file cannot be read or has bad rows, each with its line.
@@ -69,7 +69,7 @@ def _separator(text: str) -> str:
 
 
 class _Table:
-    """The rows of one file; faults: what is wrong with which line."""
+    """Rows of one file; faults: the invalid lines with their errors."""
 
     def __init__(self, path: Path, head: Sequence[str], time: int, unit_s: float) -> None:
         self.faults: list[str] = []

@@ -1,8 +1,8 @@
-"""A rig's parameters put into the running parts, between two ticks and without a jump.
+"""Application of a rig's parameters to the running parts, between two ticks, without a jump.
 
-Each part has a ``retune`` that takes its parameters and keeps what it knows. Only parts
-whose parameters differ are touched. What cannot change while the rig runs (see
-gazerig.config.parameters) keeps the value it started with until the next start.
+Each part has a ``retune`` that takes its parameters and keeps its state. Only parts whose
+parameters differ are changed. A parameter that cannot change during a run (see
+gazerig.config.parameters) keeps its value until the next start.
 """
 
 from collections.abc import Callable
@@ -82,16 +82,16 @@ class Components(NamedTuple):
 
 
 class CameraPlacement(NamedTuple):
-    """Where the camera is taken to sit, which may be standing still though the rig's does not."""
+    """Assumed placement of the camera, which may be fixed although the rig's moves."""
 
     camera: Callable[[Rig], CameraParams]
     mount: MountedOn
 
 
 class _Ready(NamedTuple):
-    """A rig that was checked before its turn.
+    """A rig that was checked before it is applied.
 
-    changes: what makes it of ``base``; walk: what its scanpath names, None if as before
+    changes: differences from ``base``; walk: of its scanpath, None if unchanged
     """
 
     changes: tuple[tuple[str, Value], ...]
@@ -104,13 +104,13 @@ _ALIKE = (
     "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "saccade", "pursuit",
     "breathing", "lids",
 )  # fmt: skip
-"""Sections of the gaze whose part of the same name needs nothing but its own parameters."""
+"""Sections of the gaze whose part of the same name needs only its own parameters."""
 
 
 class LiveParams:
-    """Puts changes into the parts of a robot; a gazerig.robot.control.loop.Robot's ``tune``.
+    """Applies changes to the parts of a robot; a gazerig.robot.control.loop.Robot's ``tune``.
 
-    rig: in force
+    rig: the present one
     """
 
     def __init__(self, parts: Components, rig: Rig, placed: CameraPlacement) -> None:
@@ -124,40 +124,40 @@ class LiveParams:
 
     @property
     def loop(self) -> LoopParams:
-        """Return the rate and the time for parking in force."""
+        """Return the present rate and time for parking."""
         return self.rig.loop
 
     @property
     def park_rad(self) -> JointAngles:
-        """Return the pose before torque goes off."""
+        """Return the pose for parking, before torque is switched off."""
         return park_pose(self.rig)
 
     @property
     def camera(self) -> CameraParams:
-        """Return lens and place of the camera as they are believed."""
+        """Return the present lens and placement of the camera."""
         return self._placed.camera(self.rig)
 
     @property
     def horizontal_field_deg(self) -> float:
-        """Return the camera's field of view as it is believed."""
+        """Return the present field of view of the camera."""
         return self.camera.horizontal_field_deg
 
     def prepare(self, base: Rig, rig: Rig) -> Tune:
-        """Return the command that changes one rig into another that was checked; for any thread.
+        """Return the command that changes one rig into another, checked one; for any thread.
 
-        Its tick then need not check it. base: in force when the command comes
+        Its tick then need not check it. base: the present rig when the command arrives
 
         Raises:
-            gazerig.config.load.ConfigError: the walk that the rig names is at fault.
+            gazerig.config.load.ConfigError: the walk that the rig names is invalid.
         """
         command = Tune(tuple(differences(base, rig).items()))
         self._ready[id(command.changes)] = _ready(command, base, rig)
         return command
 
     def __call__(self, command: Tune, t_s: float) -> tuple[str, ...]:
-        """Apply a change from this tick on; return a description of what was done.
+        """Apply a change from this tick on; return a description of the changes.
 
-        A change that was not prepared is checked here; a wrong one changes nothing.
+        A change that was not prepared is checked here; an invalid one changes nothing.
         """
         ready = self._ready.pop(id(command.changes), None)
         if ready is None or ready.changes is not command.changes or ready.base is not self.rig:
@@ -169,7 +169,7 @@ class LiveParams:
         return (*(_change_text(key, value) for key, value in command.changes), *said)
 
     def _put(self, rig: Rig, walk: Walk) -> tuple[str, ...]:
-        """Hand the parameters that differ to their parts."""
+        """Pass the parameters that differ to their parts."""
         before, self.rig = self.rig, rig
         self._put_gaze(before, rig, walk)
         self._walk = walk
@@ -215,7 +215,7 @@ class LiveParams:
     def _put_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
         """Apply joint limits to body and guard; the guard gets the present angles of the joints.
 
-        Gives what has to wait for the servos to be set up again.
+        Returns the changes that wait for the next setup of the servos.
         """
         if (new.joints, new.guard) == (old.joints, old.guard):
             return ()
@@ -240,15 +240,15 @@ class LiveParams:
 
 
 _OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "transmission_points", "servo_speed_deg_s")
-"""What of a joint stays as it was when the bus was opened."""
+"""Fields of a joint that stay as at the opening of the bus."""
 
 
 _OF_A_PAIR = ("sign", "ratio", "zero_step")
-"""What stays besides where two servos move two joints together."""
+"""Further fields that stay if two servos move two joints together."""
 
 
 def _with_servo(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
-    """Return a joint with the servo of another; the same one where it has that already."""
+    """Return a joint with the servo of another; the same object if it has that already."""
     keys = (*_OF_THE_SERVO, *_OF_A_PAIR) if coupled else _OF_THE_SERVO
     kept = {key: getattr(first, key) for key in keys}
     if all(getattr(joint, key) == value for key, value in kept.items()):
@@ -260,7 +260,7 @@ def _ready(command: Tune, base: Rig, rig: Rig) -> _Ready:
     """Build a checked change, with a new face walk if that has changed.
 
     Raises:
-        gazerig.config.load.ConfigError: the walk that the rig names is at fault.
+        gazerig.config.load.ConfigError: the walk that the rig names is invalid.
     """
     name = rig.gaze.scanpath.transition_matrix
     walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
@@ -270,7 +270,7 @@ def _ready(command: Tune, base: Rig, rig: Rig) -> _Ready:
 def _beyond(
     joints: tuple[str, ...], wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]
 ) -> tuple[str, ...]:
-    """Return which joints may go farther or faster than their servos were set up for."""
+    """Return the joints whose limits exceed the setup of their servos."""
     more = [
         name
         for name, desired, most in zip(joints, wanted, reach, strict=True)

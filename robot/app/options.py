@@ -1,4 +1,4 @@
-"""One run as it was asked for: the same value from the command line to the assembly."""
+"""Options of one run: the same value from the command line to the assembly."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,39 +8,39 @@ from gazerig.drivers.errors import SetupError
 
 DEFAULT_SCENE = "visitor"
 BUSES = ("emulated", "ideal")
-"""What replaces the servos: byte-true emulators, or servos without bytes."""
+"""Replacements of the servos: byte-true emulators, or servos without bytes."""
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What to run, what to look at, what watches and what is written; None where nothing was said.
+    """Options of a run: rig, scene, observers and outputs; None if not given.
 
     Attributes:
         mock: emulated servos instead of the rig's.
         fast: simulated time.
         seed: of all random generators.
-        scene, video, camera, oak, replay, world: what to look at; one of them (see ``checked``); a
-            camera is the number of a webcam or the name of another package's.
-        world: a world with physics, by name or path; its camera's pictures are rendered and looked
-            at by the real detectors.
-        no_pictures: of a world nothing is rendered: detections are computed, as of a scene.
-        pixels: the scene is drawn and looked at by the real detectors.
+        scene, video, camera, oak, replay, world: source of the view; one of them (see ``checked``);
+            a camera is the number of a webcam or the name of another package's.
+        world: a world with physics, by name or path; its camera's images are rendered and analysed
+            by the real detectors.
+        no_pictures: a world is not rendered: detections are computed, as of a scene.
+        pixels: the scene is drawn and analysed by the real detectors.
         scanpath, saccade: models instead of the rig's; rules: a rule set instead of the rig's.
         port: serial port instead of the rig's.
         film_delay_s: age of a film's frames in simulated time.
         placed_by: detections are placed by the head's pose at capture, or, for comparison only,
             by the newest pose, which makes the head overshoot.
         rig, character, profile: by name or path.
-        behaviour, conversation: in force at the start.
-        seconds: how long to run.
+        behaviour, conversation: initial choices.
+        seconds: duration of the run.
         page: HOST:PORT of the live page; no_page: without it.
         heatmap: PNG to write; heatmap_face: image of a face to lay it over.
-        record: file to record to; record_pictures: camera frames a second in it.
-        force: write over older files.
+        record: file to record to; record_pictures: camera frames per second in it.
+        force: overwrite older files.
         no_browser: leave opening the page to the user.
-        verbose: say also what concerns nobody but who looks for it.
+        verbose: print details, too.
         summary: file of the figures, "-" for standard output.
-        bus: what replaces the servos, "emulated" (byte-true, the default) or "ideal" (a lag).
+        bus: replacement of the servos, "emulated" (byte-true, the default) or "ideal" (a lag).
     """
 
     mock: bool = False
@@ -80,7 +80,7 @@ class RunOptions:
 
     @property
     def looks_through(self) -> str | None:
-        """Return what a real or filmed camera is, None for a scene."""
+        """Return the real or filmed camera, None for a scene."""
         if self.video is not None:
             return "a film"
         if self.replay is not None:
@@ -96,7 +96,7 @@ class RunOptions:
 
     @property
     def page_address(self) -> tuple[str, int] | None:
-        """Return where the live page is served, None without one.
+        """Return the address of the live page, None without one.
 
         Raises:
             SetupError: ``page`` is no address.
@@ -114,18 +114,18 @@ class RunOptions:
 
     @property
     def choices(self) -> tuple[tuple[str, str], ...]:
-        """Return what is asked of the robot's menus at the start, as (menu, choice)."""
+        """Return the initial choices of the robot's menus, as (menu, choice)."""
         asked = (("behaviour", self.behaviour), ("conversation", self.conversation))
         return tuple((menu, choice) for menu, choice in asked if choice is not None)
 
     def checked(self, blind: bool = False) -> "RunOptions":
-        """Return the options with the scene that is looked at where nothing was said.
+        """Return the options with the default scene if none was given.
 
         Args:
-            blind: nothing need be looked at.
+            blind: no scene is needed.
 
         Raises:
-            SetupError: they do not fit together.
+            SetupError: they contradict each other.
         """
         _ = self.page_address
         self._refuse_bus()
@@ -152,7 +152,7 @@ class RunOptions:
         """Refuse a bus that is unknown, or that replaces no servos.
 
         Raises:
-            SetupError: with what it needs.
+            SetupError: the message names the missing option.
         """
         if self.bus is None:
             return
@@ -171,7 +171,7 @@ class RunOptions:
         """Refuse options that exclude each other.
 
         Raises:
-            SetupError: with what they need.
+            SetupError: the message names the missing option.
         """
         clashes = (
             (
@@ -229,5 +229,5 @@ def host_port(text: str) -> tuple[str, int]:
 
 
 def camera_of(text: str | None) -> int | str | None:
-    """Return what --camera asks for: the number of a webcam, or the name of a camera."""
+    """Return the value of --camera: the number of a webcam, or the name of a camera."""
     return int(text) if text is not None and text.isdecimal() else text

@@ -1,11 +1,11 @@
-"""The parameters of a running rig: what they are, what they are to be, and the file they are in.
+"""Store of a running rig's parameters: present values, changes and files.
 
-Three rigs matter: the one that its files make (with the options of the command line), the
-one in force, and the one of defaults. What a person changes lies over the files until it is
-saved, whichever character is chosen and however often the files are edited meanwhile.
+There are three rigs: the one of its files (with the options of the command line), the
+present one, and the one of defaults. A person's changes override the files until they are
+saved, for every character and every later edit of the files.
 
-Everything may be called from any thread. Changes reach the running parts as one command,
-checked as a whole beforehand.
+All methods may be called from any thread. Changes reach the running parts as one command, checked
+as a whole before.
 """
 
 import contextlib
@@ -52,11 +52,11 @@ _DEFAULTS = "desk"
 
 
 class _ParamState(NamedTuple):
-    """Everything at one moment; a new one takes its place as a whole.
+    """State at one moment, replaced as a whole.
 
-    saved: what the files make, with the options; rig: in force
-    name: of the rig as it was asked for, a shipped name or a path
-    files: in use, with what they held when they were last read without a fault
+    saved: rig of the files, with the options; rig: the present one
+    name: of the rig as given, a shipped name or a path
+    files: in use, with their contents at the last valid read
     was, values: of ``saved`` and of ``rig``, by key
     """
 
@@ -71,13 +71,13 @@ class _ParamState(NamedTuple):
 
 
 class ParamStore:
-    """The parameters of one running rig: returns and changes them.
+    """Store of one running rig's parameters.
 
     version: increases with each change
-    confined: which files a user of the page may name
+    confined: files that a user of the page may name
 
     Args:
-        live_params: the parameters of the rig as it was assembled.
+        live_params: the parameters of the assembled rig.
         command: queues commands for the next tick, as gazerig.robot.control.loop.Robot.command.
         rig: name or path of the rig.
         character: name or path of the character.
@@ -87,7 +87,7 @@ class ParamStore:
             the control loop is not delayed.
 
     Raises:
-        gazerig.config.load.ConfigError: the files have changed since, and are at fault now.
+        gazerig.config.load.ConfigError: the files have changed since, and are invalid now.
     """
 
     def __init__(
@@ -104,19 +104,19 @@ class ParamStore:
         self._profile, self._now, self._elsewhere = profile, now, elsewhere
         self._changing = threading.Lock()
         self._defaults = _defaults(live_params.rig)
-        # What the command line says otherwise stays in force whatever the files say.
+        # Options of the command line override the files.
         read, files = read_all(RigLayers(rig, character, profile))
         whole, found = live_params.rig, values(live_params.rig)
         self._options = differences(read, whole)
         self._state = _ParamState(whole, whole, rig, character, files, found, found, 0)
         self._described = described(whole, self._defaults)
-        # A shipped rig's own folder is the package's, which holds no file of a user.
+        # A shipped rig's own folder is the package's, which contains no file of a user.
         at_home = rig in shipped_names("rigs")
         self.confined = AllowedFolder(Path.cwd() if at_home else self.path.parent)
 
     @property
     def version(self) -> int:
-        """Count the changes."""
+        """Return the number of changes."""
         return self._state.version
 
     @property
@@ -131,30 +131,30 @@ class ParamStore:
 
     @property
     def character_name(self) -> str:
-        """Return the character in force, "none" without one."""
+        """Return the present character, "none" without one."""
         return self._state.character or NO_CHARACTER
 
     def files(self) -> tuple[Path, ...]:
-        """Return the files in use: the rig's, and those laid over it."""
+        """Return the files in use: the rig's, and those that override it."""
         return self._state.files.paths
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters in the order of the file."""
         state, made = self._state, self._described
-        # All but which entries there are stays as it is.
+        # Everything except the set of entries stays.
         if [param.key for param in made] != list(state.values):
             made = self._described = described(state.rig, self._defaults)
         return made
 
     def values(self) -> dict[str, Value]:
-        """Return key -> value in force of every param."""
+        """Return the present value of every parameter, by key."""
         return dict(self._state.values)
 
     def get(self, prefix: str = "") -> dict[str, Value]:
-        """Return the values in force whose keys begin so.
+        """Return the present values whose keys have a prefix.
 
         Raises:
-            gazerig.config.load.ConfigError: there is none; the message says what is near.
+            gazerig.config.load.ConfigError: there is none; the message lists similar keys.
         """
         state = self._state
         found = {key: value for key, value in state.values.items() if key.startswith(prefix)}
@@ -163,21 +163,21 @@ class ParamStore:
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Apply values at dotted keys from the next tick on, all of them or none.
 
-        Gives a line for each value that is another one now.
+        Returns a line for each changed value.
 
         Raises:
-            gazerig.config.load.ConfigError: with every fault; what was in force stays.
+            gazerig.config.load.ConfigError: with every fault; nothing changes.
         """
         with self._changing:
             return self._put(self._state, changed(self._state.rig, changes))
 
     def unsaved(self) -> tuple[ParamChange, ...]:
-        """Return what is in force and not in the files."""
+        """Return the present values that differ from the files."""
         state = self._state
         return _changes(state.saved, state.rig, state.was)
 
     def differs(self) -> tuple[ParamChange, ...]:
-        """Return what differs from the defaults, those of the shipped rig."""
+        """Return the values that differ from the defaults, those of the shipped rig."""
         return _changes(self._defaults, self._state.rig, values(self._defaults))
 
     def revert(self) -> tuple[str, ...]:
@@ -186,9 +186,9 @@ class ParamStore:
             return self._put(self._state, self._state.saved)
 
     def save(self, path: Path | str | None = None) -> SavedFile:
-        """Write what is in force into the rig's file, or into a copy of it at a new path.
+        """Write the present values into the rig's file, or into a copy of it at a new path.
 
-        From then on the copy is this rig's file. A file that was spoilt by hand meanwhile is
+        From then on the copy is this rig's file. A file that was broken by hand meanwhile is
         kept as a backup.
 
         Raises:
@@ -198,9 +198,9 @@ class ParamStore:
         with self._changing:
             copied = path is not None and os.path.realpath(path) != os.path.realpath(self.path)
             if copied:
-                refuse_copy(str(path))  # before another process is started for it
+                refuse_copy(str(path))  # checked before another process is started
             if self._state.files.changed():
-                # An edit that is not in force yet counts; one with faults does not.
+                # A valid edit that is not applied yet counts; one with faults does not.
                 with contextlib.suppress(ConfigError):
                     self._reload()
             state = self._state
@@ -222,17 +222,17 @@ class ParamStore:
             return saved
 
     def characters(self) -> tuple[str, ...]:
-        """Return the characters there are, the one in force first; "none" is the rig itself."""
+        """Return the known characters, the present one first; "none" is the rig itself."""
         now = self.character_name
         return (now, *(n for n in (NO_CHARACTER, *shipped_names("characters")) if n != now))
 
     def character(self, name: str) -> tuple[str, ...]:
-        """Lay another character over the rig; what is unsaved stays over both.
+        """Apply another character to the rig; unsaved values override both.
 
         name: of a shipped one, a path, or "none"
 
         Raises:
-            gazerig.config.load.ConfigError: there is no such character, or it does not fit the rig.
+            gazerig.config.load.ConfigError: the character is unknown, or does not fit the rig.
         """
         with self._changing:
             state = self._state
@@ -244,10 +244,10 @@ class ParamStore:
     def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
         """Apply the present values of the files; unsaved values stay unless the files changed them.
 
-        path: the one of the files that was edited
+        path: the edited file
 
         Raises:
-            gazerig.config.load.ConfigError: with every fault; what was in force stays.
+            gazerig.config.load.ConfigError: with every fault; nothing changes.
         """
         with self._changing:
             return self._reload()
@@ -266,13 +266,13 @@ class ParamStore:
         return RigLayers(state.name, state.character, self._profile)
 
     def _read(self, state: _ParamState) -> _ParamState:
-        """Read the files, with the options over them; what is in force stays."""
+        """Read the files, with the options over them; the present rig stays."""
         rig, files = self._elsewhere(read_all, self._layers(state))
         saved = changed(rig, self._options)
         return state._replace(saved=saved, was=values(saved), files=files)
 
     def _put(self, state: _ParamState, rig: Rig) -> tuple[str, ...]:
-        """Apply a checked rig, and return what has changed."""
+        """Apply a checked rig, and return the changes."""
         before = self._state
         found = differences(before.rig, rig)
         if found:
@@ -288,12 +288,12 @@ class ParamStore:
 
 
 def _defaults(rig: Rig) -> Rig:
-    """Return the shipped rig of the same name, else the one that all others are made of."""
+    """Return the shipped rig of the same name, else the base of all rigs."""
     return load_rig(rig.name if rig.name in shipped_names("rigs") else _DEFAULTS)
 
 
 def _refuse_lists(wanted: Mapping[str, Value]) -> None:
-    """Refuse what no single line can hold."""
+    """Refuse values that do not fit in a single line."""
     faults = [
         ConfigFault("", None, key, "", "holds mappings: change it in the file, which is read again")
         for key, value in wanted.items()
@@ -304,7 +304,7 @@ def _refuse_lists(wanted: Mapping[str, Value]) -> None:
 
 
 def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ParamChange, ...]:
-    """Return each value that differs, as YAML; was: those before."""
+    """Return each value that differs, as YAML; was: the former values."""
     found = flattened(after, differences(before, after))
     return tuple(
         ParamChange(key, _text(was[key]) if key in was else None, _text(value))
@@ -325,7 +325,7 @@ def _text(value: Value) -> str:
 
 
 def _overlap(one: str, other: str) -> bool:
-    """Return whether two keys are the same or one is above the other."""
+    """Return whether two keys are the same or one contains the other."""
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 

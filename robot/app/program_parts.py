@@ -1,4 +1,4 @@
-"""A program's own camera, detector and rule of attention in the place of the rig's."""
+"""A program's own camera, detector and rule of attention, in place of the rig's."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -12,11 +12,11 @@ from gazerig.robot.control.chooser import LONGEST_S, Chooser, GuardedChooser, Ta
 
 
 class ProgramParts(NamedTuple):
-    """Objects that a program brings; None where the rig's own part does the work.
+    """Objects of a program; None for the rig's own part.
 
-    camera: gives detections, or frames in which a detector looks
+    camera: returns detections, or frames for a detector
     detector: finds faces in frames
-    chooser: says what to look at
+    chooser: chooses the target
     """
 
     camera: Camera | FrameSource | None = None
@@ -24,7 +24,7 @@ class ProgramParts(NamedTuple):
     chooser: Chooser | None = None
 
     def find_faces(self, params: FaceDetectorParams) -> FaceDetector:
-        """Return the detector: the program's, with ours for after it has failed, or the rig's."""
+        """Return the detector: the program's, with ours as a fallback, or the rig's."""
         if self.detector is None:
             return face_detector(params)
         require(self.detector, "detector", "find")
@@ -34,7 +34,7 @@ class ProgramParts(NamedTuple):
     def choose(
         self, own: TargetChooser, say: Callable[[str], None], simulated: bool
     ) -> TargetChooser:
-        """Return who chooses what to look at: the program's rule before the rig's own."""
+        """Return the chooser of the target: the program's rule before the rig's own."""
         if self.chooser is None:
             return own
         require(self.chooser, "attention", "choose")
@@ -51,12 +51,12 @@ def require(part: object, what: str, method: str) -> None:
     """Refuse a part of a program that lacks a method.
 
     Raises:
-        SetupError: it has none of that name.
+        SetupError: it has no such method.
     """
     if not callable(getattr(part, method, None)):
         raise SetupError(f"{label_of(what, part)} has no method {method}")
 
 
 def label_of(what: str, part: object) -> str:
-    """Return a part of a program as messages name it."""
+    """Return the name of a program's part for messages."""
     return f"{what} {type(part).__name__} of the program"

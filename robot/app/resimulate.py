@@ -1,8 +1,8 @@
-"""A recorded run done again: the same percepts, times, commands and rng, the models of now.
+"""Resimulation of a recorded run: its percepts, times, commands and rng with the present models.
 
-With the configuration and code of then every command comes out the same to the bit; the
-joints are then fed as recorded. With anything changed the recorded joints would belong to
-other commands, so the emulated servos follow instead, ideal ones where they were ideal.
+With the recorded configuration and code every command is identical to the bit; the
+joints are then those recorded. After a change the recorded joints would belong to
+other commands, so emulated servos follow instead, ideal ones if they were ideal.
 """
 
 import tempfile
@@ -34,14 +34,14 @@ _LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
 
 
 class Resimulation(NamedTuple):
-    """What came out of doing a run again.
+    """Result of a resimulation.
 
-    joints: where the joints' angles came from
-    ticks: compared; agreeing: whose target, gaze and commands are the same to the bit
-    first_difference_s: from the first tick, None where all agree; differs: what does there
-    tx_same: the bytes on the emulated bus are the same too, None if that cannot be known
+    joints: source of the joints' angles
+    ticks: compared; agreeing: number with the same target, gaze and commands, to the bit
+    first_difference_s: from the first tick, None if all agree; differs: the difference there
+    tx_same: whether the bytes on the emulated bus are the same too, None if unknown
     recorded, again: the figures of both (gazerig.robot.analysis.summary)
-    notes: what else a person should know
+    notes: further messages for the user
     """
 
     joints: Joints
@@ -56,7 +56,7 @@ class Resimulation(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Return whether every tick came out the same."""
+        """Return whether every tick is identical."""
         return self.agreeing == self.ticks
 
 
@@ -67,22 +67,22 @@ def rerun(
     joints: str | None = None,
     on_tick: Callable[[Tick], None] | None = None,
 ) -> Resimulation:
-    """Do a recorded run again.
+    """Resimulate a recorded run.
 
-    rig: another rig, by name or path or as it is; None: as recorded
-    character: laid over it, by name or path
-    joints: "recorded" (the default where nothing is changed) or "emulated"
+    rig: another rig, by name, by path or as an object; None: as recorded
+    character: applied to it, by name or path
+    joints: "recorded" (the default if nothing is changed) or "emulated"
     on_tick: gets every tick of the new run, to be recorded or reported on
 
     Raises:
-        gazerig.config.load.ConfigError: the rig or character is at fault.
-        SetupError: the recording cannot be read or holds no tick.
+        gazerig.config.load.ConfigError: the rig or character is invalid.
+        SetupError: the recording cannot be read or contains no tick.
     """
     changed = rig is not None or character is not None
     fed = _joints(joints, changed)
     with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
         with_rig = _rig(recording, rig, character, Path(folder))
-        # The scene is not looked at: what it showed is in the recording.
+        # The scene is not needed: its percepts are in the recording.
         info = recording.info
         options = RunOptions(True, True, info.seed, "visitor", bus=info.bus)
         again = _Resimulator(with_rig, options, fed, on_tick)
@@ -93,7 +93,7 @@ def rerun(
 
 
 class _Resimulator:
-    """One run being done again."""
+    """Resimulation of one run."""
 
     def __init__(
         self, rig: Rig, options: RunOptions, joints: Joints, on_tick: Callable[[Tick], None] | None
@@ -120,11 +120,11 @@ class _Resimulator:
         return self._body
 
     def close(self) -> None:
-        """End what was started for it."""
+        """End the processes started for it."""
         self._made.close()
 
     def whole(self, recording: RunRecording) -> Resimulation:
-        """Do all of it and compare."""
+        """Resimulate the whole run and compare."""
         moments = recording.moments()
         first = next(moments, None)
         if first is None:
@@ -148,10 +148,10 @@ class _Resimulator:
         return self._compared.result(self._joints, same, tuple(self._notes))
 
     def _see_joints(self, recorded: tuple[str, ...]) -> None:
-        """See that recorded joints are the rig's own; say where the rig has others.
+        """Check that the recorded joints are the rig's own; note differences.
 
         Raises:
-            SetupError: they are to be fed to a rig that has others.
+            SetupError: the rig has other joints, and the recorded ones are required.
         """
         names = self._made.robot.body.names
         if names == recorded:
@@ -162,7 +162,7 @@ class _Resimulator:
         self._notes.append(apart)
 
     def _start(self, first: TickRecord) -> float:
-        """Begin where the recorded run began; give when."""
+        """Start like the recorded run; return the start time."""
         began_s = first.tick.t_s - first.dt_s
         starts = [one.t_s for one in first.before if isinstance(one, MeasuredJoints)]
         if not starts:
@@ -174,7 +174,7 @@ class _Resimulator:
         return began_s
 
     def _run(self, moments: Iterator[TickRecord]) -> str | None:
-        """Do tick after tick; give what ended them before their time."""
+        """Run all ticks; return the reason of an early end."""
         made = self._made
         for moment in moments:
             made.clock.sleep_until(moment.tick.t_s)
@@ -190,7 +190,7 @@ class _Resimulator:
         return None
 
     def _tick(self, moment: TickRecord) -> Tick:
-        """Do one tick."""
+        """Run one tick."""
         was = moment.tick
         if self._body is not None:
             self._body.play(moment)
@@ -201,7 +201,7 @@ class _Resimulator:
             except ValueError as error:
                 self._notes.append(f"a command could not be given again: {error}")
         tick = self._made.robot.tick(was.t_s, moment.dt_s)
-        # What happened on the bus and to the camera happened to the machine of then.
+        # Events of the bus and the camera belong to the recorded machine.
         return tick if self._body is None else tick._replace(events=was.events)
 
 
@@ -217,7 +217,7 @@ class _Compared:
         self._was, self._is = Summary(), Summary()
 
     def update(self, was: Tick, now: Tick) -> None:
-        """Compare a tick with its likeness."""
+        """Compare a tick with the recorded one."""
         if self.ticks == 0:
             self._began_s = was.t_s
         self.ticks += 1
@@ -231,7 +231,7 @@ class _Compared:
             self._differs = differs
 
     def result(self, joints: Joints, tx_same: bool | None, notes: tuple[str, ...]) -> Resimulation:
-        """Return what came out."""
+        """Return the result."""
         return Resimulation(
             joints, self.ticks, self._agreeing, self._first_s, self._differs, tx_same,
             self._was.figures(), self._is.figures(), notes,
@@ -239,7 +239,7 @@ class _Compared:
 
 
 class _Decided(NamedTuple):
-    """What a tick decided, as text that is the same only where every bit is."""
+    """Decisions of a tick, as text that is equal only if every bit is."""
 
     target: str
     gaze: str
@@ -249,11 +249,11 @@ class _Decided(NamedTuple):
 
 
 def _decided(tick: Tick) -> _Decided:
-    gaze = tick.gaze._replace(limited=())  # told since later versions
-    # What is asked of absent lids moves nothing.
+    gaze = tick.gaze._replace(limited=())  # recorded by later versions only
+    # Commands to absent lids have no effect.
     if _LOWER_LIDS.isdisjoint(tick.guard_result.joints):
         gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
-    # The reason's words may be put better one day; what they stand for is in the pulls.
+    # The wording of the reason may change; its contents are in the pulls.
     return _Decided(
         repr(tick.target._replace(why="")),
         repr(gaze),
@@ -291,7 +291,7 @@ def _short(was: Tick, now: Tick, name: str) -> str:
 
 
 def _joints(joints: str | None, changed: bool) -> Joints:
-    """Choose where the joints' angles come from."""
+    """Choose the source of the joints' angles."""
     match joints:
         case None:
             return "emulated" if changed else "recorded"
@@ -301,10 +301,10 @@ def _joints(joints: str | None, changed: bool) -> Joints:
 
 
 def recorded_rig(recording: RunRecording) -> Rig:
-    """Return the rig with everything that was in force when the run began.
+    """Return the rig with all values at the start of the run.
 
     Raises:
-        BadRecording: this version does not know what the recorded one was made of.
+        BadRecording: this version does not know a part of the recorded one.
     """
     with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
         return _read(recording, _kept(recording.info.config_yaml, Path(folder) / "recorded.yaml"))
@@ -313,7 +313,7 @@ def recorded_rig(recording: RunRecording) -> Rig:
 def _rig(
     recording: RunRecording, rig: Rig | str | None, character: str | None, folder: Path
 ) -> Rig:
-    """Return the rig to run with: the recorded one, unless another was asked for."""
+    """Return the rig of the resimulation: the recorded one, unless another is given."""
     if isinstance(rig, str):
         return load_rig(rig, character)
     text = params_text(rig) if rig is not None else recording.info.config_yaml
@@ -356,7 +356,7 @@ def _kept(text: str, file: Path) -> Path:
 
 
 def _character(name_or_path: str) -> Path:
-    """Find a character as gazerig.config.schema.load_rig does."""
+    """Find a character like gazerig.config.schema.load_rig."""
     if "/" in name_or_path or name_or_path.endswith((".yaml", ".yml")):
         return Path(name_or_path)
     return shipped("characters", name_or_path)

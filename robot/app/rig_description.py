@@ -1,4 +1,4 @@
-"""The description of a rig as its YAML says, with the user's own meshes."""
+"""Description of a rig by its YAML, with the user's own meshes."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -19,7 +19,7 @@ def description_of(rig: Rig, *, looks: bool = True) -> Description:
 
     Args:
         rig: the rig.
-        looks: with what can be seen; without, the same mechanism is made in a moment.
+        looks: with the visible shapes; without them, the same mechanism is built quickly.
 
     Raises:
         SetupError: a mesh of its own cannot be used.
@@ -28,11 +28,12 @@ def description_of(rig: Rig, *, looks: bool = True) -> Description:
 
 
 def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
-    """Return what a rig's description is made from.
+    """Return the shape from which a rig's description is built.
 
     Args:
         rig: the rig.
-        without_lost_meshes: meshes that cannot be used are left out, as a recorded rig's may be.
+        without_lost_meshes: unusable meshes are left out, as those of a recorded rig may be
+            missing.
 
     Raises:
         SetupError: a mesh of its own cannot be used.
@@ -63,9 +64,10 @@ def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
 
 
 def collision_hints(rig: Rig) -> list[str]:
-    """Return where parts of the rig's model meet within the joints' limits, a line each.
+    """Return the collisions of the rig's model within the joints' limits, a line each.
 
-    What its guard forbids is left out. Shoulders are those of the model, so these are hints.
+    Collisions that its guard prevents are left out. Shoulders are those of the model, so these are
+    hints.
     """
     shape = shape_of(replace(rig, meshes={}))
     return [
@@ -82,7 +84,7 @@ def _forbids(pair: CollisionParams, angles_deg: Mapping[str, float]) -> bool:
 
 
 def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:
-    """Find meshes of a rig's own that cannot be shown: key in its file, and what is wrong."""
+    """Find meshes of a rig's own that cannot be shown: key in its file, and the fault."""
     if not rig.meshes:
         return
     made = describe(shape_of(replace(rig, meshes={})), looks=False)

@@ -1,4 +1,4 @@
-"""What a rig's file comes to in radians and metres, for the parts that are made of it."""
+"""Conversion of a rig's file to radians and metres, for the parts of the robot."""
 
 from collections.abc import Mapping
 from math import radians
@@ -23,17 +23,17 @@ def limits(joints: Mapping[str, JointParams]) -> tuple[JointLimit, ...]:
 
 
 def park_pose(rig: Rig) -> JointAngles:
-    """Return the pose before torque goes off."""
+    """Return the pose for parking, before torque is switched off."""
     return tuple(radians(rig.park_deg.get(name, 0.0)) for name in in_order(rig.joints))
 
 
 def own_parts(rig: Rig) -> dict[str, Vec3]:
-    """Return the rig's own places of face parts in metres."""
+    """Return the rig's own positions of face parts in metres."""
     return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
 
 
 def lid_ends(rig: Rig) -> dict[str, LidEnds]:
-    """Return the joint angles of the rig's lids shut, and open."""
+    """Return the joint angles of the rig's shut and open lids."""
     ends = {}
     for name in LIDS:
         shut, wide = rig.lid_joints.ends_deg(name)
@@ -43,7 +43,7 @@ def lid_ends(rig: Rig) -> dict[str, LidEnds]:
 
 
 def lid_spans(rig: Rig) -> dict[str, float]:
-    """Return the way of each lid from shut to open, in radians."""
+    """Return the travel of each lid from shut to open, in radians."""
     return {name: wide - shut for name, (shut, wide) in lid_ends(rig).items()}
 
 
@@ -64,7 +64,7 @@ def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2], Angles2]:
 
 
 def neck_span(rig: Rig, name: str) -> Angles2:
-    """Return the range of an axis of the neck; none where it is not there."""
+    """Return the range of an axis of the neck; (0, 0) without it."""
     return _span(rig, name, 180.0)
 
 
@@ -80,7 +80,7 @@ def _turned_by(rig: Rig, side: str, way: str) -> str:
 
 
 def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
-    """Return a joint's range within +-most_deg, in radians; none where it is not there."""
+    """Return a joint's range within +-most_deg, in radians; (0, 0) without it."""
     joint = rig.joints.get(name)
     if joint is None:
         return (0.0, 0.0)
@@ -93,7 +93,7 @@ def park_rad(rig: Rig) -> dict[str, float]:
 
 
 def animation_tables(rig: Rig) -> AnimationTables:
-    """Return what expressions and levels add to the pose."""
+    """Return the pose offsets of expressions and levels."""
     expressions = {name: pose_offset(rig, angles) for name, angles in rig.expressions.items()}
     levels = {name: _level(rig, level) for name, level in rig.levels.items()}
     return AnimationTables(expressions, rig.expression_blend_s, levels)
@@ -102,12 +102,12 @@ def animation_tables(rig: Rig) -> AnimationTables:
 def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
     """Return angles added to joints as an offset of the pose.
 
-    The angle of a lid becomes a factor of its opening, such that it is added where the lid is
-    open and nothing where it is shut: blinks still shut it.
+    The angle of a lid becomes a factor of its opening, such that the open lid moves by this angle
+    and the shut lid stays: blinks still shut it.
 
     Args:
         rig: its joints and the ends of its lids.
-        offsets_deg: joint -> angle; none of an eye.
+        offsets_deg: joint -> angle; no eyes.
     """
     offsets = {name: radians(angle) for name, angle in offsets_deg.items()}
     spans = lid_spans(rig)

@@ -18,13 +18,13 @@ from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 
 
 def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
-    """Return the real port, ideal servos, an emulated bus here, or one on a pseudo-terminal.
+    """Return the real port, ideal servos, or an emulated bus here or on a pseudo-terminal.
 
-    Without pseudo-terminals the bus is emulated here in real time, too.
+    Without pseudo-terminals the bus is emulated in this process in real time, too.
 
     Args:
-        rig: whose servos they are.
-        options: what replaces them.
+        rig: of the servos.
+        options: of the run, with their replacement.
         clock: of the run.
     """
     if not options.mock:
@@ -43,7 +43,7 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
 
 
 def without_wires(rig: Rig, ideal: IdealBus) -> RunBus:
-    """Return ideal servos of a rig, which know where they are."""
+    """Return ideal servos of a rig, with their true positions."""
     names = rig.names
     return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
 
@@ -58,7 +58,7 @@ def in_process(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
 
 
 def _true_steps(rig: Rig, devices: Mapping[str, Device]) -> TrueSteps:
-    """Return what reads the shafts of emulated devices; ``devices``: by the name of the bus."""
+    """Return the reader of the shafts of emulated devices; ``devices``: by the name of the bus."""
     places = tuple((name, rig.joints[name].bus, place_of(rig, name)) for name in rig.names)
 
     def now() -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The figures of a run: those of its ticks, its loop, its pictures, its scene and its bus."""
+"""Figures of a run: ticks, loop, images, scene and bus."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from gazerig.sim_mock.scenes.scene import Scene
 
 
 class SceneScore(NamedTuple):
-    """How a scene's events were answered, by the gaze and by the action planner."""
+    """Score of the responses to a scene's events, by the gaze and by the action planner."""
 
     behaviours: BehaviourScore
     planner: PlannerScore
@@ -32,7 +32,7 @@ def run_figures(
     wall_s: float,
     faults: JointFaults,
 ) -> dict[str, object]:
-    """Join the figures of the ticks, where they were summed up, the loop, frames and bus."""
+    """Join the figures of the ticks (if summarised), the loop, the frames and the bus."""
     robot = made.robot
     health = robot.body.bus.health()
     bus: dict[str, object] = {

@@ -1,4 +1,4 @@
-"""What a run hands from part to part: its bus, and where its camera is."""
+"""Values passed between the parts of a run: its bus, and the placement of its camera."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from gazerig.drivers.types import ServoBus
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 
 TrueSteps = Callable[[], Mapping[str, float]]
-"""Returns the true positions of the servos now in steps, by joint."""
+"""Function that returns the present true positions of the servos in steps, by joint."""
 
 
 def _no_digest() -> str | None:
@@ -22,10 +22,10 @@ def _nothing() -> None:
 class RunBus(NamedTuple):
     """The bus of the rig.
 
-    true_steps: where the servos truly are, None where that is unknown in this process
-    digest: returns the SHA-256 of all bytes sent, None where they are not counted
-    close: ends what was started for it
-    fault: carries out a fault command of the emulated servos, None where they are real or ideal
+    true_steps: true positions of the servos, None if unknown in this process
+    digest: returns the SHA-256 of all bytes sent, None if they are not counted
+    close: ends the processes started for it
+    fault: executes a fault command of the emulated servos, None for real or ideal ones
     """
 
     bus: ServoBus
@@ -36,7 +36,7 @@ class RunBus(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """Where the camera sits, where the head was when, and who else receives it."""
+    """Placement of the camera, history of the head's pose, and its further receivers."""
 
     mount: CameraMount
     poses: PoseHistory

@@ -1,4 +1,4 @@
-"""The rig of a run as the command line has it, its scene, and what a recording says of both."""
+"""The rig of a run with the options of the command line, its scene, and the record of both."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -23,22 +23,22 @@ P = TypeVar("P", ScanpathParams, SaccadeParams)
 
 
 def run_rig(options: RunOptions) -> Rig:
-    """Return the rig of a run, with the meshes that it names looked at, too.
+    """Return the rig of a run, with its meshes checked, too.
 
     Raises:
-        gazerig.config.load.ConfigError: rig, character, profile or rule set are at fault.
-        SetupError: there is no such model.
+        gazerig.config.load.ConfigError: rig, character, profile or rule set are invalid.
+        SetupError: an option names an unknown model.
     """
     names = (options.rig, options.character, options.profile)
     return with_options(load_rig(*names, further=[mesh_faults]), options)
 
 
 def with_options(rig: Rig, options: RunOptions) -> Rig:
-    """Return the rig with what the command line says otherwise.
+    """Return the rig with the options of the command line.
 
     Raises:
-        gazerig.config.load.ConfigError: the rule set is at fault.
-        SetupError: there is no such model.
+        gazerig.config.load.ConfigError: the rule set is invalid.
+        SetupError: an option names an unknown model.
     """
     gaze = rig.gaze
     if options.rules is not None:
@@ -53,7 +53,7 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
 
 
 def _chosen(params: P, key: str, value: str, option: str) -> P:
-    """Replace one key that has choices, as an option of the command line asks.
+    """Replace one key that has choices by an option of the command line.
 
     Raises:
         SetupError: the value is none of the choices.
@@ -65,10 +65,10 @@ def _chosen(params: P, key: str, value: str, option: str) -> P:
 
 
 def scene_of(rig: Rig, options: RunOptions) -> Scene | None:
-    """Return the scene that was asked for, None where a camera looks at something else.
+    """Return the requested scene, None if the camera has another source.
 
     Raises:
-        SetupError: there is no such scene, or the rig has no rule for something that its action
+        SetupError: the scene is unknown, or the rig has no rule for a behaviour that its action
             planner would have to choose there.
     """
     if options.scene is None:
@@ -82,10 +82,10 @@ def scene_of(rig: Rig, options: RunOptions) -> Scene | None:
 
 
 def refuse_unruled(rules: TopDownParams, scene: Scene, option: str) -> None:
-    """Refuse a scene that needs a planner of behaviours that a rig has no rules for.
+    """Refuse a scene whose planner needs behaviours without rules.
 
     Raises:
-        SetupError: names them.
+        SetupError: the message names them.
     """
     missing = [b for b in scene.behaviours if b not in rules.rules]
     if missing:
@@ -96,10 +96,10 @@ def refuse_unruled(rules: TopDownParams, scene: Scene, option: str) -> None:
 
 
 def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
-    """Return the rig with what a boxing match needs, where its surroundings are one.
+    """Return the rig with the settings of a boxing match, if its surroundings are one.
 
     Its action planner is switched on, and in a world the finder of red gloves. Rules that lack a
-    behaviour stay as they are: ``scene_of`` refuses the scene.
+    behaviour stay unchanged: ``scene_of`` refuses the scene.
     """
     scene: Scene | None = scenes().get(options.scene or "")
     if options.world is not None:
@@ -113,7 +113,7 @@ def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
 
 
 def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:
-    """Return what a recording says of its run."""
+    """Return the header of a run's recording."""
     return RunInfo(
         rig=options.rig,
         profile=rig.profile,

@@ -1,4 +1,4 @@
-"""One run from start to torque off: what the command line asks for, carried out."""
+"""Execution of one run of the command line, from start to torque off."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
 
 
 SECONDS = "seconds"
-"""Why a run ended whose time was over."""
+"""Reason of a run that ended after its time."""
 
 
 class ComposedRun(NamedTuple):
-    """A robot put together for one run, with what reaches into it and what records it.
+    """A robot assembled for one run, with its remote controls and its recorder.
 
     tuning: None if its parameters cannot be changed from outside
     """
@@ -59,18 +59,18 @@ def compose(
 
     Args:
         options: what to run.
-        substitutes: parts of a program's own; a recording goes around the body.
+        substitutes: parts of a program's own; a recorder wraps the body.
         room: open surroundings with other robots in them; None: it is alone.
 
     Raises:
-        gazerig.config.load.ConfigError: the rig, character, profile or walk is at fault.
+        gazerig.config.load.ConfigError: the rig, character, profile or walk is invalid.
         SetupError: a film or model file cannot be used.
     """
     rig = run_rig(options)
     if options.record is None:
         recorder = None
     else:
-        from gazerig.robot.recording.recorder import Recorder  # with what writes and packs files
+        from gazerig.robot.recording.recorder import Recorder  # imports file formats
 
         info = run_info(rig, options, () if room is None else room.stands)
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
@@ -90,17 +90,17 @@ def run(
     ends: Callable[[str], object] | None = None,
     summarised: bool = True,
 ) -> dict[str, object]:
-    """Run until the time is over, a signal comes or something fails; return the figures.
+    """Run until the time is over, a signal arrives or a part fails; return the figures.
 
     Args:
         composed: what to run.
-        stopped: returns the name of a signal that has come, None before.
+        stopped: returns the name of an arrived signal, None before.
         say: writes a line.
         status: rewrites the status line; None: there is none.
         watch: gets every tick.
         browse: opens the page in the user's browser; None: leaves that to the user.
         ends: gets the reason as soon as it ends, before the head parks.
-        summarised: also sum up every tick, for figures of the gaze and of a scene's events.
+        summarised: also summarise every tick, for figures of the gaze and of a scene's events.
 
     Raises:
         SetupError: before anything moved.
@@ -113,9 +113,9 @@ def run(
 
 
 class Session:
-    """One run, with everything that watches it; arguments as of ``run``.
+    """One run, with its observers; arguments as of ``run``.
 
-    stopped_by: why it ended; a fault until ``powered``'s block says otherwise
+    stopped_by: reason of its end; a fault unless ``powered``'s block sets another
     """
 
     def __init__(
@@ -173,14 +173,14 @@ class Session:
                 self._made.robot.report(line)
 
     def _stop(self, seconds: float) -> str | None:
-        """Return why the run ends now, None while it goes on."""
+        """Return the reason why the run ends now, None while it continues."""
         over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
         return self._stopped() or self._interrupts() or (SECONDS if over else None)
 
     def whole(self, ends: Callable[[str], object] | None = None) -> dict[str, object]:
         """Run from torque on to torque off; return the figures.
 
-        ends: gets why it ends, before the head parks
+        ends: gets the reason of its end, before the head parks
         """
         wall = RealClock()
         began_s = wall.now_s()
@@ -204,7 +204,7 @@ class Session:
 
     @contextlib.contextmanager
     def powered(self) -> Iterator[TickLoop]:
-        """Switch on, let the block step the loop, leave as every way out does.
+        """Switch on, let the block step the loop, shut down like every exit.
 
         Raises:
             SetupError: before anything moved.
@@ -239,20 +239,20 @@ class Session:
                 run_observers.give_up()
 
     def _start_events(self) -> list[str]:
-        """Return what the bus did to begin; of emulated servos, not which registers were set."""
+        """Return the events of the bus at the start; without the registers of emulated servos."""
         events, options = self._made.robot.body.bus.events(), self._options
         if options.mock and not options.verbose:
             events = tuple([event for event in events if not is_register_change(event)])
         return drawn_together(events)
 
     def _unwritten_heatmap(self) -> Path | None:
-        """Write the heat map where one is asked for; return its file where that failed."""
+        """Write the heat map if requested; return its file if that failed."""
         out = self._options.heatmap
         if self._face_gaze is None or out is None:
             return None
         try:
             _draw_heatmap(self._face_gaze, self._options, out, self._say)
-        except SetupError as error:  # the figures of the run are still to be had
+        except SetupError as error:  # the figures of the run are still available
             self._say(str(error))
             return out
         return None
@@ -261,7 +261,7 @@ class Session:
 def _observe_scene(
     observers: Observers, made: Assembly, score: SceneScore | None, face_gaze: GazeOnFace | None
 ) -> None:
-    """Add the score of a scene and the heat map, where there are any."""
+    """Add the score of a scene and the heat map, if any."""
     if score is not None:
         observers.add("the scene's score", score.behaviours.update)
         observers.add("the planner's score", score.planner.update)
@@ -270,7 +270,7 @@ def _observe_scene(
 
 
 def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Return ``say`` so that a failure to say something ends nothing."""
+    """Return ``say`` without its exceptions, so that a failed message ends nothing."""
 
     def tried(line: str) -> None:
         with contextlib.suppress(Exception):
@@ -280,9 +280,9 @@ def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
 
 
 def _longest_s(made: Assembly, options: RunOptions) -> float | None:
-    """Return how long to run: as asked, or one whole round of a scene in simulated time."""
+    """Return the duration of the run, s: as given, or a scene's round in simulated time."""
     if options.seconds is None and options.fast and made.scene is not None:
-        return made.scene.round_s + 1.0  # and how the round ends
+        return made.scene.round_s + 1.0  # and the end of the round
     return options.seconds
 
 
@@ -298,7 +298,7 @@ def _ask_all(robot: Robot, options: RunOptions) -> None:
 def _draw_heatmap(
     face_gaze: GazeOnFace, options: RunOptions, out: Path, say: Callable[[str], None]
 ) -> None:
-    """Write the heat map, or say why there is none."""
+    """Write the heat map, or report why there is none."""
     if not face_gaze.points_face_m:
         say(f"no heat map in {out}: no face was looked at")
         return
@@ -315,7 +315,7 @@ def leave(
     say: Callable[[str], None],
     interrupts: Interrupts | None = None,
 ) -> None:
-    """Park, torque off, close, and say what of it worked: power_down.py's end alone."""
+    """Park, switch torque off, close, and report the results: the only end, by power_down.py."""
     leaving = way_out(made, say, interrupts if interrupts is not None else Interrupts())
     leaving.cause = count.stopped_by
     leaving.leave()
@@ -327,12 +327,12 @@ def way_out(
     interrupts: Interrupts,
     watch: Callable[[Tick], object] | None = None,
 ) -> PowerDown:
-    """Return the way out of a run of this robot; watch: gets a tick at every step of parking."""
+    """Return the shutdown of a run of this robot; watch: gets a tick at every step of parking."""
     return PowerDown(lambda again: parked(made, again, watch), made.robot.stop, say, interrupts)
 
 
 def parked(made: Assembly, again: Again, watch: Callable[[Tick], object] | None = None) -> str:
-    """Park a robot unless it was stopped; return what to say of it."""
+    """Park a robot unless it was stopped; return the messages."""
     robot = made.robot
     if robot.stopped:
         return "not parked, as it was stopped"

@@ -1,6 +1,6 @@
-"""Surroundings of an emulated rig: its servos' mechanics, what its camera sees, how it looks.
+"""Surroundings of an emulated rig: servo mechanics, camera view and appearance.
 
-``gazerig run --world NAME`` runs in them. A package brings some by an entry point of the group
+``gazerig run --world NAME`` runs in them. A package provides some by an entry point of the group
 ``gazerig.surroundings``, which names a subclass of ``Surroundings``.
 """
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from gazerig.sim_mock.scenes.scene import Scene
 
 WORLD = "world"
-"""Our own surroundings: they have all names that no package has."""
+"""Our own surroundings: they serve all names that no package has."""
 
 
 class RunRoom(Protocol):
@@ -50,7 +50,7 @@ class RunRoom(Protocol):
 
     @property
     def stands(self) -> tuple[float, ...]:
-        """Return where the rig is, as of ``RunInfo.stands``; () at the origin."""
+        """Return the rig's placement, as of ``RunInfo.stands``; () at the origin."""
         ...
 
     def camera(
@@ -68,24 +68,24 @@ class RunRoom(Protocol):
         Args:
             rig: with the parameters of detectors.
             options: of the run.
-            sight: where the camera is, and how it was turned when.
-            placed: the camera as it is believed.
+            sight: placement of the camera, and history of its rotation.
+            placed: the present parameters of the camera.
             rng: for its noise.
             own: camera and detector of a program.
-            say: gets what a person should know.
+            say: gets messages for the user.
         """
         ...
 
     def start_s(self) -> float | None:
-        """Return when its script began, on the clock of the ticks, None before that."""
+        """Return the start of its script, on the clock of the ticks, None before."""
         ...
 
     def shapes(self) -> "WorldShapes | None":
-        """Return how it looks, for the page; None: it is not shown."""
+        """Return its appearance, for the page; None: it is not shown."""
         ...
 
     def recorded(self) -> "WorldInfo | None":
-        """Return what a recording keeps of it, None before its script began or for nothing."""
+        """Return its part of a recording, None before its script began or without one."""
         ...
 
 
@@ -106,21 +106,21 @@ class GroupRun(Protocol):
 
 @runtime_checkable
 class RoomCamera(Protocol):
-    """A camera of a room that looks through another one."""
+    """A camera of a room that wraps another one."""
 
     @property
     def seeing(self) -> "Camera | None":
-        """Return the camera that looks, None before it is known."""
+        """Return the wrapped camera, None before it is known."""
         ...
 
     @property
     def start_s(self) -> float | None:
-        """Return when the scene before it began, None before that."""
+        """Return the start of the scene in front of it, None before."""
         ...
 
 
 class Surroundings(ABC):
-    """Surroundings that a run may be in; made without arguments."""
+    """Surroundings of a run; constructed without arguments."""
 
     @abstractmethod
     def scene(self, options: "RunOptions") -> "Scene":
@@ -156,14 +156,14 @@ class Surroundings(ABC):
         return None
 
     def replayed(self, info: "WorldInfo", stands: tuple[float, ...]) -> "WorldShapes":
-        """Return how the surroundings of a recorded run looked, as from its head's neck base.
+        """Return the appearance of a recorded run's surroundings, relative to its head's neck base.
 
         Args:
-            info: what ``RunRoom.recorded`` returned.
-            stands: where the head was, as of ``RunInfo.stands``.
+            info: the result of ``RunRoom.recorded``.
+            stands: placement of the head, as of ``RunInfo.stands``.
 
         Raises:
-            SetupError: they cannot be shown; says why.
+            SetupError: they cannot be shown; the message has the reason.
         """
         raise SetupError(f"the surroundings {info.name} are not shown: they keep no shapes")
 
