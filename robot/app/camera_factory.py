@@ -1,4 +1,4 @@
-"""The camera of a run, and where it sits: a scene, a film, a recording, a webcam or an OAK-D."""
+"""The camera of a run and its placement: a scene, a film, a recording, a webcam or an OAK-D."""
 
 from collections.abc import Callable
 from functools import partial
@@ -66,13 +66,13 @@ if TYPE_CHECKING:
 def sight_of(
     kinematics: Kinematics, camera: CameraParams, options: RunOptions, real: bool
 ) -> Sight:
-    """Return where the camera of a run sits.
+    """Return the placement of a run's camera.
 
     Args:
         kinematics: of the head.
-        camera: the camera as it is believed.
-        options: by which pose detections are placed.
-        real: another process looks through it, and must know how it is turned.
+        camera: the present parameters of the camera.
+        options: define the pose by which detections are placed.
+        real: another process reads the camera, and needs its rotation.
     """
     mount = CameraMount(camera)
     turns = PoseBuffer() if real and mount.on_head else None
@@ -83,7 +83,7 @@ def sight_of(
 def _turn_sender(
     mount: CameraMount, turns: PoseBuffer | None
 ) -> Callable[[float, Mat3], None] | None:
-    """Return what tells the camera's process how its camera is turned, None if it is not needed."""
+    """Return the sender of the camera's rotation to its process, None if it is not needed."""
     if turns is None:
         return None
     return lambda t_s, R_world_head: turns.record(t_s, mount.rotation(R_world_head))
@@ -100,7 +100,7 @@ def run_camera(
     clock: Clock,
     own: ProgramParts,
 ) -> Camera:
-    """Return what the robot looks through."""
+    """Return the robot's camera."""
     if scene is None:
         return real_camera(rig, options, clock, placed, sight.turns, own)
     locate = locator_of(placed)
@@ -111,9 +111,9 @@ def run_camera(
 
 
 def true_head(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> HeadPose:
-    """Return where the emulated head is: from the servos themselves where they are at hand.
+    """Return the pose of the emulated head: from the servos themselves if they are in this process.
 
-    It is built as the rig says now, whatever is believed of it later.
+    Its mechanics are those of the rig at the start, whatever parameters change later.
     """
     if true_steps is None:
         return poses.head_pose
@@ -154,8 +154,8 @@ def scene_camera(
 ) -> Camera:
     """Return a camera on a simulated scene, which renders frames or returns ideal detections.
 
-    clock, turns: the host's clock, and how the camera was turned when, for a scene that is drawn
-        in real time; that has a process of its own
+    clock, turns: the host's clock, and the history of the camera's rotation, for a scene that is
+        drawn in real time, in a process of its own
     """
     field_deg = rig.camera.horizontal_field_deg
     if not options.pixels:
@@ -164,7 +164,7 @@ def scene_camera(
     if clock is not None and not options.fast:
         motion = partial(motion_finder, rig.motion, rig.camera.lens, radians(field_deg), turns)
         return drawn_camera(rig, scene, mount, where, rng, clock, own, motion, locate)
-    # Drawing and detecting, with OpenCV.
+    # Imported here: drawing and detection, with OpenCV.
     from gazerig.robot.app.drawn_motion import MotionOfDrawn
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
@@ -187,15 +187,15 @@ def drawn_camera(
     """Return a camera on a drawn scene in real time.
 
     Args:
-        rig: how wide it sees, and how a lost camera is recovered.
-        scene: what is before it.
-        mount: where it sits on the head.
-        where: rotation and place of the head in the world at a time.
+        rig: its field of view, and the recovery of a lost camera.
+        scene: in front of it.
+        mount: its placement on the head.
+        where: rotation and position of the head in the world at a time.
         rng: for the noise.
         clock: the host's.
         own: a program's own detector, if it has one.
-        motion: makes what finds motion.
-        locate: locates what is found in the camera's axes.
+        motion: creates the motion detector.
+        locate: locates detections in the camera's axes.
     """
     poses = PoseSlot()
     make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
@@ -207,7 +207,7 @@ def drawn_camera(
 
 
 def scene_start_s(camera: Camera) -> float | None:
-    """Return when the scene of a camera without images began, None before that or without one."""
+    """Return the start of the scene of a camera without images, None before or without one."""
     if isinstance(camera, BorrowedCamera):
         return None if camera.lent else scene_start_s(camera.own)
     return camera.start_s if isinstance(camera, SceneCamera | RoomCamera) else None
@@ -218,7 +218,7 @@ def placed_camera(
 ) -> tuple[CameraParams, tuple[str, ...]]:
     """Return the rig's camera, with mount base if its frames cannot turn with the head.
 
-    seen: the camera as it is now, in whose place that of a browser may stand
+    seen: the present camera, which may be a browser's
     """
     what = options.looks_through
     if isinstance(seen, BorrowedCamera) and seen.lent:
@@ -232,7 +232,7 @@ def placed_camera(
 
 
 def lendable(own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]) -> BorrowedCamera:
-    """Return an emulated rig's camera, in whose place a browser's may stand."""
+    """Return an emulated rig's camera, which a browser's may replace."""
     field_rad = radians(FIELD_DEG)
     detector = partial(face_detector, rig.detector)
     motion = partial(motion_finder, rig.motion, None, field_rad, None)
@@ -255,8 +255,8 @@ def real_camera(
 ) -> Camera:
     """Return the camera of a program, a film, a recording, a webcam or an OAK-D.
 
-    placed: where it sits, which may be standing still though the rig's does not
-    turns: how the camera was turned when; None where it stands still
+    placed: its placement, which may be fixed although the rig's moves
+    turns: history of the camera's rotation; None if it is fixed
     own: camera and detector of a program
 
     Raises:
@@ -298,10 +298,10 @@ def program_camera(
     locate: Locate,
     fast: bool,
 ) -> Camera:
-    """Return the program's own camera, checked and watched like another package's.
+    """Return the program's own camera, checked and supervised like another package's.
 
     Raises:
-        SetupError: it is none, or gives frames in simulated time.
+        SetupError: it is no camera, or gives frames in simulated time.
     """
     camera = parts.camera
     label = label_of("camera", camera)
@@ -323,18 +323,18 @@ def watched(
     motion: Callable[[], Motion | None],
     locate: Locate,
 ) -> CameraThread:
-    """Return a source of frames with the detector looking in a thread of this program."""
+    """Return a source of frames with the detector in a thread of this program."""
     detector = parts.find_faces(rig.detector)
     return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)
 
 
 def locator_of(placed: CameraParams) -> FrameLocator:
-    """Return what locates faces and things in the axes of a camera with this lens."""
+    """Return the locator of faces and things in the axes of a camera with this lens."""
     return FrameLocator(placed.lens, radians(placed.horizontal_field_deg))
 
 
 def orientation_of(camera: CameraParams) -> FrameOrientation:
-    """Return how the camera's frames are turned upright."""
+    """Return the rotation of the camera's frames to upright."""
     return FrameOrientation(camera.rotation, camera.mirrored)
 
 
@@ -342,7 +342,7 @@ def _section(rig: Rig, name: str) -> object:
     """Return the parameters of a package's camera: the rig's section of its name, or defaults.
 
     Raises:
-        PluginError: the rig has none, and something in it has no default.
+        PluginError: the rig has none, and a parameter has no default.
     """
     section = getattr(rig, name, None)
     if section is not None:
@@ -358,7 +358,7 @@ def _section(rig: Rig, name: str) -> object:
 def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams) -> str:
     """Change the parameters of a running camera; return what cannot be changed while it runs.
 
-    placed: where it sits, with the lens that is to be believed
+    placed: its placement, with the new lens
     """
     detector = partial(face_detector, after.detector) if after.detector != before.detector else None
     seen_through = after.camera.lens, after.camera.horizontal_field_deg
@@ -381,10 +381,10 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
             case CameraProcess():
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = camera.retune(detector, motion if moves else None, locate)
-            case CameraThread():  # it looks with the program's own detector
+            case CameraThread():  # it uses the program's own detector
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = camera.retune(None, motion if moves else None, locate)
-            case SceneCamera():  # it makes up what a detector would find
+            case SceneCamera():  # it computes ideal detections
                 done = locate is None or camera.retune(locate)
             case _:
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
@@ -401,7 +401,7 @@ def _retune_detecting(
     motion: Callable[[Motion | None], Motion | None] | None,
     locate: FrameLocator | None,
 ) -> bool:
-    """Change a camera that looks for faces in simulated time; others have nothing to change."""
+    """Change a camera that detects faces in simulated time; others have nothing to change."""
     from gazerig.robot.app.drawn_motion import retuned_drawn
     from gazerig.sim_mock.cameras.rendered import PixelCamera
     from gazerig.sim_mock.cameras.video import FilmCamera
@@ -425,12 +425,12 @@ def _film(options: RunOptions) -> "VideoFile | CameraReplay":
 
 
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
-    """Return how to make the source of upright frames, for the process that will use it."""
+    """Return a factory of the source of upright frames, for the process that will use it."""
     return upright(_delivered(rig, options), orientation_of(rig.camera))
 
 
 def _delivered(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
-    """Return how to make the source of frames as the camera delivers them."""
+    """Return a factory of the source of frames as the camera delivers them."""
     if options.replay is not None:
         return partial(sources.recording, options.replay)
     if options.video is not None:

@@ -1,4 +1,4 @@
-"""A gesture made of joint angles over time, as a YAML file that the rig's loader reads."""
+"""Conversion of joint angles over time to a gesture's YAML file, which the rig's loader reads."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,9 +19,9 @@ from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
 
 TOLERANCE_DEG = 0.7
-"""The curve through fitted keys is nowhere farther from the samples."""
+"""Largest distance of the curve through fitted keys from the samples."""
 _DENSE_S = 0.09
-"""Rows closer than this are samples of a motion, not keys that somebody has set."""
+"""Rows closer than this are samples of a motion, not keys of an animator."""
 _LARGEST_S = 60.0
 _STILL_DEG = 0.01
 
@@ -33,13 +33,13 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
     """Return a gesture as YAML.
 
     Args:
-        rig: whose joints it moves.
-        series: times in seconds and angles in degrees, by joint of the rig; a gesture is what
-            they do beyond their first angle.
-        description: what it expresses.
+        rig: the rig whose joints it moves.
+        series: times in seconds and angles in degrees, by joint of the rig; a gesture is their
+            motion relative to their first angle.
+        description: meaning of the gesture.
 
     Raises:
-        SetupError: a joint is not the rig's, it takes too long or nothing moves.
+        SetupError: a joint is not the rig's, the gesture is too long, or nothing moves.
     """
     unknown = [name for name in series if _track(name) not in _tracks(rig)]
     if unknown:
@@ -68,10 +68,10 @@ def write_gesture(
     """Write a gesture's file and check it against the rig.
 
     Returns:
-        The file, and the gesture as the rig can do it.
+        The file, and the gesture fitted to the rig.
 
     Raises:
-        SetupError: the file cannot be written, or the rig cannot do it.
+        SetupError: the file cannot be written, or the rig cannot perform it.
         gazerig.config.load.ConfigError: the name or the gesture breaks a rule.
     """
     path = folder / f"{name}.yaml"
@@ -84,10 +84,10 @@ def write_gesture(
 
 
 def checked(rig: Rig, gesture: Gesture) -> FittedGesture:
-    """Return a gesture as a rig can do it from the middle of its ranges.
+    """Return a gesture fitted to a rig, from the middle of its ranges.
 
     Raises:
-        gazerig.robot.model.gesture_fit.GestureRefused: it cannot.
+        gazerig.robot.model.gesture_fit.GestureRefused: the rig cannot perform it.
     """
     bounds = limits(rig.joints)
     middle = np.clip(0.0, [one.low_rad for one in bounds], [one.high_rad for one in bounds])
@@ -112,7 +112,7 @@ def _track(joint: str) -> str:
 def _keys(
     rig: Rig, joint: str, times_s: Floats, angles_deg: Floats, start_s: float
 ) -> list[tuple[float, float]]:
-    """Return the keys of one joint; of a lid, factors of its first opening."""
+    """Return the keys of one joint; for a lid, factors of its first opening."""
     dense = len(times_s) > 4 and float(np.median(np.diff(times_s))) < _DENSE_S
     values = angles_deg - angles_deg[0]
     if np.abs(values).max() <= _STILL_DEG:
@@ -129,7 +129,7 @@ def _keys(
 
 
 def _factors(rig: Rig, lid: str, first_deg: float, values_deg: Floats) -> Floats:
-    """Return openings over the first opening, of a lid moved by so much."""
+    """Return openings over the first opening, of a lid at these angles."""
     shut, wide = rig.lid_joints.ends_deg(lid)
     if shut is None or wide is None:
         raise SetupError(f"{lid}: the rig does not say where it is shut and open")

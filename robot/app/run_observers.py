@@ -1,7 +1,7 @@
-"""Everything that watches a run, or reaches into it, beside the control loop.
+"""Observers and remote controls of a run, outside the control loop.
 
 The page, the status line, other programs, the rig's files and the recording: each is optional,
-has its own thread or process, and receives a tick in next to no time.
+has its own thread or process, and receives a tick with hardly any delay.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.feed.param_feed import ParamFeed
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.status_line import StatusLine
-from gazerig.robot.dashboard.requests.click_to_look import ClickToLook
+from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
 from gazerig.robot.dashboard.requests.request_handler import PageRequestHandler
 from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
@@ -40,14 +40,14 @@ if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
 
 STEER = "steer"
-"""The menu of this name is the page's steps of a calibration (dashboard/panels/controls.py)."""
+"""Name of the menu with the page's steps of a calibration (dashboard/panels/controls.py)."""
 
 
 class SteeringButtons(NamedTuple):
-    """Buttons of the page that lead a calibration in the place of all that leads the robot.
+    """Buttons of the page that steer a calibration, in place of all other controls of the robot.
 
-    keys: what stands on them; press: takes one, in a thread of the page's, and gives what there
-    is to say about it; shown: gives how far things are, in words
+    keys: their labels; press: handles one, in a thread of the page's, and returns a message
+        about it; shown: returns the progress, in words
     """
 
     keys: tuple[str, ...]
@@ -58,17 +58,17 @@ class SteeringButtons(NamedTuple):
 class RunObservers:
     """All observers of a run and all its remote controls, opened and closed together.
 
-    To be made before the robot starts.
+    It must be created before the robot starts.
 
     Args:
         made: the robot and its surroundings.
-        options: where the page is, and whether time is simulated, without any user.
+        options: address of the page, and whether time is simulated, without any user.
         say: prints a line.
         status: rewrites the status line; None: there is none.
         tuning: the parameters; None if they cannot be changed from outside.
         recorder: records the run.
         browse: opens the page in the user's browser.
-        steer: buttons that lead the head; otherwise the page can then only stop and resume.
+        steer: buttons that steer the head; the page can then otherwise only stop and resume.
     """
 
     def __init__(
@@ -155,7 +155,7 @@ class RunObservers:
         )
 
     def _run_state(self) -> RunState:
-        """Return what the page shows and ticks do not tell."""
+        """Return the values of the page that are not in ticks."""
         robot = self._made.robot
         errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
         start_s = scene_start_s(robot.camera)
@@ -167,7 +167,7 @@ class RunObservers:
         )  # fmt: skip
 
     def _record_world(self, tick: Tick) -> None:
-        """Record the surroundings, once their beginning is known."""
+        """Record the surroundings, once their start is known."""
         if self._world_recorded or self._recorder is None or self._made.room is None:
             return
         if (world := self._made.room.recorded()) is not None:
@@ -175,7 +175,7 @@ class RunObservers:
             self._world_recorded = True
 
     def join(self, observers: Observers) -> None:
-        """Let all of them observe the ticks; each is left out by itself where it fails."""
+        """Let all of them observe the ticks; each that fails is left out."""
         if self._recorder is not None:
             if self._made.room is not None:
                 observers.add("recording the surroundings", self._record_world)
@@ -196,11 +196,11 @@ class RunObservers:
         self._observers.update(tick)
 
     def busy(self) -> str:
-        """Return that the computer is too busy, "" where it is not or time is simulated."""
+        """Return a message if the computer is too busy, "" if not or if time is simulated."""
         return busy_text(self._timing.figures())
 
     def parking(self, tick: Tick) -> None:
-        """Show a tick of the way to the parking pose, which is no part of a recording."""
+        """Show a tick of the motion to the parking pose, which is not recorded."""
         with contextlib.suppress(Exception):  # nothing may keep the head from parking
             if self._status is not None:
                 self._status.update(tick)
@@ -213,16 +213,16 @@ class RunObservers:
         return self._recorder.timed(stop) if self._recorder is not None else stop
 
     def open_files(self) -> None:
-        """Create what is written, before anything moves.
+        """Create the output files, before anything moves.
 
         Raises:
-            SetupError: it exists already or cannot be made.
+            SetupError: a file exists already or cannot be created.
         """
         if self._recorder is not None:
             self._recorder.open()
 
     def open(self) -> None:
-        """Open the doors, once the robot has started; the robot goes on without what fails."""
+        """Open the remote controls, once the robot has started; those that fail are left out."""
         with self._spared("the recording"):
             if self._recorder is not None:
                 self._recorder.begin()
@@ -236,7 +236,7 @@ class RunObservers:
 
     @contextlib.contextmanager
     def _spared(self, name: str) -> Iterator[None]:
-        """Go on whatever the block raises, and say so."""
+        """Report what the block raises, and continue."""
         try:
             yield
         except Exception as error:
@@ -248,7 +248,7 @@ class RunObservers:
             self._page.say(text)
 
     def give_up(self) -> None:
-        """Leave no file behind of a robot that could not start."""
+        """Remove the files of a robot that could not start."""
         if self._recorder is not None:
             self._recorder.close("it could not start")
 
@@ -257,11 +257,11 @@ class RunObservers:
         return self._recorder.events() if self._recorder is not None else ()
 
     def unwritten(self) -> Path | None:
-        """Return the file that was asked for and is not whole, None where there is none."""
+        """Return the requested file that is incomplete, None without one."""
         return self._recorder.unwritten if self._recorder is not None else None
 
     def close(self, count: LoopCount) -> None:
-        """Close all, when the torque is off."""
+        """Close everything, when the torque is off."""
         with self._spared("the remote control"):
             if self._live is not None:
                 self._live.close()
@@ -280,7 +280,7 @@ class RunObservers:
         return self._made.robot.menus()
 
     def _in_force(self) -> tuple[str, str, str]:
-        """Return the behaviour, the mode of conversation and the character in force."""
+        """Return the present behaviour, mode of conversation and character."""
         if self._steer is not None:
             return self._steer.shown(), "", ""
         menus = self._made.robot.menus()
@@ -292,13 +292,13 @@ class RunObservers:
             self._publisher.depth = on
 
     def _keep_time(self, tick: Tick) -> None:
-        """Record when a tick came; a tuned loop has slots of its own."""
+        """Record the time of a tick; a tuned loop has slots of its own."""
         if tick.commands and any(isinstance(command, Tune) for command in tick.commands):
             self._timing.retune(self._made.loop.rate_hz)
         self._timing.update(tick.t_s)
 
     def _follow(self, tick: Tick) -> None:
-        """Keep what a click is placed by, and show the rig as it is after tuning."""
+        """Store the percept that places a click, and show the rig after tuning."""
         self._picking.newest = tick
         if self._publisher is None:
             return
@@ -310,7 +310,7 @@ class RunObservers:
 
 
 def only_stops(command: CommandTaker) -> CommandTaker:
-    """Return what takes stop and resume alone; of the rest, it raises ValueError."""
+    """Return a taker of stop and resume only; other commands raise ValueError."""
 
     def take(asked: Command) -> Ticket | None:
         if not isinstance(asked, Stop | Resume):
