@@ -54,7 +54,7 @@ class Order:
 
     Args:
         host: the head.
-        answered: returns the reply once the head has accepted the order, None before.
+        read_reply: returns the reply once the head has accepted the order, None before.
         within_s: time in which the head must accept it, seconds.
     """
 

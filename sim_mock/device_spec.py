@@ -48,7 +48,7 @@ def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
                     "ids must differ (the command `collide` makes a collision)"
                 )
             specs[servo_id] = ServoSpec(servo_id, model, start, firmware)
-    _see_one_kind(specs.values())
+    _require_one_kind(specs.values())
     return tuple(specs.values())
 
 
@@ -69,7 +69,7 @@ def _read(part: str) -> tuple[range, str, int]:
     return range(first, last + 1), model, start
 
 
-def _see_one_kind(specs: Iterable[ServoSpec]) -> None:
+def _require_one_kind(specs: Iterable[ServoSpec]) -> None:
     """Reject servos of different protocols on one line.
 
     Raises:

@@ -112,8 +112,8 @@ class PluginLine:
 
 
 Emulated = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line | PluginLine
-OurLine = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line
-_KINDS: dict[str, type[OurLine]] = {
+ShippedLine = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line
+_KINDS: dict[str, type[ShippedLine]] = {
     one.kind: one for one in (DynamixelLine, FeetechLine, MaestroLine, Pca9685Line)
 }
 

@@ -48,7 +48,7 @@ class HobbyServo:
     """
 
     def __init__(self, spec: HobbySpec | Sequence[float]) -> None:
-        self.spec = checked(HobbySpec(*spec))
+        self.spec = check_spec(HobbySpec(*spec))
         self.place_steps = self._within(self.spec.start_steps)
         self.stuck = False
         self.width_steps = 0
@@ -97,7 +97,7 @@ class HobbyServo:
         return min(max(steps, self.spec.stop_low_steps), self.spec.stop_high_steps)
 
 
-def checked(spec: HobbySpec) -> HobbySpec:
+def check_spec(spec: HobbySpec) -> HobbySpec:
     """Return the spec if such a servo can exist.
 
     Raises:

@@ -69,10 +69,10 @@ class ServoLine:
         """Send the host's bytes now, or at ``now_s``; return the bytes that arrive immediately."""
         faulty = self.device.faults.wire.any
         if faulty:
-            data = self.device.faults.wire.roughened(data, self.device.now_s())
+            data = self.device.faults.wire.add_noise(data, self.device.now_s())
         replies = self.device.exchange(data, baud)
         if faulty:
-            replies = self._disturbed(replies)
+            replies = self._apply_noise(replies)
         if self.wire_time:
             self._on_the_wire(data, replies, baud, self.device.now_s() if now_s is None else now_s)
             return self.arrived()
@@ -83,13 +83,13 @@ class ServoLine:
         self._queue_late(replies, self.device.now_s())
         return self.arrived()
 
-    def _disturbed(self, replies: list[DeviceReply]) -> list[DeviceReply]:
+    def _apply_noise(self, replies: list[DeviceReply]) -> list[DeviceReply]:
         """Apply noise to the answers; put the previous ones first if that fault is active."""
         wire, now_s = self.device.faults.wire, self.device.now_s()
         said = b"".join(piece.data for reply in replies for piece in reply.pieces)
         before, self._said = self._said, said or self._said
         replies = [
-            DeviceReply(r.end, [p._replace(data=wire.roughened(p.data, now_s)) for p in r.pieces])
+            DeviceReply(r.end, [p._replace(data=wire.add_noise(p.data, now_s)) for p in r.pieces])
             for r in replies
         ]
         if said and before and wire.take("repeat", None, now_s) is not None:

@@ -39,7 +39,7 @@ def speeds(positions: list[float]) -> list[float]:
 )
 def test_the_shapes_of_the_manual(cruise, ramp, kind, ms):
     made = PositionProfile(0.0)
-    made.by_velocity(1000.0, cruise, ramp)
+    made.plan_by_velocity(1000.0, cruise, ramp)
     assert made.kind == kind
     positions = path(made)
     assert positions[-1] == 1000.0 and made.v == 0.0
@@ -52,7 +52,7 @@ def test_the_shapes_of_the_manual(cruise, ramp, kind, ms):
 @pytest.mark.parametrize("goal", [7.0, 1000.0, -3000.0])
 def test_a_time_based_profile_takes_its_time_whatever_the_distance(total, ramp, goal):
     made = PositionProfile(0.0)
-    made.by_time(goal, total, ramp)
+    made.plan_by_time(goal, total, ramp)
     assert made.kind == (RECTANGLE if ramp == 0 else TRAPEZOID if ramp < 250 else TRIANGLE)
     positions = path(made)
     assert len(positions) - 1 == total
@@ -69,9 +69,9 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
     first, second, after, cruise, ramp
 ):
     made = PositionProfile(0.0)
-    made.by_velocity(first, cruise, ramp)
+    made.plan_by_velocity(first, cruise, ramp)
     positions = [0.0, *made.ahead(after + 1)]
-    made.by_velocity(second, cruise, ramp)
+    made.plan_by_velocity(second, cruise, ramp)
     positions += path(made, stride=100)[1:]
     assert positions[-1] == second
     v = speeds(positions)
@@ -86,12 +86,12 @@ def test_a_new_goal_starts_from_the_present_speed_and_keeps_to_the_limits(
 def test_in_one_go_or_in_steps_is_the_same(pieces, goal, later):
     once, often = PositionProfile(5.0), PositionProfile(5.0)
     for made in (once, often):
-        made.by_velocity(goal, 2.0, 0.01)
+        made.plan_by_velocity(goal, 2.0, 0.01)
     whole = once.ahead(sum(pieces))
     assert whole == [r for piece in pieces for r in often.ahead(piece)]
     assert (once.r, once.v, once.running) == (often.r, often.v, often.running)
     for made in (once, often):
-        made.by_time(later, 100, 20)
+        made.plan_by_time(later, 100, 20)
     assert once.ahead(50) == often.ahead(50)
 
 

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.smart_servo.controller import DISABLED, Loop
 from gazerig.sim_mock.smart_servo.motor import Shaft
-from gazerig.sim_mock.smart_servo.physics import Physics, checked
+from gazerig.sim_mock.smart_servo.physics import Physics, check_physics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
 DEG = 4096.0 / 360.0
@@ -26,7 +26,7 @@ SMOOTH: dict[str, Any] = {
 
 
 def shaft(model: str = "xl330-m077", loop: Loop = Loop(p=P, d=D), **physics) -> Shaft:  # noqa: B008
-    made = Shaft(MODELS[model], checked(Physics(**physics)), 0.0)
+    made = Shaft(MODELS[model], check_physics(Physics(**physics)), 0.0)
     made.drive(loop)
     return made
 
@@ -34,7 +34,7 @@ def shaft(model: str = "xl330-m077", loop: Loop = Loop(p=P, d=D), **physics) -> 
 def go(made: Shaft, goal: float, ms: int, cruise: float = 0.0, ramp: float = 0.0) -> list[float]:
     """Lead to a goal; give the position after every millisecond."""
     assert isinstance(made.profile, PositionProfile)
-    made.profile.by_velocity(goal, cruise, ramp)
+    made.profile.plan_by_velocity(goal, cruise, ramp)
     made.resume()
     return run(made, ms)
 
@@ -285,7 +285,7 @@ def test_in_one_go_or_in_steps_is_the_same(pieces, gain, goal):
     once, often = (shaft(loop=loop, load_nm=0.02, gravity_nm=0.01) for _ in range(2))
     for made in (once, often):
         assert isinstance(made.profile, PositionProfile)
-        made.profile.by_velocity(goal, 3.0, 0.02)
+        made.profile.plan_by_velocity(goal, 3.0, 0.02)
         made.resume()
     once.run(sum(pieces))
     for piece in pieces:
@@ -307,4 +307,4 @@ def test_in_one_go_or_in_steps_is_the_same(pieces, gain, goal):
 )
 def test_impossible_physics_are_refused_by_name(bad, named):
     with pytest.raises(ValueError, match=named):
-        checked(Physics(**bad))
+        check_physics(Physics(**bad))

@@ -41,7 +41,7 @@ class Both:
         for shaft in (self.spans, self.single):
             assert isinstance(shaft.profile, PositionProfile)
             if shaft.profile.goal != goal:
-                shaft.profile.by_velocity(goal, *self.pace)
+                shaft.profile.plan_by_velocity(goal, *self.pace)
         self.spans.resume()
         self.spans.run(ms)
         self.single.run(ms)
@@ -107,7 +107,7 @@ def test_steps_of_the_short_form_are_those_of_the_long_one(
         made = Shaft(MODELS["xl330-m077"], Physics(load_nm=load_nm), 0.0)
         made.drive(EYE._replace(slew=slew))
         assert isinstance(made.profile, PositionProfile)
-        made.profile.by_velocity(goal, cruise, ramp)
+        made.profile.plan_by_velocity(goal, cruise, ramp)
         made.resume()
         for _ in range(ms):
             made.run(1)

@@ -135,7 +135,7 @@ def test_profiles_go_on_at_once_as_they_do_step_by_step(ramp, skipped):
 
 def _led(ramp):
     made = PositionProfile(0.0)
-    made.by_velocity(5000.0, 1.0, ramp)
+    made.plan_by_velocity(5000.0, 1.0, ramp)
     return made
 
 

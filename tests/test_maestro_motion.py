@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from maestro_world import World, acceleration, speed, target
 
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.maestro.channel import EmulatedChannel, brakes_within
+from gazerig.sim_mock.maestro.channel import EmulatedChannel, largest_braking_step
 
 
 @pytest.fixture
@@ -116,7 +116,7 @@ def test_the_largest_first_step_is_the_largest(way, limit):
         steps = first // limit
         return first * (steps + 1) - limit * steps * (steps + 1) // 2 <= way
 
-    first = brakes_within(way, limit)
+    first = largest_braking_step(way, limit)
     assert stops_within(first)
     assert not stops_within(first + 1)
 

@@ -11,8 +11,8 @@ from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
     expose,
+    ideal_size_px,
     through_lens,
-    widest_px,
 )
 from gazerig.sim_mock.cameras.sensor import Sensor, SensorParams
 
@@ -57,9 +57,9 @@ def test_what_a_lens_bends_lands_where_the_programs_model_of_it_says(k1: float) 
         assert place == pytest.approx(project([direction], lens)[0].tolist(), abs=0.75)
         assert seen.depth_m is not None
         assert (seen.depth_m == 2.0).all()
-    wide = widest_px(lens, SIZE)
+    wide = ideal_size_px(lens, SIZE)
     assert (wide[0] > SIZE[0]) == (k1 < 0.0)
-    assert widest_px(LENS, SIZE) == SIZE
+    assert ideal_size_px(LENS, SIZE) == SIZE
 
 
 def test_an_exposure_is_spread_evenly_about_its_middle() -> None:

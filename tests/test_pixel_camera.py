@@ -31,7 +31,7 @@ from gazerig.sim_mock.cameras.draw_person import (
     draw_thing,
 )
 from gazerig.sim_mock.cameras.draw_room import draw_room
-from gazerig.sim_mock.cameras.optics import smeared
+from gazerig.sim_mock.cameras.optics import blur_along
 from gazerig.sim_mock.cameras.rendered import (
     Exposure,
     PixelCamera,
@@ -110,7 +110,7 @@ def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) ->
     red[:] = (0, 0, 255)
     right, down = np.array((s, -c, 0.0)) * 0.2, np.array((0.0, 0.0, -0.2))
     corner = middle - 0.5 * (right + down)
-    canvas.sheet(TexturedQuad(tuple(corner), tuple(right), tuple(down), red))
+    canvas.draw_quad(TexturedQuad(tuple(corner), tuple(right), tuple(down), red))
     y, x = np.nonzero(canvas.image[:, :, 2] > 127)
     expected = project(canvas.seen(middle), LENS)[0]
     assert (x.mean(), y.mean()) == pytest.approx(tuple(expected), abs=0.6)
@@ -256,8 +256,8 @@ def test_depth_has_the_noise_of_stereo_and_holes_at_edges() -> None:
 def test_a_turn_during_the_exposure_smears_along_the_turn() -> None:
     dot = np.zeros((41, 41, 3), np.uint8)
     dot[20, 20] = 200
-    assert smeared(dot, (0.3, 0.2)) is dot
-    long = smeared(dot, (8.0, 0.0)).astype(float)[:, :, 0]
+    assert blur_along(dot, (0.3, 0.2)) is dot
+    long = blur_along(dot, (8.0, 0.0)).astype(float)[:, :, 0]
     y, x = np.nonzero(long > 5.0)
     assert set(y.tolist()) == {20} and np.ptp(x) in (7, 8)
     assert x.mean() == pytest.approx(20.0) and long.sum() == pytest.approx(200.0, rel=0.1)

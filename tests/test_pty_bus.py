@@ -298,7 +298,7 @@ def test_a_command_needs_a_server():
 def test_a_server_ends_with_its_client_also_while_it_makes_a_world():
     code = (
         "import gazerig.sim_mock.pty.server as server, time\n"
-        "with server._ended_with_client(True):\n"
+        "with server._exit_with_client(True):\n"
         "    print('making', flush=True); time.sleep(600)"
     )
     server = subprocess.Popen(

@@ -66,18 +66,18 @@ class Canvas:
             fixed = np.rint((self._pixels(points)) * (1 << _SHIFT)).astype(np.int32)
             cv2.fillPoly(self.image, [fixed], colour, cv2.LINE_AA, _SHIFT)
 
-    def sheet(self, sheet: TexturedQuad) -> None:
+    def draw_quad(self, quad: TexturedQuad) -> None:
         """Draw a textured rectangle; the fourth channel of a texture is its opacity."""
         right, down, corner = (
             self.R_world_camera.T @ np.array(v) - offset
             for v, offset in (
-                (sheet.right_m, 0.0),
-                (sheet.down_m, 0.0),
-                (sheet.corner_m, self.R_world_camera.T @ self.p_m),
+                (quad.right_m, 0.0),
+                (quad.down_m, 0.0),
+                (quad.corner_m, self.R_world_camera.T @ self.p_m),
             )
         )
         corners = np.array([corner, corner + right, corner + right + down, corner + down])
-        outline = _before_lens(corners)
+        outline = _clip_to_near_plane(corners)
         if len(outline) < 3:
             return
         pixels = self._pixels(outline)
@@ -86,12 +86,12 @@ class Canvas:
             return
         left, top, width, height = window
         moved = self.lens.matrix - np.array([(0, 0, left), (0, 0, top), (0, 0, 0)])
-        rows, columns = sheet.texture.shape[:2]
+        rows, columns = quad.texture.shape[:2]
         scaled = np.stack((right / columns, down / rows, corner), axis=1)
         # The centre of a texture's first pixel is half a pixel within the sheet.
         scaled[:, 2] += 0.5 * (scaled[:, 0] + scaled[:, 1])
         drawn = cv2.warpPerspective(
-            sheet.texture,
+            quad.texture,
             moved @ scaled,
             (width, height),
             flags=cv2.INTER_LINEAR,
@@ -106,7 +106,7 @@ class Canvas:
         if not self._depth:
             return
         normal = np.cross(right, down)
-        self._deepen(window, np.asarray(mask, np.uint8), normal / float(normal @ corner))
+        self._set_depths(window, np.asarray(mask, np.uint8), normal / float(normal @ corner))
 
     def ellipsoid_depth(self, centre_m: Vec3, R_world_body: Floats, half_m: Vec3) -> None:
         """Set the distances of the visible front of an ellipsoid; the colours do not change."""
@@ -170,7 +170,7 @@ class Canvas:
             mixed = part[y, x] * (1.0 - share) + drawn[y, x] * share
             part[y, x] = np.rint(mixed).astype(np.uint8)
 
-    def _deepen(self, window: tuple[int, int, int, int], mask: Bytes, inverse: Floats) -> None:
+    def _set_depths(self, window: tuple[int, int, int, int], mask: Bytes, inverse: Floats) -> None:
         """Set the distances of a plane in which 1 / z = inverse . ray."""
         left, top, width, height = window
         i = self.lens
@@ -182,7 +182,7 @@ class Canvas:
         np.copyto(part, z, where=mask > 127)
 
 
-def _before_lens(corners: Floats) -> Floats:
+def _clip_to_near_plane(corners: Floats) -> Floats:
     """Clip a convex polygon (n, 3) of the camera frame at the nearest distance."""
     kept: list[Floats] = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):

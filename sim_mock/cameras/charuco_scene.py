@@ -45,7 +45,7 @@ class BoardScene:
         params: BoardCameraParams | None = None,
     ) -> None:
         par = params if params is not None else BoardCameraParams()
-        self.mount, self.lens = elsewhere(camera), _lens(camera, par)
+        self.mount, self.lens = offset_mount(camera), _lens(camera, par)
         self.head_rad: Angles3 = (0.0, 0.0, 0.0)
         self._camera = BoardCamera(par, self.lens, board, rng)
         self._where = CameraMount(self.mount)
@@ -68,7 +68,9 @@ class BoardScene:
         if self._hanging:
             pose = self.seen_pose(self.head_rad)
         else:
-            pose = held_pose(self._number - 1, self._camera.params, self.lens, self._camera.board)
+            pose = hand_held_pose(
+                self._number - 1, self._camera.params, self.lens, self._camera.board
+            )
         return Shot(now_s, self._number, self._camera.image(*pose))
 
     def seen_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
@@ -79,7 +81,7 @@ class BoardScene:
         return compose(back, self.R_world_board), rotate_back(R, sub(self.p_world_board_m, p))
 
 
-def elsewhere(camera: CameraParams) -> CameraParams:
+def offset_mount(camera: CameraParams) -> CameraParams:
     """Return a mount a little off the mount of the rig file."""
     x, y, z = (mm + off for mm, off in zip(camera.position_mm, _OFF_MM, strict=True))
     return replace(
@@ -91,7 +93,7 @@ def elsewhere(camera: CameraParams) -> CameraParams:
     )
 
 
-def held_pose(
+def hand_held_pose(
     number: int, params: BoardCameraParams, lens: Intrinsics, board: CharucoBoard
 ) -> tuple[Mat3, Vec3]:
     """Return R_camera_board and p_camera_board_m of the number-th pose in the hand, from 0.

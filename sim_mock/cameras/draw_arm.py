@@ -64,7 +64,7 @@ def _limb(canvas: Canvas, start: Vec3, end: Vec3, width_m: float, colour: Colour
         return
     across *= width_m / length
     corner = np.array(start) - 0.5 * across
-    canvas.sheet(TexturedQuad(_vec(corner), _vec(across), _vec(way), _cloth(colour)))
+    canvas.draw_quad(TexturedQuad(_vec(corner), _vec(across), _vec(way), _cloth(colour)))
 
 
 @lru_cache(maxsize=16)

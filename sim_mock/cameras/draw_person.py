@@ -89,7 +89,7 @@ def draw_body(canvas: Canvas, p_world_face_m: Vec3, looks: PersonColours, number
     aside = np.array((away[1], -away[0], 0.0)) * _TORSO_WIDTH_M
     middle = np.array((x, y, z + _TORSO_TOP_M)) + (*(away * _TORSO_BEHIND_M), 0.0)
     corner = middle - 0.5 * aside
-    canvas.sheet(
+    canvas.draw_quad(
         TexturedQuad(_vec(corner), _vec(aside), (0.0, 0.0, -_TORSO_HEIGHT_M), _trunk(looks, number))
     )
 
@@ -104,7 +104,7 @@ def draw_thing(canvas: Canvas, thing: Thing) -> None:
     aside, up = cos(turned) * aside - sin(turned) * up, cos(turned) * up + sin(turned) * aside
     corner = np.array(thing.p_world_m) - r * aside + r * up
     texture = _ball(thing.kind == "hand", thing.id)
-    canvas.sheet(TexturedQuad(_vec(corner), _vec(2 * r * aside), _vec(-2 * r * up), texture))
+    canvas.draw_quad(TexturedQuad(_vec(corner), _vec(2 * r * aside), _vec(-2 * r * up), texture))
 
 
 def _hull(canvas: Canvas, points_world_m: Floats, colour: Colour) -> None:

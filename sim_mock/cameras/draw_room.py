@@ -23,8 +23,8 @@ _PATCHES_M, _CONTRAST = (0.07, 0.2, 0.6), (26.0, 30.0, 24.0)
 
 def draw_room(canvas: Canvas, seed: int = 0) -> None:
     """Draw the visible walls, floor and ceiling."""
-    for sheet in _room(seed):
-        canvas.sheet(sheet)
+    for quad in _room(seed):
+        canvas.draw_quad(quad)
 
 
 @lru_cache(maxsize=4)

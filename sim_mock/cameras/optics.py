@@ -102,17 +102,17 @@ def expose(
         depth: with distances, at the middle of each row's exposure.
     """
     bands = [
-        _averaged(view, params, t_s, lens, size_px, motion, late_s, rows, depth)
+        _average_exposure(view, params, t_s, lens, size_px, motion, late_s, rows, depth)
         for late_s, rows in _bands(params, size_px[1])
     ]
     image = np.concatenate([band.image for band in bands]) if len(bands) > 1 else bands[0].image
     seen = [band.depth_m for band in bands if band.depth_m is not None]
     if params.sub_exposures == 1:
-        image = smeared(image, motion.smear_px(params.exposure_ms / 1e3, lens))
-    return Rendered(_blurred(image, params.blur_px), np.concatenate(seen) if seen else None)
+        image = blur_along(image, motion.smear_px(params.exposure_ms / 1e3, lens))
+    return Rendered(_blur(image, params.blur_px), np.concatenate(seen) if seen else None)
 
 
-def _blurred(image: ImageArray, blur_px: float) -> ImageArray:
+def _blur(image: ImageArray, blur_px: float) -> ImageArray:
     """Blur a frame as a slightly soft lens does."""
     if blur_px <= 0.0:
         return image
@@ -133,7 +133,7 @@ def _bands(params: OpticsParams, height: int) -> Iterator[tuple[float, tuple[int
             yield middle * params.read_out_ms / 1e3, (top, bottom)
 
 
-def _averaged(
+def _average_exposure(
     view: SceneView,
     params: OpticsParams,
     t_s: float,
@@ -192,7 +192,7 @@ def through_lens(
     return Rendered(image, metres.astype(np.float32, copy=False))
 
 
-def widest_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
+def ideal_size_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
     """Return width and height of the ideal picture that a picture through a lens needs."""
     return _undistorting(lens, size_px)[1] if lens.distorts else size_px
 
@@ -219,7 +219,7 @@ def _undistorting(
     return ideal, ideal_px, places[..., 0].copy(), places[..., 1].copy()
 
 
-def smeared(image: ImageArray, way_px: tuple[float, float]) -> ImageArray:
+def blur_along(image: ImageArray, way_px: tuple[float, float]) -> ImageArray:
     """Blur a frame evenly along a displacement (x, y) in pixels."""
     length = hypot(*way_px)
     if length < 1.0:

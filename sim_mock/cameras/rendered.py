@@ -140,7 +140,7 @@ class PixelCamera:
             # A late call skips the frames that it missed, as a real camera's buffer does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
-            self._on_the_way.append(self._looked_at(self._expose(now_s, R, p)))
+            self._on_the_way.append(self._detect(self._expose(now_s, R, p)))
         self._before = now_s, R, p
         late_s = self._params.latency_ms / 1e3
         while self._on_the_way and now_s >= self._on_the_way[0].captured_s + late_s - 1e-9:
@@ -180,7 +180,7 @@ class PixelCamera:
         """Stop, and free the view."""
         self._view.close()
 
-    def _looked_at(self, shot: Exposure) -> Detections:
+    def _detect(self, shot: Exposure) -> Detections:
         """Return the detections in a frame."""
         blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
         height, width = shot.image.shape[:2]
@@ -246,19 +246,19 @@ def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0)
     things = [thing._replace(id=_FIRST_THING_ID + thing.id) for thing in scene.things(scene_s)]
     for number, person in enumerate(people):
         away = norm(sub(person.p_world_face_m, eye))
-        drawn.append((away, _later(draw_person, canvas, person, number)))
+        drawn.append((away, _defer(draw_person, canvas, person, number)))
         if person.hand is not None:
             things.append(Thing(number, "hand", person.hand, _HAND_RADIUS_M, person=number))
     for thing in things:
         away = norm(sub(thing.p_world_m, eye))
         if thing.person is not None:
-            draw = _later(draw_arm_of, canvas, people[thing.person], thing.person, thing.p_world_m)
+            draw = _defer(draw_arm_of, canvas, people[thing.person], thing.person, thing.p_world_m)
             drawn.append((away + _BEHIND_HAND_M, draw))
-        drawn.append((away, _later(draw_thing, canvas, thing)))
+        drawn.append((away, _defer(draw_thing, canvas, thing)))
     for _, draw in sorted(drawn, key=lambda item: -item[0]):
         draw()
 
 
-def _later(draw: Callable[..., None], *what: Any) -> Callable[[], None]:
+def _defer(draw: Callable[..., None], *what: Any) -> Callable[[], None]:
     """Return a deferred call."""
     return lambda: draw(*what)

@@ -54,7 +54,7 @@ def draw_picture(scene: Scene, seen_by: PinholeView) -> ImageArray:
     return np.asarray(cv2.GaussianBlur(canvas.image, (3, 3), 0.6), np.uint8)
 
 
-class _Placed(NamedTuple):
+class _PlacedShape(NamedTuple):
     """A painted shape with its pose in the world."""
 
     shape: Painted
@@ -64,12 +64,14 @@ class _Placed(NamedTuple):
     away_m: float
 
 
-def _placed(shape: Painted, R: Floats, p_m: Vec3, eye_m: Vec3, scale: float = 1.0) -> _Placed:
+def _place_shape(
+    shape: Painted, R: Floats, p_m: Vec3, eye_m: Vec3, scale: float = 1.0
+) -> _PlacedShape:
     away = float(np.linalg.norm(np.subtract(p_m, eye_m)))
-    return _Placed(shape, R, np.array(p_m), scale, away)
+    return _PlacedShape(shape, R, np.array(p_m), scale, away)
 
 
-def _person(person: ScenePerson, number: int, eye_m: Vec3) -> list[_Placed]:
+def _person(person: ScenePerson, number: int, eye_m: Vec3) -> list[_PlacedShape]:
     """Return a person's head and chest, and the arm of a raised hand."""
     face = person.p_world_face_m
     yaw, pitch = person.face_yaw_pitch_rad
@@ -77,11 +79,11 @@ def _person(person: ScenePerson, number: int, eye_m: Vec3) -> list[_Placed]:
     away = np.subtract(face, eye_m)
     R_chest = np.array(rotation((atan2(-away[1], -away[0]), 0.0, 0.0)))
     solid, features = head_parts(number, _FINENESS)
-    skull = _placed(solid, R_head, face, eye_m)
+    skull = _place_shape(solid, R_head, face, eye_m)
     solids = [
         skull,
         # The chest is drawn before the head in any case: the neck is in its collar.
-        _placed(torso(number, _CHEST_M), R_chest, face, eye_m)._replace(
+        _place_shape(torso(number, _CHEST_M), R_chest, face, eye_m)._replace(
             away_m=float(np.linalg.norm(away)) + 0.01
         ),
     ]
@@ -92,7 +94,7 @@ def _person(person: ScenePerson, number: int, eye_m: Vec3) -> list[_Placed]:
     return solids
 
 
-def _arm(person: ScenePerson, number: int, p_hand_m: Vec3, eye_m: Vec3) -> list[_Placed]:
+def _arm(person: ScenePerson, number: int, p_hand_m: Vec3, eye_m: Vec3) -> list[_PlacedShape]:
     shoulder = shoulder_m(person.p_world_face_m, p_hand_m, eye_m)
     elbow = elbow_m(shoulder, p_hand_m)
     sleeve, bare = _limb(number, True), _limb(number, False)
@@ -104,11 +106,11 @@ def _arm(person: ScenePerson, number: int, p_hand_m: Vec3, eye_m: Vec3) -> list[
     ]
 
 
-def _hand(p_m: Vec3, number: int, radius_m: float, eye_m: Vec3) -> _Placed:
+def _hand(p_m: Vec3, number: int, radius_m: float, eye_m: Vec3) -> _PlacedShape:
     """Return an open hand whose palm faces the camera."""
     to_eye = np.subtract(eye_m, p_m)
     R = np.array(rotation((atan2(to_eye[1], to_eye[0]), 0.0, 0.0)))
-    return _placed(hand(number), R, p_m, eye_m, radius_m)
+    return _place_shape(hand(number), R, p_m, eye_m, radius_m)
 
 
 @lru_cache(maxsize=8)
@@ -122,7 +124,7 @@ def _limb(number: int, sleeve: bool) -> Painted:
     return painted(mesh, look.shirt if sleeve else look.skin)
 
 
-def _between(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _Placed:
+def _between(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _PlacedShape:
     """Place a link from one point to another."""
     way = np.subtract(end, start)
     length = max(float(np.linalg.norm(way)), 1e-6)
@@ -131,11 +133,11 @@ def _between(link: Painted, start: Vec3, end: Vec3, eye_m: Vec3) -> _Placed:
     aside /= np.linalg.norm(aside)
     R = np.stack((aside, np.cross(up, aside), up * length), axis=1)
     middle = 0.5 * (np.array(start) + np.array(end))
-    placed = _placed(link, R, start, eye_m)
+    placed = _place_shape(link, R, start, eye_m)
     return placed._replace(away_m=float(np.linalg.norm(middle - np.array(eye_m))))
 
 
-def _draw_solid(canvas: Canvas, solid: _Placed) -> None:
+def _draw_solid(canvas: Canvas, solid: _PlacedShape) -> None:
     """Draw a shape face by face, the farthest first, with diffuse shading."""
     mesh = solid.shape.mesh
     seen = canvas.seen(solid.scale * mesh.vertices @ solid.R.T + solid.p_m)
@@ -154,11 +156,11 @@ def _draw_solid(canvas: Canvas, solid: _Placed) -> None:
     facing = facing[np.argsort(-depth)]
     fixed = np.rint(corners[facing] * (1 << _SHIFT)).astype(np.int32)
     image, fill = canvas.image, cv2.fillConvexPoly
-    for triangle, colour in zip(fixed, _lit(solid)[facing].tolist(), strict=True):
+    for triangle, colour in zip(fixed, _shade(solid)[facing].tolist(), strict=True):
         fill(image, triangle, colour, cv2.LINE_8, _SHIFT)
 
 
-def _lit(solid: _Placed) -> Floats:
+def _shade(solid: _PlacedShape) -> Floats:
     """Return the colours of a shape's faces under the room's light, BGR."""
     mesh, colours, out = solid.shape
     assert out is not None

@@ -75,7 +75,7 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         rows = self.instructions.sync_rows
         return super()._group_instructions() | {
             FAST_SYNC_READ: lambda params: self._fast(rows(params)),
-            BULK_READ: lambda params: self._plain(bulk_rows(params)),
+            BULK_READ: lambda params: self._answer_plain(bulk_rows(params)),
             FAST_BULK_READ: lambda params: self._fast(bulk_rows(params)),
             BULK_WRITE: lambda params: self._write_all(bulk_writes(params)),
         }

@@ -138,9 +138,9 @@ class DynamixelDrive(Drive):
         profile, to = shaft.profile, float(self._side * (goal - self._shift))
         if isinstance(profile, PositionProfile) and to != profile.goal:
             if self._by_time:
-                profile.by_time(to, self._speed, self._ramp)
+                profile.plan_by_time(to, self._speed, self._ramp)
             else:
-                profile.by_velocity(to, self._speed * _SPEED_UNIT, self._ramp * _RAMP_UNIT)
+                profile.plan_by_velocity(to, self._speed * _SPEED_UNIT, self._ramp * _RAMP_UNIT)
             shaft.resume()
 
     def set_goal_velocity(self, speed: int) -> None:
@@ -174,7 +174,7 @@ class DynamixelDrive(Drive):
 
     def _start(self) -> None:
         """Start the profile at the shaft's position and follow the goal register."""
-        self._lead_from_here(self.mode == VELOCITY)
+        self._start_profile(self.mode == VELOCITY)
         self._wrap_by_itself()
         if self._quirks.goal_at_torque_on:
             self._set_goal_here()

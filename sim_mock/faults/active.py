@@ -72,7 +72,7 @@ class ActiveFaults:
 
     def listed(self, now_s: float) -> tuple[LineFault, ...]:
         """Return the active faults, oldest first."""
-        self._forget(now_s)
+        self._drop_expired(now_s)
         return tuple(self._faults)
 
     def on(self, kind: str, now_s: float) -> bool:
@@ -90,16 +90,16 @@ class ActiveFaults:
                 if fault.left is not None:
                     fault.left -= 1
                 return fault
-        self._forget(now_s)
+        self._drop_expired(now_s)
         return None
 
-    def _forget(self, now_s: float) -> None:
+    def _drop_expired(self, now_s: float) -> None:
         self._faults = [fault for fault in self._faults if fault.lasts(now_s)]
         self.any = bool(self._faults)
 
     # --- electrical noise, in both directions
 
-    def roughened(self, data: bytes, now_s: float) -> bytes:
+    def add_noise(self, data: bytes, now_s: float) -> bytes:
         """Return bytes after a noisy line: some changed, lost or inserted.
 
         The fault's number is the percentage of bytes that are hit. Of four such bytes two are
@@ -127,12 +127,12 @@ class ActiveFaults:
 
     def spoil_answers(self, answers: Sequence[Answer], fast: bool, now_s: float) -> list[Answer]:
         """Change answers before their checksums are computed: ids, errors, lengths and order."""
-        said = [self._misspoken(answer, fast, now_s) for answer in answers]
+        said = [self._spoil_answer(answer, fast, now_s) for answer in answers]
         if len(said) > 1 and self.take("reorder", None, now_s):
             said.reverse()
         return said
 
-    def _misspoken(self, answer: Answer, fast: bool, now_s: float) -> Answer:
+    def _spoil_answer(self, answer: Answer, fast: bool, now_s: float) -> Answer:
         servo_id, params = answer.servo_id, answer.params
         refused = self.take("refuse", servo_id, now_s)
         if refused is not None:
@@ -155,8 +155,8 @@ class ActiveFaults:
         out: list[Piece] = []
         repeat = False
         for piece in pieces:
-            hurt, cut = self._damaged(piece, now_s)
-            out += self._late(hurt, now_s)
+            hurt, cut = self._damage(piece, now_s)
+            out += self._delay(hurt, now_s)
             again = self.take("duplicate", piece.servo_id, now_s) is not None
             if again and not fast:
                 out.append(Piece(NO_DEVICE, hurt.data))
@@ -165,9 +165,9 @@ class ActiveFaults:
                 break
         if fast and repeat:
             out += [Piece(NO_DEVICE, piece.data) for piece in out]
-        return self._amid_noise(out, pieces, now_s)
+        return self._surround_with_noise(out, pieces, now_s)
 
-    def _damaged(self, piece: Piece, now_s: float) -> tuple[Piece, bool]:
+    def _damage(self, piece: Piece, now_s: float) -> tuple[Piece, bool]:
         """Return a piece as it arrives and whether its end is missing."""
         servo_id, data = piece.servo_id, bytearray(piece.data)
         flip = self.take("corrupt", servo_id, now_s)
@@ -183,7 +183,7 @@ class ActiveFaults:
             del data[int(cut.numbers[0]) :]
         return piece._replace(data=bytes(data)), cut is not None
 
-    def _late(self, piece: Piece, now_s: float) -> list[Piece]:
+    def _delay(self, piece: Piece, now_s: float) -> list[Piece]:
         """Return a piece after a delay, or in two halves with a gap."""
         late = self.take("delay", piece.servo_id, now_s)
         if late is not None:
@@ -195,7 +195,9 @@ class ActiveFaults:
         rest = Piece(piece.servo_id, piece.data[half:], 0.0, gap.numbers[0] / 1000.0)
         return [piece._replace(data=piece.data[:half]), rest]
 
-    def _amid_noise(self, out: list[Piece], pieces: Sequence[Piece], now_s: float) -> list[Piece]:
+    def _surround_with_noise(
+        self, out: list[Piece], pieces: Sequence[Piece], now_s: float
+    ) -> list[Piece]:
         """Put noise, pieces of headers and a babbling node around received pieces."""
         if not pieces:
             return out

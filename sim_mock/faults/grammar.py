@@ -56,7 +56,7 @@ class CommandTable(NamedTuple):
                 f"{arguments[0]!r} is not a command; commands: {', '.join(self.verbs)}, help"
             )
         try:
-            rest, lasting = _lasting(verb, rest)
+            rest, lasting = _split_duration(verb, rest)
             return verb.do(faults, *_arguments(verb, rest), **lasting)
         except (KeyError, ValueError) as error:
             raise ValueError(f"{name}: {error.args[0]}; usage: {self.usage(name)}") from None
@@ -80,7 +80,7 @@ class CommandTable(NamedTuple):
         return "\n".join(lines)
 
 
-def _lasting(verb: Verb, arguments: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+def _split_duration(verb: Verb, arguments: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """Split ``count N`` and ``for S`` off the end; return the other words and these values."""
     left, found = list(arguments), dict[str, Any]()
     while len(left) >= 2 and left[-2] in BOTH:

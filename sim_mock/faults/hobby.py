@@ -13,7 +13,7 @@ from gazerig.sim_mock.faults.grammar import (
     whole,
 )
 from gazerig.sim_mock.faults.line import FaultTarget, LineFaults
-from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, lost
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, loss_verb
 from gazerig.sim_mock.hobby_servo import HobbyServo
 
 
@@ -136,8 +136,8 @@ def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str
     label = Argument(one.shown, or_all(one.read))
     return {
         **line_verbs(one),
-        "lose-writes": lost("lose_writes", writes),
-        "lose-bytes": lost("lose_bytes", "bytes of the host"),
+        "lose-writes": loss_verb("lose_writes", writes),
+        "lose-bytes": loss_verb("lose_bytes", "bytes of the host"),
         **adapter_verbs(),
         **own,
         "brown-out": Verb(HobbyFaults.brown_out, (),

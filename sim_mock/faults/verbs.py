@@ -43,7 +43,7 @@ def answers(kind: str, text: str) -> Do:
     return do
 
 
-def everything(kind: str, text: str) -> Do:
+def line_command(kind: str, text: str) -> Do:
     """Return a command that starts a fault of the whole line; ``text``: its reply."""
 
     def do(
@@ -57,7 +57,7 @@ def everything(kind: str, text: str) -> Do:
     return do
 
 
-def times(kind: str, text: str) -> Do:
+def counted_command(kind: str, text: str) -> Do:
     """Return a command that affects the next N, or all."""
 
     def do(faults: LineFaults, count: int | None = None, seconds: float | None = None) -> str:
@@ -66,7 +66,7 @@ def times(kind: str, text: str) -> Do:
     return do
 
 
-def switched(kind: str, text: str) -> Do:
+def switch_command(kind: str, text: str) -> Do:
     """Return a command that switches a fault of the whole line on or off."""
 
     def do(faults: LineFaults, on: bool = True, seconds: float | None = None) -> str:
@@ -115,10 +115,10 @@ def line_verbs(one: Argument) -> dict[str, Verb]:
         "noise": Verb(_noise, (Argument("before|after", one_of("before", "after")),
                                Argument("HEX|random", hex_bytes, True)),
                       "bytes around every answer", BOTH),
-        "static": Verb(everything("static", "noise hits {:g} % of all bytes, both directions"),
+        "static": Verb(line_command("static", "noise hits {:g} % of all bytes, both directions"),
                        (Argument("PERCENT", number(0.0, 100.0, "a percentage")),),
                        "noise hits this share of all bytes, both directions", TIME),
-        "repeat": Verb(everything("repeat", "the previous answers arrive again before the next"),
+        "repeat": Verb(line_command("repeat", "the previous answers arrive again before the next"),
                        (), "the last answers arrive again first", BOTH),
     }
 
@@ -130,7 +130,7 @@ def packet_verbs(one: Argument) -> dict[str, Verb]:
         "fragment": Verb(answers("fragment", "a loose header before answers of {label}"),
                          (target._replace(optional=True),),
                          "a loose header before the real one", BOTH),
-        "reorder": Verb(everything("reorder", "groups answer in reverse order"), (),
+        "reorder": Verb(line_command("reorder", "groups answer in reverse order"), (),
                         "groups answer in reverse order", BOTH),
         "wrong-id": Verb(answers("wrong_id", "{label} answers as {}"),
                          (target, Argument("AS", whole(0, 255, "an id"))), "answer under another id", BOTH),
@@ -141,27 +141,27 @@ def packet_verbs(one: Argument) -> dict[str, Verb]:
         "refuse": Verb(answers("refuse", "{label} answers with error {} and no data"),
                        (target, Argument("NUMBER", whole(0, 255, "an error number"))),
                        "answer with an error number and no data", BOTH),
-        "lose-writes": lost("lose_writes", "group writes"),
+        "lose-writes": loss_verb("lose_writes", "group writes"),
     }
 
 
-def lost(kind: str, what: str) -> Verb:
+def loss_verb(kind: str, what: str) -> Verb:
     """Return the command that loses data to the device, which no answer shows."""
-    return Verb(times(kind, f"{what} are lost"), (_TIMES,), f"the next N {what} are lost", TIME)
+    return Verb(counted_command(kind, f"{what} are lost"), (_TIMES,), f"the next N {what} are lost", TIME)
 
 
 def adapter_verbs() -> dict[str, Verb]:
     """Return the commands of the line and adapter as a whole."""
     return {
-        "echo": Verb(switched("echo", "the line echoes the host"), (SWITCH,),
+        "echo": Verb(switch_command("echo", "the line echoes the host"), (SWITCH,),
                      "the host hears its own bytes", TIME),
-        "babble": Verb(switched("babble", "a broken node babbles"), (SWITCH,),
+        "babble": Verb(switch_command("babble", "a broken node babbles"), (SWITCH,),
                        "a broken node sends headers and noise all the time", TIME),
-        "unplug": Verb(switched("unplug", "unplugged"), (), "pull the adapter out", TIME),
+        "unplug": Verb(switch_command("unplug", "unplugged"), (), "pull the adapter out", TIME),
         "plug": Verb(_plug, (), "reconnect the adapter under its name"),
-        "deny": Verb(switched("deny", "opening is forbidden"), (SWITCH,),
+        "deny": Verb(switch_command("deny", "opening is forbidden"), (SWITCH,),
                      "opening the port is forbidden", TIME),
-        "block": Verb(switched("block", "the adapter accepts no bytes"), (SWITCH,),
+        "block": Verb(switch_command("block", "the adapter accepts no bytes"), (SWITCH,),
                       "the adapter accepts no bytes", TIME),
     }
 

@@ -100,8 +100,8 @@ class FeetechDrive(Drive):
     def position_steps(self) -> float:
         """Return the true position in the registers' unit, with fractions."""
         at = self.shaft.x + self._shift
-        goes_on = self.counts_turns or self.torque or self._last is not None
-        return (at if goes_on else at % TURN) * self._scale
+        counts_on = self.counts_turns or self.torque or self._last is not None
+        return (at if counts_on else at % TURN) * self._scale
 
     def motion_words(self, now_ms: int) -> MotionWords:
         """Return the register words of position, speed, load, current, target, moving."""
@@ -114,7 +114,7 @@ class FeetechDrive(Drive):
         turning = shaft.v * scale * 1000.0 / self._speed_unit
         speed, current = round(turning), round(shaft.effort * self._current_full)
         if self.torque and not turning:
-            more, speed = self._flicker(now_ms)
+            more, speed = self._noise_now(now_ms)
             current += more
         led = self.torque and isinstance(profile, PositionProfile)
         goal = round((profile.goal + self._shift) * scale) if led else self._goal_register()
@@ -212,7 +212,7 @@ class FeetechDrive(Drive):
         """Start a profile at the shaft's position."""
         self.followed = None
         self._goals_followed = ()
-        self._lead_from_here(self.mode == WHEEL)
+        self._start_profile(self.mode == WHEEL)
         self.apply_gains()
         if self.mode != STEP:
             self.follow()
@@ -257,9 +257,9 @@ class FeetechDrive(Drive):
             return
         if time_ms and self._timed and self.mode == SERVO:
             # No faster than possible: the next path begins at the speed of this one.
-            profile.by_time(to, max(time_ms, abs(to - profile.r) / self._top), 0.0)
+            profile.plan_by_time(to, max(time_ms, abs(to - profile.r) / self._top), 0.0)
         else:
-            profile.by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
+            profile.plan_by_velocity(to, min(cruise or self._top, self._top), ramp * RAMP_UNIT)
         self.shaft.resume()
 
     # --- origin

@@ -34,7 +34,7 @@ from gazerig.sim_mock.maestro.commands import (
     word,
 )
 from gazerig.sim_mock.maestro.faults import COMMANDS, MaestroFaults
-from gazerig.sim_mock.maestro.settings import LIMITS, Settings, chosen, width_steps
+from gazerig.sim_mock.maestro.settings import LIMITS, Settings, change_setting, width_steps
 from gazerig.sim_mock.replies import Piece
 
 SIZES = (6, 12, 18, 24)
@@ -106,7 +106,7 @@ class EmulatedMaestro:
             self.body.limit(*((steps, None) if case == "min-us" else (None, steps)))
             return
         before = self.body.settings.mode
-        self._set_up(chosen(self.body.settings, case, value))
+        self._set_up(change_setting(self.body.settings, case, value))
         if before != self.body.settings.mode:
             self._forget()
         self.body.feed()
@@ -163,7 +163,7 @@ class EmulatedMaestro:
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
         """Process received bytes; return the reply to each command in them."""
         self.body.advance()
-        came = self._what_comes(data, client_baud)
+        came = self._filter_input(data, client_baud)
         missing, replies = len(data) - len(came), []
         for command in self._parser.feed(came):
             pieces = self._execute(command)
@@ -171,18 +171,18 @@ class EmulatedMaestro:
                 replies.append(DeviceReply(missing + command.end, pieces))
         return self.faults.around(replies, data) if self._wire.any else replies
 
-    def _what_comes(self, data: bytes, client_baud: int | None) -> bytes:
+    def _filter_input(self, data: bytes, client_baud: int | None) -> bytes:
         """Return the bytes of a client that the board understands."""
         if not self.body.awake or self.body.settings.mode == "mute":
             return b""
         if self.check_baud and client_baud is not None:
-            data = self._through_pins(data, client_baud)
+            data = self._filter_pins(data, client_baud)
         now_s = self.now_s()
         if not self._wire.any or not self._wire.on("lose_bytes", now_s):
             return data
         return bytes(b for b in data if self._wire.take("lose_bytes", None, now_s) is None)
 
-    def _through_pins(self, data: bytes, client_baud: int) -> bytes:
+    def _filter_pins(self, data: bytes, client_baud: int) -> bytes:
         """Return the bytes understood at the serial pins: none before AA in uart-detect."""
         if self.body.settings.mode == "uart-detect" and self._detected_baud is None:
             sign = data.find(POLOLU)
@@ -201,20 +201,20 @@ class EmulatedMaestro:
         if command.trouble:
             self.body.fail(command.trouble)
             return []
-        if self._wire.any and command.code not in ASKING and self._lost():
+        if self._wire.any and command.code not in ASKING and self._is_lost():
             return []
         answer = self._do[command.code](command.data)
         self.body.feed()
         if answer is None:
             return []
         asked = command.data[0] if command.code == GET_POSITION else NO_DEVICE
-        return self._sent(Piece(asked, answer))
+        return self._apply_faults(Piece(asked, answer))
 
-    def _lost(self) -> bool:
+    def _is_lost(self) -> bool:
         """Return whether a command without an answer is lost."""
         return self._wire.take("lose_writes", None, self.now_s()) is not None
 
-    def _sent(self, piece: Piece) -> list[Piece]:
+    def _apply_faults(self, piece: Piece) -> list[Piece]:
         """Return an answer as it arrives; faults of one channel affect only its position."""
         if not self._wire.any:
             return [piece]

@@ -42,7 +42,7 @@ class MaestroBody:
         self.errors = 0
         self.servo_power = True
         self.script_running = False
-        self.swung: int | None = None
+        self.script_channel: int | None = None
         self._period = self._fed = self._awake_from = whole_periods(now_s())
         self._timed_out = False
         self.send_all(settings.startup)
@@ -105,23 +105,23 @@ class MaestroBody:
     def run_script(self, channel: int | None = None) -> None:
         """Start an endless script that swings a channel from end to end, or does nothing."""
         self.advance()
-        self.script_running, self.swung = True, channel
+        self.script_running, self.script_channel = True, channel
 
     def stop_script(self) -> None:
         """End the script."""
-        self.script_running, self.swung = False, None
+        self.script_running, self.script_channel = False, None
 
     # --- time
 
     def advance(self) -> None:
         """Advance to the present time."""
         now = whole_periods(self.now_s())
-        while now - self._period > PAUSE and self.swung is not None:
-            self._live_on(self._period + 2 * SWING)
+        while now - self._period > PAUSE and self.script_channel is not None:
+            self._run_periods(self._period + 2 * SWING)
             self._skip_swings(now)
-        self._live_on(now)
+        self._run_periods(now)
 
-    def _live_on(self, until: int) -> None:
+    def _run_periods(self, until: int) -> None:
         while self._period < until:
             self._period = self._next_period(until)
             self._pass()
@@ -130,12 +130,12 @@ class MaestroBody:
         """Skip whole swings of a script, because each one ends in its initial state."""
         due = self._due()
         until = now if due is None else min(now, due - 1)
-        if self.awake and until > self._period and self._at_rest(but=self.swung):
+        if self.awake and until > self._period and self._at_rest(but=self.script_channel):
             self._period += (until - self._period) // (2 * SWING) * (2 * SWING)
 
     def _next_period(self, now: int) -> int:
         """Return the next period with an event."""
-        if self.swung is not None or not self.awake or not self._at_rest():
+        if self.script_channel is not None or not self.awake or not self._at_rest():
             return self._period + 1
         due = self._due()
         return now if due is None else max(self._period + 1, min(now, due))
@@ -167,8 +167,8 @@ class MaestroBody:
         if due is not None and self.awake and self._period >= due:
             self._timed_out = True
             self.fail("timeout")
-        if self.swung is not None and self._period % SWING == 0:
-            channel = self.channels[self.swung]
+        if self.script_channel is not None and self._period % SWING == 0:
+            channel = self.channels[self.script_channel]
             channel.aim(channel.low if self._period // SWING % 2 else channel.high)
         for servo, channel in zip(self.servos, self.channels, strict=True):
             channel.step()

@@ -98,14 +98,14 @@ class EmulatedChannel:
         most8 = self.speed * EIGHTHS or way8
         if not self.acceleration:
             return min(most8, way8)
-        wanted8 = min(most8, brakes_within(way8, self.acceleration))
+        wanted8 = min(most8, largest_braking_step(way8, self.acceleration))
         return min(max(wanted8, speed8 - self.acceleration), speed8 + self.acceleration)
 
     def _arrive(self) -> None:
         self._at8, self._velocity8 = self.target * EIGHTHS, 0
 
 
-def brakes_within(way: int, acceleration: int) -> int:
+def largest_braking_step(way: int, acceleration: int) -> int:
     """Return the largest first step of a motion that comes to rest within a distance.
 
     Each further step is smaller by the acceleration; the last one is the smallest.

@@ -101,7 +101,7 @@ class CommandParser:
         if not packet:
             return (_PROTOCOL,)
         packet.append(byte)
-        return self._go_on() if len(packet) >= self._until else ()
+        return self._check_complete() if len(packet) >= self._until else ()
 
     def _begin(self, byte: int) -> tuple[ParsedCommand, ...]:
         """Start a command; an unfinished one is an error."""
@@ -112,13 +112,13 @@ class CommandParser:
         if byte in (POLOLU, MINI_SSC):
             self._until = 2 if byte == POLOLU else 3
             return said
-        return said + self._go_on()
+        return said + self._check_complete()
 
-    def _go_on(self) -> tuple[ParsedCommand, ...]:
+    def _check_complete(self) -> tuple[ParsedCommand, ...]:
         """Check whether the command is complete, or when to check again."""
         packet, head = self._packet, 1
         if packet[0] == MINI_SSC:
-            return self._finished(MINI_SSC, head)
+            return self._complete(MINI_SSC, head)
         if packet[0] == POLOLU:
             head = self._until = 3
             if packet[1] != self.device:
@@ -135,9 +135,9 @@ class CommandParser:
         if code == SET_TARGETS:
             # Its first byte gives its length.
             self._until = self._until + 2 * packet[head] if len(packet) > head else head + 1
-        return self._finished(code, head) if len(packet) >= self._until else ()
+        return self._complete(code, head) if len(packet) >= self._until else ()
 
-    def _finished(self, code: int, head: int) -> tuple[ParsedCommand, ...]:
+    def _complete(self, code: int, head: int) -> tuple[ParsedCommand, ...]:
         packet = bytes(self._packet)
         self._packet.clear()
         if self.crc and code != MINI_SSC:

@@ -71,7 +71,7 @@ def cases() -> dict[str, str]:
     }
 
 
-def chosen(settings: Settings, case: str, value: str) -> Settings:
+def change_setting(settings: Settings, case: str, value: str) -> Settings:
     """Return the settings with a new value for one case.
 
     Raises:

@@ -134,18 +134,18 @@ class Bridge:
                 known = text[at + 1] == STATUS_REGISTER and text[at + 2] == STOP
                 said = [Piece(NO_DEVICE, bytes((self._status,)))] if known else []
                 at += 3
-                yield at - kept, self._sent(said)
+                yield at - kept, self._apply_faults(said)
             elif text[at] == START:
                 found = _transfer(text, at)
                 if found is None:
                     break
                 at, parts = found
-                yield at - kept, self._sent(self._carry_out(parts))
+                yield at - kept, self._apply_faults(self._execute_transfer(parts))
             else:
                 at += 1  # not a command: skip the byte
         self._unread = text[at:]
 
-    def _sent(self, pieces: list[Piece]) -> list[Piece]:
+    def _apply_faults(self, pieces: list[Piece]) -> list[Piece]:
         """Return an answer as it arrives; faults of one channel affect only its registers."""
         if not self._wire.any or not pieces:
             return pieces
@@ -153,7 +153,7 @@ class Bridge:
         left = [p for p in pieces if self._wire.take("lose", p.servo_id, now_s) is None]
         return self._wire.spoil_pieces(left, False, now_s)
 
-    def _carry_out(self, parts: Sequence[_Part]) -> list[Piece]:
+    def _execute_transfer(self, parts: Sequence[_Part]) -> list[Piece]:
         """Execute one transfer; the first part that fails ends it."""
         self._status = OK
         now_s, said = self.now_s(), []
@@ -176,14 +176,14 @@ class Bridge:
                     self._pointers[part.address] = part.data[0] if part.data else 0
                 else:
                     data = self.body.read(part.address, part.length)
-                    said.append(Piece(self._whose(part), data))
+                    said.append(Piece(self._channel_of(part), data))
         except NotAcknowledged:
             self._status = NO_ACKNOWLEDGE
         except BusStuck:
             self._status = TIMED_OUT
         return said
 
-    def _whose(self, part: _Part) -> int:
+    def _channel_of(self, part: _Part) -> int:
         """Return the channel whose registers are read, NO_DEVICE unless it is exactly one."""
         register = self._pointers.get(part.address, 0) - LED0
         if part.length != 4 or register % 4 or not 0 <= register < 4 * CHANNELS:

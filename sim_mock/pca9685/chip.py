@@ -51,7 +51,7 @@ class Chip:
         self._registers[PRESCALE] = 0x1E
         for channel in range(CHANNELS):
             self._registers[LED0 + 4 * channel + 3] = FULL
-        self._shown = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
+        self._outputs = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
         self._pointer = 0
         self._staged = False
         self._held_back = False
@@ -73,7 +73,7 @@ class Chip:
             self._store(self._pointer, byte, now_s)
             self._step()
         if self._staged:
-            self._show()
+            self._update_outputs()
 
     def read(self, length: int) -> bytes:
         """Return the bytes of one read, from the register that was selected last."""
@@ -110,7 +110,7 @@ class Chip:
         # Awake for 0.5 ms first: the write that ends the sleep does not restart the outputs.
         if byte & RESTART and not (byte | before) & SLEEP and now_s >= self._awake_s:
             self._held_back = False
-        if byte & SLEEP and not before & SLEEP and self._gives_any():
+        if byte & SLEEP and not before & SLEEP and self._has_output():
             self._held_back = True
         if before & SLEEP and not byte & SLEEP:
             self._awake_s = now_s + START_S
@@ -128,11 +128,11 @@ class Chip:
         self._registers[LED0 + at] = byte & (0x1F if at % 2 else 0xFF)
         self._staged = True
         if self._registers[MODE2] & OCH and at % 4 == 3:
-            self._show()
+            self._update_outputs()
 
-    def _show(self) -> None:
+    def _update_outputs(self) -> None:
         """Update the outputs from the registers; outputs stopped by a sleep restart as well."""
-        self._shown = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
+        self._outputs = bytes(self._registers[LED0 : LAST_IN_TURN + 1])
         self._staged = False
         if self._held_back and not self._registers[MODE1] & SLEEP:
             self._held_back = False
@@ -140,8 +140,8 @@ class Chip:
 
     # --- the outputs
 
-    def _gives_any(self) -> bool:
-        return any(not high & FULL for high in self._shown[3::4])
+    def _has_output(self) -> bool:
+        return any(not high & FULL for high in self._outputs[3::4])
 
     @property
     def period_s(self) -> float:
@@ -150,7 +150,7 @@ class Chip:
 
     def counts(self, channel: int) -> int:
         """Return the configured width, in 4096ths of a period, awake or not."""
-        on_low, on_high, off_low, off_high = self._shown[4 * channel : 4 * channel + 4]
+        on_low, on_high, off_low, off_high = self._outputs[4 * channel : 4 * channel + 4]
         if off_high & FULL:
             return 0
         if on_high & FULL:

@@ -2,19 +2,19 @@
 
 from gazerig.sim_mock.faults.grammar import SWITCH, TIME, Argument, CommandTable, Verb, count
 from gazerig.sim_mock.faults.hobby import channel_word, hobby_verbs
-from gazerig.sim_mock.faults.verbs import switched, times
+from gazerig.sim_mock.faults.verbs import counted_command, switch_command
 
 CASES = {"oscillator-mhz": "MHZ"}
 
 # fmt: off
 OWN: dict[str, Verb] = {
-    "nack": Verb(times("nack", "transfers are not acknowledged"), (Argument("N", count, True),),
+    "nack": Verb(counted_command("nack", "transfers are not acknowledged"), (Argument("N", count, True),),
                  "the next N transfers are not acknowledged", TIME),
-    "stuck": Verb(switched("stuck", "the bus is stuck"), (SWITCH,),
+    "stuck": Verb(switch_command("stuck", "the bus is stuck"), (SWITCH,),
                   "the data line is held low: no transfer is possible", TIME),
-    "absent": Verb(switched("absent", "the boards are off the bus"), (SWITCH,),
+    "absent": Verb(switch_command("absent", "the boards are off the bus"), (SWITCH,),
                    "the boards are off the bus, pulses continue", TIME),
-    "foreign": Verb(switched("foreign", "another chip answers"), (SWITCH,),
+    "foreign": Verb(switch_command("foreign", "another chip answers"), (SWITCH,),
                     "chips of another kind answer", TIME),
 }
 # fmt: on

@@ -44,7 +44,7 @@ class SentSurroundings(Protocol):
         ...
 
 
-class _Served:
+class _ServerProcess:
     """A server process of ``gazerig.sim_mock.pty.server``."""
 
     def __init__(self) -> None:
@@ -152,7 +152,7 @@ class _Served:
         self.stop()
 
 
-class PtyBus(_Served):
+class PtyBus(_ServerProcess):
     """One emulated bus in its own process, and its terminal."""
 
     def start(
@@ -197,7 +197,7 @@ class PtyBus(_Served):
         return path
 
 
-class PtyBuses(_Served):
+class PtyBuses(_ServerProcess):
     """All emulated buses of a rig, or of several rigs in one world, in one process."""
 
     def start(

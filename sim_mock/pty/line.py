@@ -85,9 +85,9 @@ class TerminalLine:
 
     def where(self) -> str:
         """Return the path to open, the baud rate, and the name, if it has one, as JSON."""
-        return self.labelled({"path": self.terminal.path, "baud": self.settings.device.baud})
+        return self.label_message({"path": self.terminal.path, "baud": self.settings.device.baud})
 
-    def labelled(self, message: Mapping[str, object]) -> str:
+    def label_message(self, message: Mapping[str, object]) -> str:
         """Return a message about this bus as JSON, with the bus's name."""
         name = self.settings.name
         return json.dumps(message if name is None else {"bus": name, **message})
@@ -185,7 +185,7 @@ class TerminalLine:
         before = self.terminal.path
         self.terminal.plug()
         if self.terminal.path != before:
-            self._say(self.labelled({"path": self.terminal.path}))
+            self._say(self.label_message({"path": self.terminal.path}))
 
     # --- commands
 
@@ -194,11 +194,11 @@ class TerminalLine:
         try:
             done = self.device.faults.command(text)
         except ValueError as error:
-            return self.labelled({"error": str(error)})
+            return self.label_message({"error": str(error)})
         self._follow_faults()
         if done.startswith("{"):
-            return self.labelled({"ok": "status", **json.loads(done)})
-        return self.labelled({"ok": done})
+            return self.label_message({"ok": "status", **json.loads(done)})
+        return self.label_message({"ok": done})
 
 
 def _packet_gap(device: Emulated) -> dict[str, str]:

@@ -123,7 +123,7 @@ class Server:
         try:
             self.surroundings: ServedSurroundings | None = None
             if settings.surroundings is not None:
-                with _ended_with_client(settings.until_eof):
+                with _exit_with_client(settings.until_eof):
                     self.surroundings = settings.surroundings.made()
             for bus in settings.buses:
                 device = None
@@ -198,7 +198,7 @@ class Server:
 
 
 @contextmanager
-def _ended_with_client(until_eof: bool) -> Iterator[None]:
+def _exit_with_client(until_eof: bool) -> Iterator[None]:
     """End this process with its client even while surroundings are created, which takes seconds."""
     made = threading.Event()
     number: int | None = None

@@ -100,7 +100,7 @@ class Terminal:
         self.watch = ClientCounter(self.path)
         if self._link is not None:
             try:
-                _point(self._link, self.path)
+                _create_link(self._link, self.path)
             except OSError:
                 self._link = None
                 self.unplug()
@@ -111,7 +111,7 @@ class Terminal:
         """Remove the link and the terminal: a client gets an I/O error or a hang-up."""
         if not self.plugged:
             return
-        if self._link is not None and _leads_to(self._link, os.ttyname(self._slave)):
+        if self._link is not None and _links_to(self._link, os.ttyname(self._slave)):
             self._link.unlink()
         if self.watch is not None:
             self.watch.close()
@@ -159,7 +159,7 @@ class Terminal:
         fcntl.ioctl(self._slave, termios.TIOCNXCL)
 
 
-def _point(link: Path, target: str) -> None:
+def _create_link(link: Path, target: str) -> None:
     """Create a link; a dangling link, or one to a terminal, is replaced."""
     if link.is_symlink():
         old = os.readlink(link)
@@ -174,5 +174,5 @@ def _point(link: Path, target: str) -> None:
         raise OSError(error.errno, os.strerror(error.errno or 0), str(link)) from None
 
 
-def _leads_to(link: Path, target: str) -> bool:
+def _links_to(link: Path, target: str) -> bool:
     return link.is_symlink() and os.readlink(link) == target

@@ -113,7 +113,7 @@ class Boxing:
         ]
         for reach in _REACHES:
             if reach.start_s <= phase_s < reach.start_s + _REACH_S:
-                things.append(Thing(2, "hand", _reaching(reach, phase_s), _FIST_M))
+                things.append(Thing(2, "hand", _reaching_hand(reach, phase_s), _FIST_M))
         return tuple(things)
 
     def events(self) -> tuple[Event, ...]:
@@ -133,7 +133,7 @@ class Boxing:
                 for f in _FEINTS
             ),
         ]
-        return tuple(sorted((*events, *_quiet(events)), key=lambda event: event.start_s))
+        return tuple(sorted((*events, *_add_face_events(events)), key=lambda event: event.start_s))
 
 
 def _opponent(t_s: float) -> tuple[Vec3, tuple[float, float]]:
@@ -190,7 +190,7 @@ def _turn(side: float, phase_s: float) -> tuple[float, float]:
     return spin_rad_s, turned_rad(phase_s)
 
 
-def _reaching(reach: _ArmMotion, phase_s: float) -> Vec3:
+def _reaching_hand(reach: _ArmMotion, phase_s: float) -> Vec3:
     """Return the hand that reaches in from the side, beckons and retreats."""
     since_s = phase_s - reach.start_s
     into = there_and_back(since_s, _REACH_IN_S, _REACH_STAY_S, _REACH_OUT_S)
@@ -222,19 +222,19 @@ def _reach_event(reach: _ArmMotion) -> Event:
     inside = [
         ms / 1e3
         for ms in range(round(_REACH_S * 1e3))
-        if abs(_aside_rad(_reaching(reach, reach.start_s + ms / 1e3))) < HALF_FIELD_RAD
+        if abs(_side_angle_rad(_reaching_hand(reach, reach.start_s + ms / 1e3))) < HALF_FIELD_RAD
     ]
     start_s, end_s = reach.start_s + inside[0], reach.start_s + inside[-1]
     place = _plus(HEAD_M, (0.46, reach.side * 0.46 * tan(HALF_FIELD_RAD), 0.0))
     return Event("reach", "look", "hand", start_s, end_s, place, 0.25)
 
 
-def _aside_rad(p_world_m: Vec3) -> float:
+def _side_angle_rad(p_world_m: Vec3) -> float:
     """Return the horizontal angle of a point off straight ahead, from the robot's eyes."""
     return atan2(p_world_m[1] - HEAD_M[1], p_world_m[0] - HEAD_M[0])
 
 
-def _quiet(events: list[Event]) -> list[Event]:
+def _add_face_events(events: list[Event]) -> list[Event]:
     """Expect the gaze on the face whenever nothing else happens for a while."""
     quiet, free_s = [], 0.0
     busy = sorted((event.start_s, event.end_s) for event in events)

@@ -58,7 +58,7 @@ def people_of(members: Sequence[Member], t_s: float, round_s: float) -> tuple[Sc
     places = [_place(member, t_s, phase_s) for member in members]
     found = []
     for member, place in zip(members, places, strict=True):
-        way = _way(member.looks, phase_s, place, places)
+        way = _face_direction(member.looks, phase_s, place, places)
         found.append(ScenePerson(place, way, _hand(member, phase_s, place)))
     return tuple(found)
 
@@ -74,7 +74,9 @@ def _place(member: Member, t_s: float, phase_s: float) -> Vec3:
     return add(face, sway)
 
 
-def _way(looks: tuple[Look, ...], phase_s: float, place: Vec3, places: Sequence[Vec3]) -> Angles2:
+def _face_direction(
+    looks: tuple[Look, ...], phase_s: float, place: Vec3, places: Sequence[Vec3]
+) -> Angles2:
     """Return yaw and pitch of a face that turns from one target to the next."""
     last = before = looks[0]
     for look in looks[1:]:

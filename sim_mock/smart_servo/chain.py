@@ -23,7 +23,7 @@ from gazerig.sim_mock.smart_servo.framing import (
 from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, decided
+from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, change_quirk
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 from gazerig.sim_mock.smart_servo.span import whole_ms
 
@@ -81,7 +81,7 @@ class ServoChain(Generic[S, Q]):
         self._client_baud: int | None = None
         self._groups = self._group_instructions()
         for servo in self.servos:
-            servo.on_address = self._readdressed
+            servo.on_address = self._mark_stale
         self._apply_quirks(self.quirks)
         self.refresh()
 
@@ -94,7 +94,7 @@ class ServoChain(Generic[S, Q]):
         self._known = known
         self._by_id, self._twins, self._delay_s = known.by_id, known.twins, known.delay_s
 
-    def _readdressed(self) -> None:
+    def _mark_stale(self) -> None:
         """Read addresses again before the next instruction; the old ones are valid until then."""
         self._stale = True
 
@@ -127,7 +127,7 @@ class ServoChain(Generic[S, Q]):
         twin = self.servo_type(spec, now_ms)
         for name in ("baud_rate", "return_delay_time"):
             twin.memory.keep(name, first.memory.get(name))
-        twin.on_address = self._readdressed
+        twin.on_address = self._mark_stale
         self.servos = (*self.servos, twin)
         self._apply_quirks(self.quirks)
         self.refresh()
@@ -144,7 +144,7 @@ class ServoChain(Generic[S, Q]):
             self.check_baud = value == "heed"
             self.refresh()
             return
-        self.quirks = decided(self.quirks, case, value)
+        self.quirks = change_quirk(self.quirks, case, value)
         self._framing.gap_s = self.quirks.packet_gap_s
         self._apply_quirks(self.quirks)
 
@@ -186,12 +186,12 @@ class ServoChain(Generic[S, Q]):
         if self._stale:
             self.refresh()
         if not self._by_id:
-            return self._garbage(data)
+            return self._answer_wrong_baud(data)
         found = self._framing.feed(data, now_s)
         replies = [DeviceReply(i.end, pieces) for i in found if (pieces := self._execute(i))]
         return self.faults.around(replies, data) if self._wire.any else replies
 
-    def _garbage(self, data: bytes) -> list[DeviceReply]:
+    def _answer_wrong_baud(self, data: bytes) -> list[DeviceReply]:
         """Answer a client at a wrong baud rate: nothing, or garbage made of its own bytes."""
         if self.quirks.wrong_baud == "silence" or not data:
             return []
@@ -243,7 +243,7 @@ class ServoChain(Generic[S, Q]):
         shadows = self._known.shadows.get(servo_id, ())
         answer = None if servo is None else self._answer(servo, code, params)
         for twin in twins:
-            answer = _both(answer, self._answer(twin, code, params))
+            answer = _merge_answers(answer, self._answer(twin, code, params))
         for shadow in shadows:
             if not self._touches_eeprom(code, params):
                 self._answer(shadow, code, params)
@@ -266,7 +266,7 @@ class ServoChain(Generic[S, Q]):
         """Return the handlers of group instructions, by code."""
         return {
             PING: lambda params: self._out(self._ping_all()),
-            SYNC_READ: lambda params: self._plain(self.instructions.sync_rows(params)),
+            SYNC_READ: lambda params: self._answer_plain(self.instructions.sync_rows(params)),
             SYNC_WRITE: self._write_each,
         }
 
@@ -278,12 +278,12 @@ class ServoChain(Generic[S, Q]):
     def _part(self, servo_id: int, address: int, length: int) -> Answer | None:
         """Return a servo's part of a group read, None if it is silent."""
         servo = self._by_id.get(servo_id)
-        answer = None if servo is None else self._seen(servo, address, length)
+        answer = None if servo is None else self._read_part(servo, address, length)
         for twin in self._twins.get(servo_id, ()) if self._twins else ():
-            answer = _both(answer, self._seen(twin, address, length))
+            answer = _merge_answers(answer, self._read_part(twin, address, length))
         return None if answer is None or self._is_muted(servo_id) else answer
 
-    def _seen(self, servo: S, address: int, length: int) -> Answer | None:
+    def _read_part(self, servo: S, address: int, length: int) -> Answer | None:
         if not servo.advance(self._now_ms, self._fed_ms) or not servo.answers_groups:
             return None
         data, servo_id, flag = servo.read(address, length), servo.id, servo.error_flag
@@ -291,10 +291,10 @@ class ServoChain(Generic[S, Q]):
             return Answer(servo_id, flag | servo.unreadable, b"", self._delay_s[servo_id])
         return Answer(servo_id, flag, data, self._delay_s[servo_id])
 
-    def _plain(self, rows: Iterable[GroupRead]) -> list[Piece]:
+    def _answer_plain(self, rows: Iterable[GroupRead]) -> list[Piece]:
         """Answer a group read with one status per servo, in the order of the request."""
         if not self._wire.any and not self._twins:
-            return self._undisturbed(rows)
+            return self._answer_undisturbed(rows)
         answers, late_s, policy = list[Answer](), 0.0, self.quirks.after_missing
         for servo_id, address, length in rows:
             answer = self._part(servo_id, address, length)
@@ -307,7 +307,7 @@ class ServoChain(Generic[S, Q]):
                 late_s += self.quirks.slot_timeout_s
         return self._out(answers)
 
-    def _undisturbed(self, rows: Iterable[GroupRead]) -> list[Piece]:
+    def _answer_undisturbed(self, rows: Iterable[GroupRead]) -> list[Piece]:
         """Answer a group read for unique ids and a line without faults: this happens every tick."""
         servos, now_ms, fed_ms = self._by_id, self._now_ms, self._fed_ms
         pieces, late_s, policy = list[Piece](), 0.0, self.quirks.after_missing
@@ -392,8 +392,8 @@ def build_chain(
     return chain(servos, now_s, quirks, baud is not None, seed)
 
 
-def _both(one: Answer | None, other: Answer | None) -> Answer | None:
+def _merge_answers(one: Answer | None, other: Answer | None) -> Answer | None:
     """Return the combined answer of two servos with one id."""
     if one is None or other is None:
         return other if one is None else one
-    return one._replace(twin=_both(one.twin, other))
+    return one._replace(twin=_merge_answers(one.twin, other))

@@ -6,7 +6,7 @@ from typing import Any
 from gazerig.sim_mock.smart_servo.controller import Motor
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
-from gazerig.sim_mock.smart_servo.noise import LENGTH, SEED_APART_MS, flicker
+from gazerig.sim_mock.smart_servo.noise import LENGTH, SEED_APART_MS, noise_table
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -46,7 +46,7 @@ class Drive(ABC):
         self.memory = memory
         self.shaft = make_shaft(spec.id, model, physics, spec.start_steps / scale)
         seed = spec.id if spec.seed is None else spec.seed
-        self._noise = flicker(physics.noise_current, physics.noise_velocity)
+        self._noise = noise_table(physics.noise_current, physics.noise_velocity)
         self._noise_from_ms = seed * SEED_APART_MS
         self.boot()
 
@@ -67,11 +67,11 @@ class Drive(ABC):
     def turn(self, steps: float) -> None:
         """Turn the joint by hand, in the registers' direction."""
 
-    def _flicker(self, now_ms: int) -> tuple[int, int]:
+    def _noise_now(self, now_ms: int) -> tuple[int, int]:
         """Return the noise of current and velocity while the shaft holds its position."""
         return self._noise[now_ms + self._noise_from_ms & LENGTH - 1]
 
-    def _lead_from_here(self, by_speed: bool) -> None:
+    def _start_profile(self, by_speed: bool) -> None:
         """Start a profile, of speeds or of positions, at the shaft's position."""
         shaft = self.shaft
         shaft.start(SpeedProfile(shaft.x, shaft.v) if by_speed else PositionProfile(shaft.x))

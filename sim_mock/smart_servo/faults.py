@@ -68,25 +68,27 @@ def _reset(faults: ServoFaults, servo_id: int) -> str:
     return f"servo {servo_id} has factory settings: id {servo.id}, {servo.baud} bit/s"
 
 
-def _fails(error: str) -> Do:
+def _error_command(error: str) -> Do:
     """Return a command that triggers an error of one servo."""
     return lambda faults, servo_id: f"servo {servo_id} {faults.chain.here(servo_id).fail(error)}"
 
 
-def _suffers(do: Callable[..., None], text: str) -> Do:
+def _servo_command(do: Callable[..., None], text: str) -> Do:
     """Return a command that acts on one servo or all; ``text``: its reply."""
 
-    def strike(faults: ServoFaults, servo_id: int | None, *numbers: float) -> str:
+    def run(faults: ServoFaults, servo_id: int | None, *numbers: float) -> str:
         for servo in faults.servos(servo_id):
             do(servo, *numbers)
         return text.format(*numbers, label=faults.label(servo_id))
 
-    return strike
+    return run
 
 
-def _has(attribute: str, unit: str) -> Do:
+def _quantity_command(attribute: str, unit: str) -> Do:
     """Return a command that sets a quantity of one servo, or of all."""
-    return _suffers(lambda s, value: setattr(s, attribute, value), f"{{label}} has {{:g}} {unit}")
+    return _servo_command(
+        lambda s, value: setattr(s, attribute, value), f"{{label}} has {{:g}} {unit}"
+    )
 
 
 # fmt: off
@@ -108,26 +110,26 @@ def commands_of(
         **packet_verbs(one),
         **adapter_verbs(),
         "collide": Verb(_collide, (one,), "a second servo with this id joins the bus"),
-        "overload": Verb(_fails("overload"), (one,), "trigger the overload protection"),
-        "overheat": Verb(_fails("overheating"), (one,), "the motor is too hot"),
-        "encoder": Verb(_fails("encoder"), (one,), "the angle sensor is broken"),
-        "shock": Verb(_fails("electrical shock"), (one,), "latch the electrical shock error"),
-        "brown-out": Verb(_suffers(EmulatedServo.restart, "{label} restarts"), (one,),
+        "overload": Verb(_error_command("overload"), (one,), "trigger the overload protection"),
+        "overheat": Verb(_error_command("overheating"), (one,), "the motor is too hot"),
+        "encoder": Verb(_error_command("encoder"), (one,), "the angle sensor is broken"),
+        "shock": Verb(_error_command("electrical shock"), (one,), "latch the electrical shock error"),
+        "brown-out": Verb(_servo_command(EmulatedServo.restart, "{label} restarts"), (one,),
                           "restart as after a dip of the supply: no status shows it"),
         "reset": Verb(_reset, (one,), f"restore factory settings: {reset}"),
-        "voltage": Verb(_has("supply_v", "V"), (some, Argument("V", number(0.0, 30.0, "volts"))),
+        "voltage": Verb(_quantity_command("supply_v", "V"), (some, Argument("V", number(0.0, 30.0, "volts"))),
                         "change the supply voltage"),
-        "temperature": Verb(_has("temperature_c", "degC"),
+        "temperature": Verb(_quantity_command("temperature_c", "degC"),
                             (some, Argument("C", number(-40.0, 200.0, "degC"))),
                             "set the motor's temperature, which then drifts"),
-        "stick": Verb(_suffers(lambda servo: servo.jam(True), "{label} is stuck"), (some,),
+        "stick": Verb(_servo_command(lambda servo: servo.jam(True), "{label} is stuck"), (some,),
                       "jam the joint at its position"),
-        "free": Verb(_suffers(lambda servo: servo.jam(False), "{label} is free"), (some,),
+        "free": Verb(_servo_command(lambda servo: servo.jam(False), "{label} is free"), (some,),
                      "free a jammed joint"),
-        "load": Verb(_suffers(EmulatedServo.set_load, "{label} carries {:g} Nm"),
+        "load": Verb(_servo_command(EmulatedServo.set_load, "{label} carries {:g} Nm"),
                      (some, Argument("NM", number(-100.0, 100.0, "Nm"))),
                      "apply a constant torque to the joint"),
-        "turn": Verb(_suffers(EmulatedServo.turn, "{label} was turned by {:g} steps"),
+        "turn": Verb(_servo_command(EmulatedServo.turn, "{label} was turned by {:g} steps"),
                      (some, Argument("STEPS", number(-1e6, 1e6, "steps"))), "turn the joint by hand"),
         **closing_verbs(one),
     }

@@ -309,7 +309,7 @@ class ShaftMotion:
             if not low <= x <= high:
                 x, v = high if x > high else low, 0.0
                 u = min(max(c, earlier - slew, u_least), earlier + slew, u_max)
-                u, t = _stalled(u, volts, torque_max)
+                u, t = _stall_state(u, volts, torque_max)
             power = u * t
             volts = supply - sag * power if power > 0.0 else supply
             if integrating and not clipped:
@@ -324,7 +324,7 @@ class ShaftMotion:
         self.joint, self.volts, self._rv = joint, volts, rv
 
 
-def _stalled(u: float, volts: float, torque_max: float) -> tuple[float, float]:
+def _stall_state(u: float, volts: float, torque_max: float) -> tuple[float, float]:
     """Return PWM and torque of a shaft that cannot move, within its torque limit."""
     t = u * volts
     if -torque_max <= t <= torque_max:

@@ -9,7 +9,7 @@ SEED_APART_MS = 1009
 
 
 @lru_cache(maxsize=8)
-def flicker(current: int, velocity: int) -> tuple[tuple[int, int], ...]:
+def noise_table(current: int, velocity: int) -> tuple[tuple[int, int], ...]:
     """Return the noise of current and velocity for each of ``LENGTH`` milliseconds.
 
     It depends on the time only, so that reading does not change it; velocity is mostly 0.

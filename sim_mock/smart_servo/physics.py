@@ -89,7 +89,7 @@ class ServoSpec(NamedTuple):
     seed: int | None = None
 
 
-def checked(physics: Physics) -> Physics:
+def check_physics(physics: Physics) -> Physics:
     """Return the physics if it can exist.
 
     Raises:

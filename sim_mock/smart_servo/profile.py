@@ -62,7 +62,7 @@ class PositionProfile:
         self._from = self._p1 = goal
         self._start = self._out = self._cruise = self._slow = 0.0
 
-    def by_velocity(self, goal: float, cruise: float, ramp: float) -> None:
+    def plan_by_velocity(self, goal: float, cruise: float, ramp: float) -> None:
         """Plan to a goal at a speed (steps/ms, 0: step) with a ramp (steps/ms2, 0: rectangle)."""
         if cruise <= 0.0:
             self.step(goal)
@@ -77,7 +77,7 @@ class PositionProfile:
         else:
             self._ramps(goal, cruise, ramp)
 
-    def by_time(self, goal: float, total_ms: float, ramp_ms: float) -> None:
+    def plan_by_time(self, goal: float, total_ms: float, ramp_ms: float) -> None:
         """Plan to a goal in a time (0: step); each ramp takes at most half of it."""
         distance = goal - self.r
         if total_ms <= 0.0:

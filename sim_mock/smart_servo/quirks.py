@@ -46,7 +46,7 @@ def cases_of(kind: type[ChainQuirks]) -> dict[str, str]:
     return named | {name.replace("_", "-"): "MS" for name in TIMES} | {"baud": "heed|any"}
 
 
-def decided(quirks: Q, case: str, value: str) -> Q:
+def change_quirk(quirks: Q, case: str, value: str) -> Q:
     """Return the quirks with one case changed.
 
     Raises:

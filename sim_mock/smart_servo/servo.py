@@ -13,7 +13,7 @@ from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.framing import PING, READ, REBOOT
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.pauses import PAUSE_MS, long_pause
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, checked
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, check_physics
 from gazerig.sim_mock.smart_servo.protection import CHECK_MS, Limits, ServoProtection
 
 RETURN_DELAY_UNIT_S = 2e-6
@@ -69,7 +69,7 @@ class EmulatedServo(ABC):
     """An id under which it executes writes to RAM and never answers."""
 
     def __init__(self, spec: ServoSpec, now_ms: int) -> None:
-        self._physics = checked(Physics(*spec.physics))
+        self._physics = check_physics(Physics(*spec.physics))
         self.firmware = spec.firmware
         self.shaft = self.drive.shaft
         self.protection = ServoProtection(self.model, self._physics, self._limits())

@@ -14,11 +14,16 @@ from gazerig.features.bringup.calibration.camera_calibration import (
     LensCalibrationParams,
     calibrate_lens,
 )
-from gazerig.features.bringup.calibration.charuco_views import Held, ViewParams, coverage, held
+from gazerig.features.bringup.calibration.charuco_views import (
+    BoardView,
+    ViewParams,
+    coverage,
+    view_of,
+)
 from gazerig.robot.model.charuco_board import CharucoBoard, SeenBoard
 from gazerig.robot.model.intrinsics import project
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
-from gazerig.sim_mock.cameras.charuco_scene import held_pose
+from gazerig.sim_mock.cameras.charuco_scene import hand_held_pose
 
 SIZE = (640, 400)
 BOARD = CharucoBoard()
@@ -29,7 +34,7 @@ VIEWS = 16
 
 def corners(number: int, noise_px: float, rng: np.random.Generator, lens: Intrinsics) -> SeenBoard:
     """What a detector would find of the board, without a picture."""
-    R, p = held_pose(number, BoardCameraParams(), lens, BOARD)
+    R, p = hand_held_pose(number, BoardCameraParams(), lens, BOARD)
     px = project(BOARD.corners_m @ np.array(R).T + p, lens)
     inside = ((px > 0.0) & (px < np.array(SIZE) - 1.0)).all(axis=1)
     px += rng.normal(0.0, noise_px, px.shape)
@@ -61,7 +66,7 @@ def test_lens_from_pictures_is_within_one_percent(seed: int) -> None:
     camera = BoardCamera(BoardCameraParams(), LENS, BOARD, rng)
     views = []
     for number in range(24):
-        pose = held_pose(number + 5 * seed, camera.params, LENS, BOARD)
+        pose = hand_held_pose(number + 5 * seed, camera.params, LENS, BOARD)
         seen = BOARD.find(camera.image(*pose))
         assert seen is not None
         # 0.3 px on top of what the drawn pictures' own noise and blur do.
@@ -127,7 +132,7 @@ def test_a_view_that_does_not_fit_is_dropped() -> None:
 
 
 def flat(view: SeenBoard) -> bool:
-    how = held(view, GUESS, *SIZE)
+    how = view_of(view, GUESS, *SIZE)
     return how is not None and abs(how.tilt_right_deg) < 14 and abs(how.tilt_down_deg) < 14
 
 
@@ -168,7 +173,7 @@ def test_a_board_that_is_another_one_is_refused() -> None:
 
 
 def test_coverage_says_what_to_do_next() -> None:
-    middle = Held(0.4, 0.6, 0.4, 0.6, 0.0, 0.0)
+    middle = BoardView(0.4, 0.6, 0.4, 0.6, 0.0, 0.0)
     params = ViewParams(least_views=2)
     wishes = coverage([middle], params).missing
     assert len(wishes) == 10 and wishes[-1] == "show 1 more view, each a new one"
@@ -180,7 +185,7 @@ def test_coverage_says_what_to_do_next() -> None:
         "hold the board nearer",
         "show 1 more view, each a new one",
     }
-    full = Held(0.05, 0.95, 0.05, 0.95, 0.0, 0.0)
+    full = BoardView(0.05, 0.95, 0.05, 0.95, 0.0, 0.0)
     tilts = [full._replace(tilt_right_deg=t) for t in (20.0, -20.0)]
     tilts += [full._replace(tilt_down_deg=t) for t in (20.0, -20.0)]
     assert coverage(tilts, params).enough
@@ -192,6 +197,6 @@ def test_tilt_is_told_from_the_right_side() -> None:
     centre = np.array((0.126, 0.09, 0.0))
     points = (BOARD.corners_m - centre) @ R.T + (0.0, 0.0, 0.5)
     assert points[5, 2] < points[0, 2]  # the right side is nearer
-    how = held(SeenBoard(np.arange(24), project(points, GUESS), BOARD.corners_m), GUESS, *SIZE)
+    how = view_of(SeenBoard(np.arange(24), project(points, GUESS), BOARD.corners_m), GUESS, *SIZE)
     assert how is not None
     assert (how.tilt_right_deg, how.tilt_down_deg) == pytest.approx((25.0, 0.0), abs=0.1)

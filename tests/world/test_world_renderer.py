@@ -21,8 +21,8 @@ from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
+    blur_along,
     expose,
-    smeared,
     through_lens,
 )
 
@@ -287,7 +287,7 @@ def test_a_wish_that_is_no_library_is_named(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_a_smear_of_nothing_changes_nothing() -> None:
     image = np.zeros((4, 4, 3), np.uint8)
-    assert smeared(image, (0.3, 0.3)) is image
+    assert blur_along(image, (0.3, 0.3)) is image
 
 
 def test_places_of_a_camera_are_as_from_where_its_rig_stands(balls: Balls) -> None:

@@ -9,7 +9,7 @@ from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, whole
 from gazerig.sim_mock.faults.line import LineFaults
-from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, lost
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, loss_verb
 from gazerig.sim_mock.replies import Piece
 from gazerig_lx16a import protocol as p
 from gazerig_lx16a.bus import FASTEST_STEPS_S, Lx16aParams
@@ -118,7 +118,7 @@ def _restart(faults: ChainFaults, servo_id: int) -> str:
 _ID = Argument("ID", whole(0, 253, "a servo id"))
 COMMANDS = CommandTable(
     {**line_verbs(_ID), **adapter_verbs(), "brown-out": Verb(_restart, (_ID,), "restart"),
-     "lose-writes": lost("lose_writes", "moves"),
+     "lose-writes": loss_verb("lose_writes", "moves"),
      **closing_verbs(_ID)}, {}, "a servo's id",
 )  # fmt: skip
 
