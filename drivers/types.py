@@ -362,7 +362,7 @@ class DetectedPalm:
 
 @dataclass(frozen=True, slots=True)
 class MovingBlob:
-    """Something that moves, with its place in the camera frame (x right, y down, z forward).
+    """A moving thing, with its position in the camera frame (x right, y down, z forward).
 
     id: identity given by the detector, stable from image to image
     kind: "hand", "thing", ...
@@ -377,8 +377,8 @@ class MovingBlob:
     depth_sd_m, spin_sd_rad_s, loom_sd_1_s: standard deviations
     box_px: x, y, width, height; centre_px: a point on it; area_px: image area that it covers;
         flow_px_s: its mean motion, without the camera's own
-    fastest_m, fastest_m_s: place and velocity of the quarter of it that moves fastest, as
-        ``p_camera_m`` and ``v_camera_m_s``: of an arm, the hand
+    fastest_m, fastest_m_s: position and velocity of its fastest quarter, as ``p_camera_m`` and
+        ``v_camera_m_s``: of an arm, the hand
     thickness_m: diameter of the largest disc within it, at the distance of ``p_camera_m``: of an
         arm, about the width of its hand; from_side: it extends beyond the left or right edge
     """

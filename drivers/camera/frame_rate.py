@@ -59,5 +59,5 @@ class FrameRateMonitor:
         )
 
     def _prompt(self, away_s: float) -> bool:
-        """Return whether the reader returned before a frame could be missed."""
+        """Return whether the reader was back before a frame could be missed."""
         return self._stated_hz == 0.0 or away_s <= _PROMPT / self._stated_hz

@@ -148,7 +148,7 @@ class MaestroCodec:
         return self.command(GET_ERRORS)
 
     def moving(self) -> bytes:
-        """Encode a request whether a channel with a limit is still moving; the answer is a byte."""
+        """Encode a request for the motion of channels with a limit; the answer is a byte."""
         return self.command(GET_MOVING)
 
     def go_home(self) -> bytes:

@@ -93,7 +93,7 @@ class SyncReader:
         return now_s - self._unanswered_s.get(servo_id, -inf) <= OWED_S
 
     def reread(self, ids: Sequence[int]) -> dict[int, ServoReply]:
-        """Read some servos once more, in one exchange; absent servos gave no good answer.
+        """Read some servos once more, in one exchange; return those with a good answer.
 
         Raises:
             BusLost: the port is lost.
@@ -111,7 +111,7 @@ class SyncReader:
         return replies
 
     def read_troubled(self, now_s: float) -> dict[int, ServoReply]:
-        """Read the group and one servo that is out of it; absent servos gave no good answer.
+        """Read the group and one servo that is out of it; return those with a good answer.
 
         Raises:
             BusLost: the port is lost.

@@ -208,7 +208,7 @@ class Transactions:
         return values
 
     def ask(self, ids: Sequence[int], name: str) -> dict[int, int]:
-        """Read one register of several servos; absent servos gave no good answer."""
+        """Read one register of several servos; return the values of good answers by id."""
         register = self.family.registers[name]
         found = self.ask_bytes(ids, register.address, register.size)
         return {servo_id: register.decode(data) for servo_id, data in found.items()}

@@ -89,7 +89,7 @@ class TransientFaultSupervisor(Supervisor):
             self._check_torque(servo_id, sample)
 
     def record_out(self, out: Collection[int], now_s: float) -> None:
-        """Record the servos out of the group; one that returns after a while may have restarted."""
+        """Record the servos out of the group; those that return later may have restarted."""
         for servo_id in [i for i in self._out_since_s if i not in out]:
             since_s = self._out_since_s.pop(servo_id)
             if self.engaged and now_s - since_s >= RESTART_S:

@@ -15,7 +15,7 @@ from gazerig.drivers.camera.oak.yunet_node import FoundFaces, yunet_faces
 
 COLOUR, DEPTH, FACES = "colour", "depth", "faces"
 """Names of the messages in a group."""
-# Two groups may be queued: the one that is read and the newest.
+# Two groups may be queued: the current one and the newest.
 _QUEUE = 2
 _GYRO_HZ, _GYRO_BATCH = 200, 2
 _READINGS = 100  # messages in the queue: one second
