@@ -1,4 +1,4 @@
-"""The lab's entries in the list of commands; light, as every command imports them."""
+"""The lab's entries in the list of commands; a light module, because every command imports it."""
 
 from gazerig.robot.cli.command_list import CommandEntry
 
@@ -23,7 +23,7 @@ COMPARE = CommandEntry(
 )
 SWEEP = CommandEntry(
     "gazerig.features.lab.cli.sweep",
-    "Vary parameters over many simulated runs: a table, and a picture of what responds.",
+    "Vary parameters over many simulated runs; write a table and a figure of the responses.",
     "Look back",
     examples={
         "sweep": (

@@ -1,4 +1,4 @@
-"""A run in simulated time, for its figures alone: nothing is shown, recorded or tuned."""
+"""A run in simulated time for its figures only: nothing is shown, recorded or tuned."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from gazerig.robot.control.tick import Tick
 
 
 class SimulatedRun(NamedTuple):
-    """The summary's figures of a run, and what the report's measures rest on."""
+    """The summary's figures of a run, and the trace for the report's measures."""
 
     figures: dict[str, object]
     trace: GazeTrace
@@ -28,23 +28,23 @@ def simulate(
     """Run a rig from torque on to torque off.
 
     Args:
-        rig: the configuration; the rig, character and profile of the options only name it.
+        rig: the configuration; the options' rig, character and profile are only names.
         options: with emulated servos, simulated time and a scene.
-        stopped: returns why to end early, None to go on.
-        watch: gets every tick.
+        stopped: returns why to end early, None to continue.
+        watch: receives every tick.
 
     Raises:
         gazerig.config.load.ConfigError: a file that the rig names is at fault.
         SetupError: the options do not fit the rig, or the run ended by a fault.
     """
-    gathering, failures = GazeTraceBuilder(), list[Exception]()
+    builder, failures = GazeTraceBuilder(), list[Exception]()
 
     def update(tick: Tick) -> None:
         try:
-            gathering.update(tick)
+            builder.update(tick)
             watch(tick)
         except Exception as error:
-            failures.append(error)  # the run goes on without an observer that fails
+            failures.append(error)  # a run continues without a failed observer
             raise
 
     composed = ComposedRun(options, assemble(rig, options), None, None)
@@ -54,11 +54,11 @@ def simulate(
     stopped_by = str(figures["stopped_by"])
     if stopped_by.startswith("fault"):
         raise SetupError(f"the simulated run ended by a {stopped_by}")
-    return SimulatedRun(figures, gathering.gathered())
+    return SimulatedRun(figures, builder.trace())
 
 
 def refuse_unfit(rig: Rig, options: RunOptions) -> None:
-    """Refuse options with which no run of a rig could begin; nothing runs.
+    """Refuse options with which a run of a rig could not begin; nothing runs.
 
     Raises:
         gazerig.config.load.ConfigError: a file that the rig names is at fault.

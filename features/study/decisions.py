@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.analysis.multiplicity import corrected
+from gazerig.features.lab.analysis.multiplicity import correct_p_values
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
 from gazerig.features.study.measures import Measure, measures
 from gazerig.features.study.participation import Participation
@@ -79,7 +79,7 @@ def decisions(
         for k, one in enumerate(found)
         if one.test is not None and isfinite(one.test.deciding_p)
     }
-    many = corrected(chances, design.plan.correction)
+    many = correct_p_values(chances, design.plan.correction)
     out = [replace(one, corrected_p=many.get(str(k), nan)) for k, one in enumerate(found)]
     return tuple(replace(one, verdict=_verdict(one, design.plan.alpha)) for one in out)
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import params_text, walk_text
-from gazerig.features.lab.analysis.multiplicity import corrected
+from gazerig.features.lab.analysis.multiplicity import correct_p_values
 from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import chance, compare, differences_of
@@ -73,9 +73,9 @@ def test_dealing_out_again_gives_the_chance_of_a_known_case() -> None:
 
 
 def test_chances_are_corrected_for_their_number() -> None:
-    found = corrected({"a": 0.01, "b": 0.04, "c": 0.03})
+    found = correct_p_values({"a": 0.01, "b": 0.04, "c": 0.03})
     assert found == pytest.approx({"a": 0.03, "c": 0.06, "b": 0.06})
-    assert corrected({"a": 0.9, "b": 0.8}) == {"a": 1.0, "b": 1.0}
+    assert correct_p_values({"a": 0.9, "b": 0.8}) == {"a": 1.0, "b": 1.0}
 
 
 def record(path: Path, seconds: float, saccade: str) -> None:

@@ -23,12 +23,12 @@ from gazerig.features.lab.report.compare_page import compare_page
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
 from gazerig.features.lab.report.page import band_text, gauge, report_page
 from gazerig.features.lab.report.plotting import COLOURS, Shown, png
-from gazerig.features.lab.report.reference_walk import own, published
-from gazerig.features.lab.report.report import DRAWINGS, found, measured, report_of
+from gazerig.features.lab.report.reference_walk import published_walk, rig_walk
+from gazerig.features.lab.report.report import DRAWINGS, findings_of, measure_run, report_of
 from gazerig.features.lab.report.run_header import RunHeader
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
-    judged,
+    judge,
     longest,
     mean,
     median,
@@ -57,7 +57,7 @@ def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> GazeTra
     run(made.robot, made.clock, made.loop, over, gathering.update)
     made.robot.stop()
     made.close()
-    return gathering.gathered()
+    return gathering.trace()
 
 
 @pytest.fixture(scope="module")
@@ -135,17 +135,15 @@ def test_blinks_of_a_human_shape_pass_and_are_counted_by_the_minute() -> None:
 def test_too_few_events_are_no_pass_and_nothing_is_too_few() -> None:
     band = bands.BY_KEY["rate"]
     ones = np.full(band.least - 1, 0.4)
-    few = judged(MeasuredValue("rate", ones, mean), band)
+    few = judge(MeasuredValue("rate", ones, mean), band)
     assert few.verdict == "too few events" and np.isnan(few.low95)
-    assert {finding.verdict for finding in found(EMPTY)} == {"too few events"}
+    assert {finding.verdict for finding in findings_of(EMPTY)} == {"too few events"}
 
 
 def test_a_verdict_rests_on_the_band_alone() -> None:
     band = bands.BY_KEY["vergence"]
     for value, verdict in ((0.99, "pass"), (-0.99, "pass"), (1.01, "outside"), (-1.01, "outside")):
-        assert (
-            judged(MeasuredValue("vergence", np.full(40, value), median), band).verdict == verdict
-        )
+        assert judge(MeasuredValue("vergence", np.full(40, value), median), band).verdict == verdict
 
 
 def test_a_figure_outside_by_what_chance_may_do_is_uncertain() -> None:
@@ -153,16 +151,16 @@ def test_a_figure_outside_by_what_chance_may_do_is_uncertain() -> None:
     band = bands.BY_KEY["express"]
     for times, verdict in ((1, "uncertain"), (100, "outside")):
         rows = np.array([1.0] * times + [0.0] * 13 * times)
-        assert judged(MeasuredValue("express", rows, mean), band).verdict == verdict
-    inside = judged(MeasuredValue("express", np.zeros(14), mean), band)
+        assert judge(MeasuredValue("express", rows, mean), band).verdict == verdict
+    inside = judge(MeasuredValue("express", np.zeros(14), mean), band)
     assert inside.verdict == "pass" and inside.high95 > band.high  # as wide as 14 events are
     one_look = MeasuredValue("longest_look", np.array([3.0, 15.4]), longest)
-    look = judged(one_look, bands.BY_KEY["longest_look"])
+    look = judge(one_look, bands.BY_KEY["longest_look"])
     assert look.verdict == "outside" and np.isnan(look.high95)  # it has happened
 
 
 def test_every_measure_has_its_band_and_every_band_its_source(walking: GazeTrace) -> None:
-    keys = [measure.key for measure in measured(walking)]
+    keys = [measure.key for measure in measure_run(walking)]
     assert len(set(keys)) == len(keys) and set(keys) <= set(bands.BY_KEY)
     for mode in ("talk", "listen", "think", "none"):
         assert any(bands.applies(band, mode) for band in bands.BANDS if band.mode)
@@ -184,12 +182,12 @@ def test_people_are_as_published() -> None:
     assert human.visit_s(human.matrix(), human.DWELL_MEAN_S) == pytest.approx(visits, abs=1e-3)
     assert human.head_deg([20.0, 40.0, 80.0]) == pytest.approx([1.6, 17.0, 47.8], abs=0.1)
     assert human.evoked_blink([17.0, 33.0]) == pytest.approx([0.5, 0.97], abs=0.01)
-    assert published().share(np.random.default_rng(0)) == pytest.approx(share, abs=0.02)
+    assert published_walk().share(np.random.default_rng(0)) == pytest.approx(share, abs=0.02)
 
 
 def test_the_rigs_own_walk_knows_its_floor() -> None:
     walk, dice = load_walk(RIG.gaze.scanpath.transition_matrix), np.random.default_rng(0)
-    model = own(RIG.gaze.scanpath, walk)
+    model = rig_walk(RIG.gaze.scanpath, walk)
     assert model is not None
     assert model.visits(0, 300, dice).min() >= RIG.gaze.scanpath.min_dwell_ms / 1e3
 
@@ -245,7 +243,7 @@ HOSTILE = "<img src=x onerror=alert(1)> $\\frac{$"
 @pytest.mark.usefixtures("unlaid_figures")
 def test_names_are_never_markup_nor_formulas(walking: GazeTrace) -> None:
     about = RunHeader(HOSTILE, (("rig", HOSTILE), (HOSTILE, "x")), warnings=(HOSTILE,))
-    findings = build.found(walking)
+    findings = build.findings_of(walking)
     shown = [Shown(HOSTILE, walking, colour) for colour in COLOURS]
     for drawing in DRAWINGS[:3]:
         assert png(drawing, shown).startswith(b"\x89PNG")
@@ -267,7 +265,7 @@ def test_an_empty_run_and_a_bad_place_are_told_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(build, "DRAWINGS", build.DRAWINGS[:1])  # all are drawn elsewhere
-    with pytest.raises(SetupError, match="0 ticks are nothing to report on"):
+    with pytest.raises(SetupError, match="0 ticks are too few for a report"):
         build.read([], RunHeader("empty"), lambda words, share: None)
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(SetupError, match="name another file"):
@@ -278,7 +276,7 @@ def test_numbers_are_short() -> None:
     values = {0.0: "0", 0.123456: "0.12", 1.5: "1.5", 20.0: "20", 123.4: "123", -0.002: "-0.002"}
     assert {value: number(value) for value in values} == values
     place = gauge(
-        judged(MeasuredValue("vergence", np.full(40, 9.0), median), bands.BY_KEY["vergence"])
+        judge(MeasuredValue("vergence", np.full(40, 9.0), median), bands.BY_KEY["vergence"])
     )
     assert place.value == 100.0 and place.band_from == pytest.approx(30.0)
 
@@ -301,7 +299,7 @@ def test_the_command_takes_a_file_or_a_scene() -> None:
     runner = CliRunner()
     for arguments in (["report"], ["report", "x.mcap", "--scene", "visitor"]):
         done = runner.invoke(app, arguments)
-        assert done.exit_code == 2 and "one of them" in done.output
+        assert done.exit_code == 2 and "report takes either" in done.output
     done = runner.invoke(app, ["report", "--scene", "nowhere", "--seconds", "5"])
     assert done.exit_code == 2 and "unknown; scenes" in done.output
     done = runner.invoke(app, ["report", "nothing.mcap"])

@@ -42,7 +42,7 @@ def gathered(ticks: list[Tick]) -> GazeTrace:
     gathering = GazeTraceBuilder()
     for tick in ticks:
         gathering.update(tick)
-    return gathering.gathered()
+    return gathering.trace()
 
 
 def at(yaw_deg: float) -> Vec3:

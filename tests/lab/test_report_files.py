@@ -13,7 +13,7 @@ from gazerig.features.lab.report.files import files_of, write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
 from gazerig.features.lab.report.page import Figure, report_page
 from gazerig.features.lab.report.plotting import COLOURS, Shown, png
-from gazerig.features.lab.report.report import DRAWINGS, found
+from gazerig.features.lab.report.report import DRAWINGS, findings_of
 from gazerig.features.lab.report.run_header import RunHeader
 
 
@@ -92,7 +92,7 @@ def test_a_report_writes_over_nothing_that_no_report_has_made(
 
 def test_a_report_writes_over_one_of_before_when_it_is_forced(tmp_path: Path) -> None:
     run = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
-    about, findings = RunHeader("x"), found(run)
+    about, findings = RunHeader("x"), findings_of(run)
     drawing = DRAWINGS[0]
     figure = Figure(drawing, png(drawing, [Shown("x", run, COLOURS[0])]), "nothing")
     page = report_page(about, run, findings, [figure])

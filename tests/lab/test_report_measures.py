@@ -130,7 +130,7 @@ def test_a_shift_of_eyes_that_are_shut_brings_no_blink() -> None:
     run = run_of([(40.0, 120.0, 400.0, 0.3)] * 40)
     with_each = tuple(BlinkEvent(0.4 * n + 0.03, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0)
                       for n in range(0, 40, 4))  # fmt: skip
-    trials = blinks.evoked(replace(run, blinks=with_each))
+    trials = blinks.evoked_blinks(replace(run, blinks=with_each))
     # The next shift comes .4 s later, .07 s after the lids are open again: no trial.
     assert len(trials) == 30 and trials[:, 1].sum() == 10
 

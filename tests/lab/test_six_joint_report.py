@@ -39,7 +39,7 @@ def gathered(ticks: list[Tick]) -> GazeTrace:
     gathering = GazeTraceBuilder()
     for tick in ticks:
         gathering.update(tick)
-    return gathering.gathered()
+    return gathering.trace()
 
 
 def quiet(words: str, share: float) -> None:
@@ -54,7 +54,7 @@ def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: P
     rows = {row["key"]: row for row in json.loads(made.data.read_text())}
     assert {row["basis"] for row in rows.values()} == {"estimated"}
     page = unescape(out.read_text(encoding="utf-8"))
-    assert "Nothing here is measured: the servos of this rig tell nothing" in page
+    assert "Nothing here is measured: the servos of this rig have no feedback" in page
     assert "not measured" in page.partition("Saccades <span")[2][:120]
     assert "measured from the servos" not in page
     assert "{measured}" not in page and "line of sight of each eye, estimated" in page
@@ -148,4 +148,4 @@ def test_a_run_without_lids_has_no_blinks(maker: Run) -> None:
     ]
     run = gathered(bare)
     assert np.isnan(run.column("lid")).all() and run.asked_blinks == ()
-    assert not {"blink_rate", "evoked"} & {measure.key for measure in build.measured(run)}
+    assert not {"blink_rate", "evoked"} & {measure.key for measure in build.measure_run(run)}

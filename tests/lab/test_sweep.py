@@ -246,7 +246,7 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> 
         process.send_signal(signal.SIGINT)
         _, text = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
-    assert f"runs are kept in {out}: the same command goes on" in text and "interrupted" in text
+    assert f"runs are kept in {out}: the same command continues" in text and "interrupted" in text
     assert not alive(workers)
     lines = (out / RUNS).read_text(encoding="utf-8").splitlines()
     assert lines and all(len(json.loads(line)) == 4 for line in lines)

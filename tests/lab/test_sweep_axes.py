@@ -10,7 +10,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.sweep.axes import Axis, axes_of, checked, grid, latin_hypercube
+from gazerig.features.lab.sweep.axes import Axis, axes_of, check_points, grid, latin_hypercube
 from gazerig.robot.cli.tune import read_value
 
 RIG = load_rig("desk")
@@ -63,7 +63,7 @@ def test_whole_numbers_stay_whole() -> None:
         (f"{COMFORT}=", SetupError, "not KEY=VALUES"),
         (f"{COMFORT}=9:4:3", SetupError, "9 is not below 4"),
         (f"{COMFORT}=4:9:1", SetupError, "1 steps; wanted 2 to"),
-        (f"{COMFORT}=4,5,4", SetupError, "a value stands twice"),
+        (f"{COMFORT}=4,5,4", SetupError, "a value is given twice"),
         (f"{COMFORT}=[4", SetupError, "not valid YAML"),
         ("gaze.head=4:9:2", SetupError, "is no single value; name one, for example gaze.head."),
         ("profile=robot,mitake", SetupError, "it acts while files are read; give --profile"),
@@ -78,7 +78,7 @@ def test_what_cannot_be_a_setting_is_refused(
 
 
 def test_a_key_stands_once_and_all_faults_are_told() -> None:
-    with pytest.raises(SetupError, match="stands twice"):
+    with pytest.raises(SetupError, match="is given twice"):
         read(f"{COMFORT}=4,5", f"{COMFORT}=6,7")
     with pytest.raises(ConfigError) as refused:
         read("gaze.hed.comfort_deg=4,5", f"{BLINKS}=1:99")
@@ -99,7 +99,7 @@ def test_a_grid_has_every_combination_the_last_axis_fastest() -> None:
 def test_values_that_the_rig_allows_nowhere_are_refused_before_anything_runs() -> None:
     axes = read(f"{COMFORT}=4,x,-3,95", f"{BLINKS}=10,20")
     with pytest.raises(ConfigError) as refused:
-        checked(RIG, axes, grid(axes))
+        check_points(RIG, axes, grid(axes))
     assert str(refused.value).splitlines() == [
         f"{COMFORT}: 'x' is text, wanted a number, 0 to 90 deg",
         f"{COMFORT}: -3 is below 0 (unit deg)",
@@ -110,10 +110,10 @@ def test_values_that_the_rig_allows_nowhere_are_refused_before_anything_runs() -
 def test_a_rule_between_two_parameters_refuses_only_what_no_point_allows() -> None:
     axes = read(f"{LOW}=0.2,1.5", f"{HIGH}=1.0,2.0")
     points = grid(axes)
-    checked(RIG, axes, points)  # 1.5 and 1.0 exclude each other: those runs say so
+    check_points(RIG, axes, points)  # 1.5 and 1.0 exclude each other: those runs say so
     axes = read(f"{LOW}=2.5,3.0", f"{HIGH}=1.0,2.0")
     with pytest.raises(ConfigError, match="max_salience must be above min_salience"):
-        checked(RIG, axes, grid(axes))
+        check_points(RIG, axes, grid(axes))
 
 
 AXES = (

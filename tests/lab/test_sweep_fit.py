@@ -11,7 +11,7 @@ from command_line import invoked
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.sweep.axes import Axis, Point
-from gazerig.features.lab.sweep.fit import counted_in, fit, trial_of
+from gazerig.features.lab.sweep.fit import counted_measures, fit, trial_of
 from gazerig.features.lab.sweep.outcome import Outcome
 from gazerig.features.lab.sweep.search import search
 from gazerig.features.lab.sweep.snippet import snippet_of
@@ -103,11 +103,11 @@ def test_the_search_beats_chance_and_takes_the_start_along() -> None:
 
 def test_measures_count_if_half_of_the_runs_can_judge_them() -> None:
     runs = [outcome(START, 0, (17.0, None, 0.3)), outcome(START, 1, (40.0, None, None))]
-    assert set(counted_in(runs)) == {"blink_rate", "skew"}
+    assert set(counted_measures(runs)) == {"blink_rate", "skew"}
     with pytest.raises(SetupError, match="too short: no measure has enough events"):
-        counted_in([outcome(START, 0, (None, None, None))])
+        counted_measures([outcome(START, 0, (None, None, None))])
     with pytest.raises(SetupError, match="own values cannot be run: it failed"):
-        counted_in([Outcome(START, 0, {}, "it failed")])
+        counted_measures([Outcome(START, 0, {}, "it failed")])
 
 
 def test_what_can_no_longer_be_judged_is_outside_and_a_failure_worst_of_all() -> None:

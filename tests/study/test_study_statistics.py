@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from scipy import stats
 
-from gazerig.features.lab.analysis.multiplicity import Correction, corrected
+from gazerig.features.lab.analysis.multiplicity import Correction, correct_p_values
 from gazerig.features.study.statistics import effects, ranks
 from gazerig.features.study.statistics.contingency import chi_square, counts_of
 from gazerig.features.study.statistics.reliability import cronbachs_alpha
@@ -69,7 +69,7 @@ def test_corrections_equal_pingouins(by: Correction, theirs: str) -> None:
         ("rank_sum two-sided", "chi_square"), GOLDEN["corrected"][theirs], strict=True
     ):
         family = {str(k): one["pingouin"][name] for k, one in enumerate(GOLDEN["sets"])}
-        found = corrected(family, by)
+        found = correct_p_values(family, by)
         assert list(found) == list(family)
         assert list(found.values()) == pytest.approx(expected, abs=1e-12)
 

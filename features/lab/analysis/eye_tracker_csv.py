@@ -1,12 +1,12 @@
-"""CSV of an eye-tracker -> gaze samples or fixations; refuses what it cannot read with certainty.
+"""CSV of an eye-tracker -> gaze samples or fixations; refuses ambiguous files.
 
-The first line names the columns, in any order and case, beside any others:
+The first line names the columns, in any order and case; other columns are ignored:
 
 samples    time, x, y             one line a sample; an empty or NaN x or y is a lost eye
 fixations  start, duration, part  one line a fixation, already labelled; or x, y for part
 
-A time column may say its unit (time_s, time_ms, start_ms, ...). Without, seconds and
-milliseconds are told apart by their size, and the note says what was taken.
+The name of a time column may end in its unit (time_s, time_ms, start_ms, ...). Without a unit, the
+size of the steps decides between seconds and milliseconds, and the note states the choice.
 """
 
 import csv
@@ -39,7 +39,7 @@ _DURATION_MS = 5.0
 
 
 class Samples(NamedTuple):
-    """Gaze samples: time_s, x and y (n,) each, x and y NaN where the eye was lost."""
+    """Gaze samples: time_s, x and y (n,) each, x and y NaN while the eye was lost."""
 
     time_s: Floats
     x: Floats
@@ -48,7 +48,7 @@ class Samples(NamedTuple):
 
 
 class FixationRow(NamedTuple):
-    """One fixation of a table: part None where outside; p NaN where no place is given."""
+    """One fixation of a table: part None outside all parts; p NaN without a position."""
 
     line: int
     start_s: float
@@ -58,7 +58,7 @@ class FixationRow(NamedTuple):
 
 
 class FixationTable(NamedTuple):
-    """Fixations as tabled; labelled: the part column was there."""
+    """Fixations of a table; labelled: the table has a part column."""
 
     rows: tuple[FixationRow, ...]
     labelled: bool
@@ -75,7 +75,7 @@ class _TrackerTable(NamedTuple):
 
 
 class _Column(NamedTuple):
-    """Where a column is, its name as written, and its unit in seconds where it names one."""
+    """Index of a column, its name as written, and its unit in seconds if the name has one."""
 
     at: int
     name: str
@@ -86,7 +86,7 @@ def read_recording(path: Path) -> Samples | FixationTable:
     """Read samples or fixations.
 
     Raises:
-        SetupError: naming file, line and column, and what is wrong.
+        SetupError: with the file, line and column, and the fault.
     """
     table = _read(path)
     if _find(table, "duration") is not None:
@@ -106,7 +106,7 @@ def _samples(table: _TrackerTable) -> Samples:
             f"{table.path}: columns {x.name} and {y.name}: the eye is lost in all"
             f" {len(lost)} samples; nothing to fit"
         )
-    unit_s, said = time.unit_s, "as its name says"
+    unit_s, said = time.unit_s, "from its name"
     if unit_s is None:
         step = float(np.median(np.diff(raw))) if len(raw) > 1 else 0.0
         if step > _STEP_TOO_LARGE:
@@ -115,7 +115,7 @@ def _samples(table: _TrackerTable) -> Samples:
                 " milliseconds of a tracker; convert it and name it time_s or time_ms"
             )
         unit_s = 1e-3 if step > _STEP_MS else 1.0
-        said = f"by its steps of {step:g}"
+        said = f"from its steps of {step:g}"
     note = f"column {time.name} is in {'s' if unit_s == 1.0 else 'ms'} ({said})"
     return Samples(raw * unit_s, np.where(lost, nan, xs), np.where(lost, nan, ys), note)
 
@@ -140,7 +140,7 @@ def _fixations(table: _TrackerTable) -> FixationTable:
     unit_t = start.unit_s or unit_d
     rows = zip(table.rows, starts * unit_t, durations * unit_d, parts, places, strict=True)
     known = start.unit_s is not None and duration.unit_s is not None
-    said = "as their names say" if known else f"by a median duration of {np.median(durations):g}"
+    said = "from their names" if known else f"from a median duration of {np.median(durations):g}"
     note = f"times are in {'s' if unit_d == 1.0 else 'ms'} ({said})"
     return FixationTable(
         tuple(FixationRow(row[0], float(t), float(d), p, at) for row, t, d, p, at in rows),
@@ -239,7 +239,7 @@ def _or_lost(cell: str) -> float:
 
 
 def _part(table: _TrackerTable, column: _Column, line: int, cell: str) -> str | None:
-    """Read a part's code or name; None for a look outside."""
+    """Read a part's code or name; None for a fixation outside."""
     word = cell.strip().lower()
     if word in _OUTSIDE:
         return None

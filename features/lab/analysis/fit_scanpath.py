@@ -1,4 +1,4 @@
-"""The fit-scanpath command: a recording of a person who looks at a face -> a walk for ``run``."""
+"""The fit-scanpath command: a recording of a person's gaze on a face -> a walk for ``run``."""
 
 from math import isnan
 from pathlib import Path
@@ -13,7 +13,7 @@ from gazerig.features.lab.analysis.fixations import (
     FixationParams,
     PartBoxes,
     fixations_of,
-    labelled,
+    labelled_fixations,
     usual_side,
 )
 from gazerig.gaze.scanpath.fit import (
@@ -29,7 +29,7 @@ from gazerig.gaze.types import PART_NAMES, PARTS
 
 
 class _Source(NamedTuple):
-    """The fixations of a recording, and in words where they come from."""
+    """The fixations of a recording, and a description of their source."""
 
     fixations: tuple[PartFixation, ...]
     notes: tuple[str, ...]
@@ -43,11 +43,11 @@ def fit(
     seed: int = 0,
     force: bool = False,
 ) -> str:
-    """Fit a walk to a recording, write it as YAML, and give a report in words.
+    """Fit a walk to a recording, write it as YAML, and return a report as text.
 
-    parts: where the parts lie in the recording's coordinates; needed unless parts are labelled
+    parts: rectangles of the parts in the recording's coordinates; not needed for labelled parts
     smoothing: "none", "laplace" or "bootstrap"; seed: of the resampling
-    force: replace a file that is there
+    force: replace an existing file
 
     Raises:
         SetupError: a file cannot be read, trusted or written.
@@ -70,9 +70,9 @@ def fit(
 
 
 def walk_yaml(fitted: WalkFit, params: FitParams, about: tuple[str, ...]) -> str:
-    """Write a fitted walk as the YAML that a rig's ``walk`` names.
+    """Return a fitted walk as the YAML that a rig's ``walk`` names.
 
-    about: lines that say where it comes from
+    about: lines with the source of the walk
     """
     level = f"{100.0 * params.confidence:g} %"
     lines = ["# Walk over a face, fitted from a recording:"]
@@ -118,11 +118,11 @@ def walk_yaml(fitted: WalkFit, params: FitParams, about: tuple[str, ...]) -> str
 
 
 def _source(recording: Path, parts: PartBoxes | None) -> _Source:
-    """Read the recording and bring it to fixations."""
+    """Read the recording and find its fixations."""
     read = read_recording(recording)
     try:
         if not isinstance(read, Samples):
-            found = labelled(read, parts)
+            found = labelled_fixations(read, parts)
             return _Source(found, (f"{len(found)} fixations from a table; {read.note}",))
         if parts is None:
             raise SetupError("gaze samples need the rectangles of the face's parts (--parts)")
@@ -146,7 +146,7 @@ def _source(recording: Path, parts: PartBoxes | None) -> _Source:
 
 
 def _walk(fitted: WalkFit) -> Walk:
-    """Build the walk as it will be in the YAML, to write nothing that ``run`` would refuse."""
+    """Build the walk of the YAML, so that a walk that ``run`` would refuse is not written."""
     means = tuple(mean.value for mean in fitted.dwell_mean_s)
     sds = tuple(sd.value for sd in fitted.dwell_sd_s)
     if min(means) < 0.001 or max((*means, *sds)) > 60.0:
@@ -184,7 +184,7 @@ def _one_line(text: str) -> str:
 def _report(
     fitted: WalkFit, params: FitParams, recording: Path, notes: tuple[str, ...], out: Path
 ) -> str:
-    """Print what was found, part by part."""
+    """Return the results as text, part by part."""
     shares = np.array(fitted.visits) / sum(fitted.visits)
     lines = [f"{recording}: {note}" for note in notes]
     lines.append(

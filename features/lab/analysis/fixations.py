@@ -1,7 +1,7 @@
 """Gaze samples -> fixations on the parts of a face.
 
-Fixations are found by dispersion (I-DT, Salvucci & Goldberg 2000) as pymovements has it. It
-wants samples without losses and at one rate, so it is given one unbroken stretch at a time.
+Fixations are found by dispersion (I-DT, Salvucci & Goldberg 2000) with pymovements. It needs
+samples without losses and at one rate, so it gets one unbroken stretch at a time.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class PartBoxes:
-    """Where the parts lie in the recording's own coordinates; parts left out are never seen."""
+    """Rectangles of the parts in the recording's coordinates; parts without one are never seen."""
 
     DN: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the chin"] = None
     FL: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the left side"] = None
@@ -33,7 +33,7 @@ class PartBoxes:
     UP: Annotated[Box | None, Bounds(-1e6, 1e6), "x0, y0, x1, y1 of the forehead"] = None
 
     def __post_init__(self) -> None:
-        """Check that there are boxes, and that each has a width and a height.
+        """Check that there are boxes, and that each has a positive width and height.
 
         Raises:
             ValueError: fewer than two boxes, or corners out of order.
@@ -46,12 +46,12 @@ class PartBoxes:
 
     @property
     def boxes(self) -> dict[str, Box]:
-        """Return the boxes that are there."""
+        """Return the given boxes."""
         every = ((part, getattr(self, part)) for part in PARTS)
         return {part: box for part, box in every if box is not None}
 
     def part_at(self, x: float, y: float) -> str | None:
-        """Return the part at a place, the smaller one where boxes overlap, None outside."""
+        """Return the part at a position, the smallest one if boxes overlap, None outside."""
         inside = [
             ((x1 - x0) * (y1 - y0), part)
             for part, (x0, y0, x1, y1) in self.boxes.items()
@@ -62,7 +62,7 @@ class PartBoxes:
 
 @dataclass(frozen=True)
 class FixationParams:
-    """What counts as a fixation."""
+    """Criteria of a fixation."""
 
     # fmt: off
     shortest_ms: Annotated[float, Bounds(10, 1000), "shortest fixation"] = 60.0
@@ -71,7 +71,7 @@ class FixationParams:
     # fmt: on
 
 
-class _Found(NamedTuple):
+class _RawFixation(NamedTuple):
     """A fixation in the recording's coordinates."""
 
     start_s: float
@@ -83,7 +83,7 @@ class _Found(NamedTuple):
 def fixations_of(
     samples: Samples, boxes: PartBoxes, params: FixationParams
 ) -> tuple[PartFixation, ...]:
-    """Find the fixations and the part each lies on.
+    """Find the fixations and their parts.
 
     Raises:
         SetupError: pymovements is not installed, or there are too few samples.
@@ -98,18 +98,18 @@ def fixations_of(
     widest = params.dispersion * usual_side(boxes)
     pause_s = max(params.longest_loss_ms / 1e3, 1.5 * step_s)
     breaks = np.flatnonzero(np.diff(t_s) > pause_s) + 1
-    found: list[_Found] = []
+    found: list[_RawFixation] = []
     for run in np.split(np.arange(len(t_s)), breaks):
         if len(run) > least:
-            found += _dispersed(t_s[run], places[run], least, widest)
-    joined = _joined(found, 0.5 * widest, pause_s)
+            found += _find_fixations(t_s[run], places[run], least, widest)
+    joined = _join_split(found, 0.5 * widest, pause_s)
     return tuple(
         PartFixation(boxes.part_at(f.x, f.y), f.start_s, f.end_s - f.start_s) for f in joined
     )
 
 
-def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[PartFixation, ...]:
-    """Return the fixations of a table, by their labels or else by the boxes they lie in.
+def labelled_fixations(table: FixationTable, boxes: PartBoxes | None) -> tuple[PartFixation, ...]:
+    """Return the fixations of a table, with parts from its labels or else from the boxes.
 
     Raises:
         SetupError: there are neither labels nor boxes.
@@ -127,11 +127,11 @@ def labelled(table: FixationTable, boxes: PartBoxes | None) -> tuple[PartFixatio
 
 
 def usual_side(boxes: PartBoxes) -> float:
-    """Return the median of the boxes' shorter sides, the scale of what is one place."""
+    """Return the median of the boxes' shorter sides, the scale for dispersion."""
     return float(np.median([min(x1 - x0, y1 - y0) for x0, y0, x1, y1 in boxes.boxes.values()]))
 
 
-def _dispersed(t_s: Floats, places: Floats, least: int, widest: float) -> list[_Found]:
+def _find_fixations(t_s: Floats, places: Floats, least: int, widest: float) -> list[_RawFixation]:
     """Find the fixations of one unbroken stretch."""
     try:
         # Only this command needs it, and it takes a second to import.
@@ -142,24 +142,24 @@ def _dispersed(t_s: Floats, places: Floats, least: int, widest: float) -> list[_
         ) from None
     frame = idt(places, minimum_duration=least, dispersion_threshold=widest).frame
     found = []
-    # The offset is the first sample that no longer belongs to the fixation, unless the
-    # recording ends with it; so offset - onset is the time for which its samples held.
+    # The offset is the first sample after the fixation, unless the recording ends with it; so
+    # offset - onset is the duration of the fixation's samples.
     for first, last in zip(frame["onset"].to_list(), frame["offset"].to_list(), strict=True):
         x, y = np.median(places[first:last], axis=0).tolist()
-        found.append(_Found(float(t_s[first]), float(t_s[last]), x, y))
+        found.append(_RawFixation(float(t_s[first]), float(t_s[last]), x, y))
     return found
 
 
-def _joined(found: list[_Found], nearest: float, pause_s: float) -> list[_Found]:
-    """Join neighbours that one noisy sample has split: hardly apart in place and in time."""
-    out: list[_Found] = []
+def _join_split(found: list[_RawFixation], nearest: float, pause_s: float) -> list[_RawFixation]:
+    """Join neighbours that one noisy sample has split: close in position and in time."""
+    out: list[_RawFixation] = []
     for new in found:
         if out:
             old = out[-1]
             apart = float(np.hypot(new.x - old.x, new.y - old.y))
             if apart < nearest and new.start_s - old.end_s <= pause_s:
                 longer = old if old.end_s - old.start_s >= new.end_s - new.start_s else new
-                out[-1] = _Found(old.start_s, new.end_s, longer.x, longer.y)
+                out[-1] = _RawFixation(old.start_s, new.end_s, longer.x, longer.y)
                 continue
         out.append(new)
     return out

@@ -1,4 +1,4 @@
-"""Chances corrected for being many."""
+"""Corrections of p values for multiple tests."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -6,8 +6,8 @@ from typing import Literal
 Correction = Literal["holm", "bonferroni", "none"]
 
 
-def corrected(chances: Mapping[str, float], by: Correction = "holm") -> dict[str, float]:
-    """Return the chances corrected for their number, under the same keys.
+def correct_p_values(chances: Mapping[str, float], by: Correction = "holm") -> dict[str, float]:
+    """Return p values corrected for their number, under the same keys.
 
     Args:
         chances: key -> p.

@@ -1,4 +1,4 @@
-"""Reactions: saccades to something that had just come into view, found tick by tick."""
+"""Reactions: saccades to something that has just come into view, found tick by tick."""
 
 from math import inf
 from typing import NamedTuple
@@ -6,11 +6,11 @@ from typing import NamedTuple
 from gazerig.robot.control.tick import Tick
 
 _LONGEST_S = 1.0
-"""What is looked at later was there before it was chosen: that is a choice, no reaction."""
+"""A later saccade is a choice, not a reaction."""
 
 
 class MeasuredReaction(NamedTuple):
-    """A saccade to something that had just come into view.
+    """A saccade to something that has just come into view.
 
     seen_s: exposure of the first frame with it; onset_s: the saccade's command; kind: of the thing
     """
@@ -21,12 +21,12 @@ class MeasuredReaction(NamedTuple):
 
     @property
     def latency_s(self) -> float:
-        """Return the time from the one to the other."""
+        """Return the time from the frame to the command."""
         return self.onset_s - self.seen_s
 
 
 class ReactionFinder:
-    """Finds reactions in ticks as they come."""
+    """Finds reactions in ticks as they arrive."""
 
     def __init__(self) -> None:
         self._seen: dict[tuple[str, int], float] = {}
@@ -37,7 +37,7 @@ class ReactionFinder:
         """Add a tick; return the reaction that begins in it, if any."""
         percept = tick.percept
         if percept is not None and percept.captured_s != self._captured_s:
-            # What is there from the beginning has not come into view.
+            # A thing in the first percept has not come into view.
             since_s = -inf if self._captured_s is None else percept.captured_s
             self._captured_s = percept.captured_s
             for number, kind in zip(percept.bodies.ids, percept.bodies.kinds, strict=True):

@@ -65,16 +65,16 @@ def report(
     """Report how human a run's gaze was: gazerig report run.mcap, then open report.html."""
     with clear_errors():
         file, rig = _source(file, scene, bus, other)
-        # Drawing and models are heavy; `--help` does without them.
+        # Drawing and models are heavy; `--help` does not import them.
         from gazerig.features.lab.report.files import files_of, refuse_foreign
         from gazerig.features.lab.report.page import banner
         from gazerig.features.lab.report.report import FIGURE_KEYS, report_of
 
-        target = page_file(out or _beside(file, scene))
+        target = page_file(out or _default_page(file, scene))
         refuse_foreign(files_of(target, FIGURE_KEYS), force)
         with progress_bar() as tell:
             if file is not None:
-                about, run = _recorded(file, file.stem, tell)
+                about, run = _read_run(file, file.stem, tell)
             else:
                 from gazerig.robot.app.options import RunOptions
 
@@ -83,30 +83,30 @@ def report(
                     character=character, profile=profile, conversation=conversation,
                     seconds=seconds,
                 ).checked()  # fmt: skip
-                about, run = _simulated(options, tell)
+                about, run = _simulate_run(options, tell)
             gaze = None if file is None or other is None else _mutual_gaze(file, other)
             made = report_of(run, about, target, tell, force, gaze)
         if text := banner(run.joints):
             say(text)
-        _tell_findings(made.findings)
-        say(f"{made.page}: the whole report; {len(made.figures)} figures beside it")
+        _print_findings(made.findings)
+        say(f"{made.page}: the whole report; {len(made.figures)} figures in the folder next to it")
 
 
 def _source(
     file: Path | None, scene: str | None, bus: str | None, other: Path | None
 ) -> tuple[Path | None, str]:
-    """Return what to report of: a recording, or None for a scene; and the rig of that scene.
+    """Return the recording, or None for a scene, and the rig of that scene.
 
     Raises:
-        SetupError: an option does not go with a recording, or not with a scene.
+        SetupError: an option needs a recording or a scene.
     """
     rig = DEFAULT_RIG
     if scene is not None and file is not None and file.suffix != ".mcap":
         rig, file = str(file), None
     if (file is None) == (scene is None):
-        raise SetupError("report takes a recording, or --scene NAME: one of them")
+        raise SetupError("report takes either a recording or --scene NAME")
     if file is not None and bus is not None:
-        raise SetupError("--bus needs --scene: a recording was made on the bus it names")
+        raise SetupError("--bus needs --scene: a recording already has its bus")
     if file is None and other is not None:
         raise SetupError("--with takes the recording of another head: give both recordings")
     return file, rig
@@ -133,7 +133,10 @@ def compare(
         refuse_foreign(files_of(target, FIGURE_KEYS), force)
         recordings = RunRecording(first), RunRecording(second)
         names = _names(first, second)
-        abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])
+        abouts = (
+            _recording_header(recordings[0], names[0]),
+            _recording_header(recordings[1], names[1]),
+        )
         with used(Path(f"{first} or {second}")), progress_bar() as tell:
             ticks = recordings[0].ticks(), recordings[1].ticks()
             made = comparing(ticks, abouts, target, tell, force)
@@ -150,19 +153,19 @@ def compare(
         say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
 
 
-def _recorded(file: Path, name: str, tell: Steps) -> "tuple[RunHeader, GazeTrace]":
+def _read_run(file: Path, name: str, tell: Steps) -> "tuple[RunHeader, GazeTrace]":
     """Read a recorded run."""
     from gazerig.features.lab.report.report import read
     from gazerig.robot.recording.read import RunRecording, used
 
     recording = RunRecording(file)
-    about = _about(recording, name)
+    about = _recording_header(recording, name)
     with used(file):
         return about, read(recording.ticks(), about, tell)
 
 
 def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
-    """Read how two heads of one run looked at each other."""
+    """Read the mutual gaze of two heads of one run."""
     from gazerig.features.lab.report.heads import mutual_gaze_report
     from gazerig.robot.recording.read import RunRecording, used
 
@@ -178,7 +181,7 @@ def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
         )
 
 
-def _simulated(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":
+def _simulate_run(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":
     """Run a scene in simulated time; Ctrl-C ends the run early."""
     from gazerig.config.schema import load_walk
     from gazerig.features.lab.simulated_run import simulate
@@ -203,10 +206,10 @@ def _simulated(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrac
     )
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
     name = " ".join(filter(None, (options.scene, options.character, options.profile)))
-    return _described(name, facts, rig, walk), run.trace
+    return _run_header(name, facts, rig, walk), run.trace
 
 
-def _about(recording: "RunRecording", name: str) -> "RunHeader":
+def _recording_header(recording: "RunRecording", name: str) -> "RunHeader":
     """Describe a recorded run."""
     from gazerig.features.lab.report.run_header import RunHeader
 
@@ -225,17 +228,17 @@ def _about(recording: "RunRecording", name: str) -> "RunHeader":
     )
     warnings = (recording.note,) if recording.note else ()
     try:
-        rig, walk = _configured(info.config_yaml, info.walk_yaml)
+        rig, walk = _load_config(info.config_yaml, info.walk_yaml)
     except ConfigError as error:
         first = str(error).splitlines()[0]
         cannot = f"the recorded configuration is not valid today, so no notes on it: {first}"
         return RunHeader(name, known, warnings=(*warnings, cannot), duration_s=recording.duration_s)
-    made = _described(name, known, rig, walk)
+    made = _run_header(name, known, rig, walk)
     return replace(made, warnings=warnings, duration_s=recording.duration_s)
 
 
-def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
-    """Read the configuration that a recording holds.
+def _load_config(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
+    """Read the configuration in a recording.
 
     Raises:
         gazerig.config.load.ConfigError: it is not valid today.
@@ -255,14 +258,14 @@ def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
         return rig, load(walk_file, Walk)
 
 
-def _described(
+def _run_header(
     name: str,
     facts: tuple[tuple[str, str], ...],
     rig: "Rig",
     walk: "Walk",
 ) -> "RunHeader":
-    """Add to a run's description the style of its gaze."""
-    from gazerig.features.lab.report.reference_walk import own
+    """Return a run's description with the style of its gaze."""
+    from gazerig.features.lab.report.reference_walk import rig_walk
     from gazerig.features.lab.report.run_header import RunHeader
 
     gaze = rig.gaze
@@ -274,11 +277,11 @@ def _described(
         ("saccades", gaze.saccade.profile),
         ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.transition_matrix}"),
     )
-    return RunHeader(name, (*facts, *shown), frozenset(styles), own(gaze.scanpath, walk))
+    return RunHeader(name, (*facts, *shown), frozenset(styles), rig_walk(gaze.scanpath, walk))
 
 
-def _tell_findings(findings: "Sequence[MeasureResult]") -> None:
-    """Print which measures are outside their bands, and how many are within."""
+def _print_findings(findings: "Sequence[MeasureResult]") -> None:
+    """Print the measures outside their bands, and the counts of all verdicts."""
     for finding in findings:
         if finding.verdict == "outside":
             band = finding.band
@@ -295,19 +298,19 @@ def _tell_findings(findings: "Sequence[MeasureResult]") -> None:
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
-    """Return two short names that differ."""
+    """Return two different short names."""
     if first.stem != second.stem:
         return first.stem, second.stem
     return f"{first.stem} (A)", f"{second.stem} (B)"
 
 
 def page_file(out: Path) -> Path:
-    """Return the file of a page, whose name ends so that a browser opens it as one."""
+    """Return the file of a page, with a suffix that browsers open as a page."""
     if out.suffix.lower() in _PAGES:
         return out
-    # Not with_suffix: what follows the dot of "evening-0.5" is no ending.
+    # Not with_suffix: the part after the dot of "evening-0.5" is not a suffix.
     return out.with_name(f"{out.name}.html")
 
 
-def _beside(file: Path | None, scene: str | None) -> Path:
+def _default_page(file: Path | None, scene: str | None) -> Path:
     return file.with_suffix(".html") if file is not None else Path(f"report-{scene}.html")

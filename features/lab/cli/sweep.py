@@ -1,4 +1,4 @@
-"""The command ``gazerig sweep``: many simulated runs, and what parameters do to their figures."""
+"""The command ``gazerig sweep``: many simulated runs, and the effect of parameters on figures."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -32,9 +32,9 @@ _COLUMNS = (
     *("outside", "distance", "fixations", "saccades", "blinks"),
     *("gaze_error_deg.median", "gaze_error_deg.p95"),
 )
-"""What can be drawn besides the report's measures."""
-_TRIED = 60
-"""Points of a search where nothing is said; the help of --samples says so."""
+"""Figures that can be drawn in addition to the report's measures."""
+_DEFAULT_POINTS = 60
+"""Default number of points of a search; the help of --samples names it."""
 
 
 @app.command(cls=RigCommand)
@@ -57,9 +57,9 @@ def sweep(
     behaviour: options.Behaviour = None,
     conversation: options.Conversation = None,
 ) -> None:
-    """Vary parameters over many simulated runs: a table, and a picture of what responds.
+    """Vary parameters over many simulated runs; write a table and a figure of the responses.
 
-    Every finished run is kept at once: the same command goes on after Ctrl-C.
+    Every finished run is stored immediately: the same command continues after Ctrl-C.
 
     --fit searches for the values with most measures inside people's bands.
     """
@@ -69,30 +69,36 @@ def sweep(
             mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,
             character=character, rules=rules, behaviour=behaviour, conversation=conversation,
         ).checked()  # fmt: skip
-        number = samples if samples is not None or not fit else _TRIED
-        spec, points = _checked(asked, setting or (), range(seed, seed + seeds), number, fit)
+        number = samples if samples is not None or not fit else _DEFAULT_POINTS
+        spec, points = _plan_runs(asked, setting or (), range(seed, seed + seeds), number, fit)
         folder = out or Path(f"{'fit' if fit else 'sweep'}-{Path(rig).stem}-{scene}")
         if fit:
-            outcomes = _fitted(spec, folder, jobs, shown)
+            outcomes = _search_best(spec, folder, jobs, shown)
         else:
-            outcomes = _swept(spec, points, folder, jobs, shown)
+            outcomes = _run_points(spec, points, folder, jobs, shown)
     if all(one.failed for one in outcomes):
         raise typer.Exit(FAULT)
 
 
-def _checked(
+def _plan_runs(
     asked: RunOptions, settings: Sequence[str], seeds: range, number: int | None, fit: bool
 ) -> "tuple[SweepSpec, Sequence[Point]]":
-    """Return what is to be run, with its points unless a search is to find them.
+    """Return the runs to make, with their points unless a search will find them.
 
     Raises:
-        ConfigError, SetupError: something in it cannot be run.
+        ConfigError, SetupError: a point or an option cannot be run.
     """
-    # Models are heavy; `--help` does without them. What draws the picture is an extra, whose
-    # absence is told before hours of runs and not after them.
+    # Models are heavy; `--help` does not import them. The figures need an extra; a missing extra
+    # is reported before hours of runs, not after them.
     import gazerig.features.lab.sweep.response_figure  # noqa: F401
     from gazerig.features.lab.simulated_run import refuse_unfit
-    from gazerig.features.lab.sweep.axes import axes_of, checked, grid, latin_hypercube, one_by_one
+    from gazerig.features.lab.sweep.axes import (
+        axes_of,
+        check_points,
+        grid,
+        latin_hypercube,
+        one_by_one,
+    )
     from gazerig.features.lab.sweep.sweep import SweepSpec
     from gazerig.robot.app.run_rig import run_rig
 
@@ -106,25 +112,25 @@ def _checked(
         points = one_by_one(axes)
     else:
         points = grid(axes) if number is None else latin_hypercube(axes, number, seeds[0])
-    checked(rig, axes, points)
+    check_points(rig, axes, points)
     how = "fit" if fit else "samples"
     search = {how: number, "seed": seeds[0]} if number is not None else {}
     return SweepSpec(rig, asked, tuple(axes), tuple(seeds), search), points
 
 
-def _swept(
+def _run_points(
     spec: "SweepSpec", points: "Sequence[Point]", folder: Path, jobs: int | None,
     shown: Sequence[str],
 ) -> "list[Outcome]":  # fmt: skip
     """Run all points, and write table and picture."""
-    with _working(spec, folder, jobs) as (work, runs):
+    with _running_sweep(spec, folder, jobs) as (work, runs):
         outcomes = work.run(points, runs)
     _write(spec, folder, outcomes, shown)
     _say_failures(outcomes)
     return outcomes
 
 
-def _fitted(
+def _search_best(
     spec: "SweepSpec", folder: Path, jobs: int | None, shown: Sequence[str]
 ) -> "list[Outcome]":
     """Search for the best point; write it as YAML, with the table and picture of all runs."""
@@ -135,7 +141,7 @@ def _fitted(
     count, seed = int(str(spec.search["fit"])), int(str(spec.search["seed"]))
     start = {axis.key: value_of(spec.rig, axis.key) for axis in spec.axes}
     outcomes: list[Outcome] = []
-    with _working(spec, folder, jobs) as (work, runs):
+    with _running_sweep(spec, folder, jobs) as (work, runs):
         total = (count + 1) * len(spec.seeds)
 
         def run(points: "Sequence[Point]") -> "Sequence[Sequence[Outcome]]":
@@ -153,7 +159,7 @@ def _fitted(
 
 
 def _say_fit(found: "SweepFit", snippet: Path, asked: RunOptions) -> None:
-    """Print the best point beside the rig's own values, and how to run it."""
+    """Print the best point, the rig's own values, and the command to run it."""
     own, best = found.start, found.best
     say(
         f"{len(found.counted)} measures count, {len(found.trials)} points tried; outside: "
@@ -173,7 +179,7 @@ def _say_fit(found: "SweepFit", snippet: Path, asked: RunOptions) -> None:
 def _write(
     spec: "SweepSpec", folder: Path, outcomes: "Sequence[Outcome]", shown: Sequence[str]
 ) -> None:
-    """Write table and picture, and say where."""
+    """Write table and figure, and print their paths."""
     from gazerig.features.lab.sweep.response_figure import PICTURE, response_png
     from gazerig.features.lab.sweep.table import write_tables
 
@@ -183,15 +189,15 @@ def _write(
         write_file(files[-1], response_png(spec.axes, outcomes, shown), force=True)
     points = len(outcomes) // len(spec.seeds)
     count = f"{points} points, {len(spec.seeds)} seeds each: {len(outcomes)} runs"
-    say(f"{files[0]}: {count}; beside it {', '.join(file.name for file in files[1:])}")
+    say(f"{files[0]}: {count}; also {', '.join(file.name for file in files[1:])}")
 
 
 @contextmanager
-def _working(
+def _running_sweep(
     spec: "SweepSpec", folder: Path, jobs: int | None
 ) -> "Iterator[tuple[Sweep, Progress]]":
-    """Return what runs points and what draws how far it is; Ctrl-C ends it and keeps its runs."""
-    from gazerig.features.lab.sweep.sweep import working
+    """Yield the sweep and its progress function; Ctrl-C ends the sweep and keeps its runs."""
+    from gazerig.features.lab.sweep.sweep import open_sweep
     from gazerig.features.lab.sweep.worker_pool import SweepInterrupted
 
     reached = [0, 0]
@@ -199,7 +205,7 @@ def _working(
         with (
             progress_bar(remaining=True) as tell,
             signals() as stopped,
-            working(spec, folder, jobs, stopped) as work,
+            open_sweep(spec, folder, jobs, stopped) as work,
         ):
 
             def runs(done: int, total: int) -> None:
@@ -208,15 +214,15 @@ def _working(
 
             yield work, runs
     except SweepInterrupted:
-        say(f"{reached[0]} of {reached[1]} runs are kept in {folder}: the same command goes on")
+        say(f"{reached[0]} of {reached[1]} runs are kept in {folder}: the same command continues")
         raise typer.Exit(INTERRUPTED) from None
 
 
 def _column(name: str) -> str:
-    """Return the column of a measure that can be drawn.
+    """Return the column of a measure.
 
     Raises:
-        SetupError: there is none of that name.
+        SetupError: there is no measure of that name.
     """
     if name in BY_KEY or name in _COLUMNS[:2]:
         return f"report.{name}"
@@ -228,7 +234,7 @@ def _column(name: str) -> str:
 
 
 def _say_failures(outcomes: "Sequence[Outcome]") -> None:
-    """Print which runs failed, each reason once."""
+    """Print the failed runs, each reason once."""
     reasons = Counter(one.failed for one in outcomes if one.failed)
     for failed, count in reasons.items():
         first = next(one for one in outcomes if one.failed == failed)

@@ -1,4 +1,4 @@
-"""The options of the command sweep that run does not have, and what --help says of them."""
+"""The options of the command sweep that run does not have, with their help."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Blinks: how often, with what shape, and with which gaze shifts."""
+"""Blinks: their rate, their shape, and the gaze shifts that evoke them."""
 
 from collections.abc import Sequence
 from math import nan
@@ -20,16 +20,16 @@ _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0
 _WITH_BEFORE_S, _WITH_AFTER_S = 0.12, 0.2
 _AGAIN_S = 0.3
-"""So soon after a blink even one that a shift asks for would be a double one."""
+"""Time after a blink within which a blink with a gaze shift would be a double blink."""
 
 _PART_S = 10.0
 _TIED_S = 0.006
 _SHUT = 0.96
-"""A blink that goes so far has shut the eye; of lids in steps of a servo."""
+"""A blink of this depth has shut the eye, given the resolution of a servo."""
 
 
 def intervals(run: GazeTrace) -> Floats:
-    """Return seconds from blink to blink; the second of a double one counts as the same."""
+    """Return seconds from blink to blink; a double blink counts once."""
     onsets = np.array([blink.onset_s for blink in run.blinks])
     apart = np.diff(onsets)
     return apart[apart > _DOUBLE_S]
@@ -44,10 +44,10 @@ def shapes(blinks: Sequence[BlinkEvent]) -> Floats:
     return np.array(rows).reshape(-1, 4)
 
 
-def evoked(run: GazeTrace) -> Floats:
-    """Return (n, 2) amplitude of each saccade in deg and whether a blink went with it.
+def evoked_blinks(run: GazeTrace) -> Floats:
+    """Return (n, 2) amplitude of each saccade in deg and whether a blink came with it.
 
-    Shifts during a blink that began before them are left out: eyes that are shut cannot shut.
+    Shifts during an earlier blink are left out: shut eyes cannot shut.
     """
     onsets = np.array([blink.onset_s for blink in run.blinks])
     opened = onsets + np.array([blink.duration_s for blink in run.blinks])
@@ -63,8 +63,8 @@ def evoked(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 2)
 
 
-def tied(run: GazeTrace) -> Floats:
-    """Return (n,) whether each blink begins in the very moment of a saccade."""
+def tied_blinks(run: GazeTrace) -> Floats:
+    """Return (n,) whether each blink begins at the same moment as a saccade."""
     onsets = np.array([saccade.onset_s for saccade in run.saccades])
     if not len(onsets):
         return np.zeros(len(run.blinks))
@@ -73,9 +73,9 @@ def tied(run: GazeTrace) -> Floats:
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about lids."""
+    """Return the measures of lids."""
     seen, asked = shapes(run.blinks), shapes(run.asked_blinks)
-    large = evoked(run)
+    large = evoked_blinks(run)
     large = large[large[:, 0] >= _EVOKING_DEG]
     partial = np.array([float(blink.depth < _SHUT) for blink in run.blinks])
     shape = [
@@ -90,12 +90,12 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         *shape,
         MeasuredValue("evoked", large[:, 1], mean),
         MeasuredValue("blink_partial", partial, mean),
-        MeasuredValue("blink_tied", tied(run), mean),
+        MeasuredValue("blink_tied", tied_blinks(run), mean),
     ]
 
 
 def _counts(run: GazeTrace) -> Floats:
-    """Return (n, 2) blinks and seconds of every ten seconds of the run."""
+    """Return (n, 2) blinks and seconds of each ten seconds of the run."""
     if not len(run.rows):
         return np.zeros((0, 2))
     first, last = run.column("t")[[0, -1]]

@@ -1,11 +1,11 @@
-"""Two runs held against each other: the same figures, the differences, and whether they are chance.
+"""Comparison of two runs: their figures, the differences, and the p values of these.
 
-For each measure the events of both runs are thrown together and dealt out again at random
-(permutation test) to see how often chance makes a difference as large; where a measure has one
-number an event, the two distributions are held against each other too (Kolmogorov-Smirnov).
-All these chances are corrected for their number (Holm 1979). The interval of the difference is a
-bootstrap's (Efron 1979). Events count as independent of each other, as is usual; within a run
-they are not quite, so a difference just above chance deserves another run.
+For each measure, the events of both runs are pooled and dealt again at random (permutation test)
+to find how often chance makes a difference as large. If a measure has one number an event, the two
+distributions are compared too (Kolmogorov-Smirnov). All p values are corrected for their number
+(Holm 1979). The interval of the difference is a bootstrap's (Efron 1979). Events count as
+independent of each other, as is usual. Within a run they are not quite independent, so a
+difference just above chance deserves another run.
 """
 
 import warnings
@@ -16,15 +16,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.features.lab.analysis.multiplicity import corrected
-from gazerig.features.lab.report.compare_page import MeasureDifference, Word, compare_page, mixed
+from gazerig.features.lab.analysis.multiplicity import correct_p_values
+from gazerig.features.lab.report.compare_page import (
+    MeasureDifference,
+    Word,
+    compare_page,
+    mixed_basis_warning,
+)
 from gazerig.features.lab.report.files import write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.plotting import COLOURS, Shown
-from gazerig.features.lab.report.report import Progress, drawn, measured, read
+from gazerig.features.lab.report.report import Progress, draw_figures, measure_run, read
 from gazerig.features.lab.report.run_header import RunHeader
-from gazerig.features.lab.report.statistics import MeasuredValue, figure, figures, judged
-from gazerig.features.lab.report.statistics import drawn as resampled
+from gazerig.features.lab.report.statistics import MeasuredValue, bootstrap, figure, figures, judge
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.control.tick import Tick
@@ -36,9 +40,9 @@ COMPARING = "comparing"
 
 
 class Comparison(NamedTuple):
-    """What was found, and the files that say so.
+    """The differences, and the files with them.
 
-    warning: that one run is measured and the other estimated, "" where both are alike
+    warning: that one run is measured and the other estimated, "" if both have the same basis
     """
 
     differences: tuple[MeasureDifference, ...]
@@ -55,25 +59,25 @@ def compare(
     progress: Progress,
     force: bool = False,
 ) -> Comparison:
-    """Write a page that puts two runs side by side, its figures and numbers; give what differs.
+    """Write a page that compares two runs, its figures and numbers; return the differences.
 
-    force: replace files that are there
+    force: replace existing files
 
     Raises:
-        SetupError: a file cannot be written, or there is nothing in a run.
+        SetupError: a file cannot be written, or a run is empty.
     """
     runs = [read(each, about, progress) for each, about in zip(ticks, abouts, strict=True)]
     progress(COMPARING, 0.0)
-    differences = differences_of(measured(runs[0]), measured(runs[1]))
+    differences = differences_of(measure_run(runs[0]), measure_run(runs[1]))
     progress(COMPARING, 1.0)
     shown = [
         Shown(about.name, run, colour, about.model)
         for about, run, colour in zip(abouts, runs, COLOURS, strict=True)
     ]
-    figures = drawn(shown, progress)
+    figures = draw_figures(shown, progress)
     page = compare_page(abouts, runs, differences, figures)
     written = write_all(out, page, figures, [_numbers(d, runs) for d in differences], force)
-    return Comparison(differences, out, *written, mixed(abouts, runs))
+    return Comparison(differences, out, *written, mixed_basis_warning(abouts, runs))
 
 
 def differences_of(
@@ -87,7 +91,7 @@ def differences_of(
     chances = {m.key: chance(m, n, rng) for m, n in pairs if m.key in enough}
     shapes = {m.key: chance_of_shape(m, n) for m, n in pairs if m.key in enough}
     known = {k: p for k, p in shapes.items() if isfinite(p)}
-    both = corrected({**chances, **{f"{k} shape": p for k, p in known.items()}})
+    both = correct_p_values({**chances, **{f"{k} shape": p for k, p in known.items()}})
     out = []
     for m, n in pairs:
         p, shape = both.get(m.key, nan), both.get(f"{m.key} shape", nan)
@@ -96,7 +100,7 @@ def differences_of(
 
 
 def chance(a: MeasuredValue, b: MeasuredValue, rng: np.random.Generator) -> float:
-    """Return how often events dealt out at random differ in their figure as much as these."""
+    """Return the p value of the difference of two figures by a permutation test."""
     rows, n = np.concatenate([a.rows, b.rows]), len(a.rows)
     seen = abs(figure(b.of, b.rows) - figure(a.of, a.rows))
     as_much = drawn_count = 0
@@ -110,13 +114,13 @@ def chance(a: MeasuredValue, b: MeasuredValue, rng: np.random.Generator) -> floa
 
 
 def chance_of_shape(a: MeasuredValue, b: MeasuredValue) -> float:
-    """Return the Kolmogorov-Smirnov chance of two distributions, nan of rows that are none."""
+    """Return the Kolmogorov-Smirnov p value of two distributions, nan for rows without one."""
     if a.rows.ndim != 1 or len(np.unique(np.concatenate([a.rows, b.rows]))) <= 2:
         return nan
-    from scipy import stats  # a second of processor, which other commands need not wait for
+    from scipy import stats  # takes a second to import, which other commands should not pay
 
     with warnings.catch_warnings():
-        # Where the exact chance overflows, SciPy takes the asymptotic one by itself, and says so.
+        # If the exact p value overflows, SciPy uses the asymptotic one and warns.
         warnings.simplefilter("ignore", RuntimeWarning)
         return float(stats.ks_2samp(a.rows, b.rows).pvalue)
 
@@ -125,11 +129,11 @@ def _difference(
     a: MeasuredValue, b: MeasuredValue, p: float, shape: float, rng: np.random.Generator
 ) -> MeasureDifference:
     band = BY_KEY[a.key]
-    ours, theirs = judged(a, band), judged(b, band)
+    ours, theirs = judge(a, band), judge(b, band)
     if not isfinite(p):
         return MeasureDifference(ours, theirs, nan, nan, nan, nan, nan, "too few events")
     value = theirs.value - ours.value
-    low, high = _interval(resampled(b, rng), resampled(a, rng), value)
+    low, high = _interval(bootstrap(b, rng), bootstrap(a, rng), value)
     differs = p < LEVEL or (isfinite(shape) and shape < LEVEL)
     word: Word = "more than chance" if differs else "may be chance"
     return MeasureDifference(ours, theirs, value, low, high, p, shape, word)

@@ -1,11 +1,11 @@
-"""The page that puts two runs side by side, and the values it shows."""
+"""The page of a comparison of two runs, and its values."""
 
 from collections.abc import Sequence
 from math import isfinite
 from typing import Literal, NamedTuple
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.page import Figure, banner, left_out, line_of, rendered, with_unit
+from gazerig.features.lab.report.page import Figure, banner, left_out, line_of, render, with_unit
 from gazerig.features.lab.report.run_header import RunHeader
 from gazerig.features.lab.report.statistics import MeasureResult, number
 from gazerig.robot.analysis.norm_bands import GROUPS
@@ -17,9 +17,9 @@ Word = Literal["more than chance", "may be chance", "too few events"]
 class MeasureDifference(NamedTuple):
     """One measure of two runs.
 
-    difference: b - a; low95, high95: its interval, nan where there is none
-    chance: how often chance alone gives as much, corrected; chance_shape: the same for the
-        whole distribution, nan where a measure has none
+    difference: b - a; low95, high95: its interval, nan if unknown
+    chance: p value of the difference, corrected; chance_shape: the same for the whole distribution,
+        nan if the measure has none
     """
 
     a: MeasureResult
@@ -110,7 +110,7 @@ def compare_page(
         )
         for group in GROUPS
     )
-    return rendered(
+    return render(
         "compare.html", abouts=abouts, sections=sections, facts=_facts(abouts, runs),
         differing=[d.a.band.title for d in differences if d.word == "more than chance"],
         counts={word: sum(d.word == word for d in differences) for word in _CLASSES},
@@ -119,30 +119,30 @@ def compare_page(
 
 
 def banners(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> tuple[str, ...]:
-    """Return what a reader must know first: which runs were not measured, or differ in it."""
+    """Return the warnings at the top: runs that were not measured, or differ in that."""
     messages = [
         f"{about.name}: {text}"
         for about, run in zip(abouts, runs, strict=True)
         if (text := banner(run.joints))
     ]
-    return (*messages, *filter(None, (mixed(abouts, runs),)))
+    return (*messages, *filter(None, (mixed_basis_warning(abouts, runs),)))
 
 
-def mixed(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> str:
-    """Warn of a measured run beside an estimated one, "" where both rest on the same."""
+def mixed_basis_warning(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> str:
+    """Return a warning if one run is measured and the other estimated, "" otherwise."""
     first, second = (run.joints.whole_basis for run in runs)
     if first == second:
         return ""
     return (
-        f"{abouts[0].name} is {first} and {abouts[1].name} is {second}: what differs may be what "
-        "the servos tell, not what the gaze did"
+        f"{abouts[0].name} is {first} and {abouts[1].name} is {second}: differences may "
+        "come from the servos' feedback, not from the gaze"
     )
 
 
 def _left_out(
     abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace], group: str
 ) -> tuple[str, ...]:
-    """Return why a section says less than it could, and of which run."""
+    """Return the reasons for missing measures of a section, and the run of each reason."""
     each = [dict.fromkeys(left_out(run.joints, group)) for run in runs]
     both = [why for why in each[0] if why in each[1]]
     return (
@@ -163,7 +163,7 @@ def _basis(basis: Basis) -> str:
 def _facts(
     abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]
 ) -> tuple[tuple[str, str, str], ...]:
-    """Return what is known of both runs, side by side."""
+    """Return the facts of both runs, side by side."""
     first, second = (dict(about.facts) for about in abouts)
     names = dict.fromkeys((*first, *second))
     counts = [

@@ -1,4 +1,4 @@
-"""Looks at a face and away from it, and the time in which two look at each other."""
+"""Looks at a face and away from it, and times of mutual gaze."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ def on_face(run: GazeTrace) -> NDArray[np.bool_]:
 
 
 def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
-    """Return (n, 3) begin, end, and whether it was cut off by the run, of each time it holds."""
+    """Return (n, 3) start, end, and whether the run cut it off, of each time with a true mask."""
     t = run.column("t")
     if not len(t):
         return np.zeros((0, 3))
@@ -38,7 +38,7 @@ def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
 
 
 def looks(run: GazeTrace) -> Floats:
-    """Return the times of looks at a face, cut ones included."""
+    """Return the times of looks at a face, including cut ones."""
     return bouts(run, on_face(run))
 
 
@@ -48,7 +48,7 @@ def mutual(run: GazeTrace) -> Floats:
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about looks at people."""
+    """Return the measures of looks at people."""
     seen = looks(run)
     whole = _lengths(seen[seen[:, 2] == 0.0])
     both = mutual(run)

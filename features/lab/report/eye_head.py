@@ -1,4 +1,4 @@
-"""How eyes and head share a gaze shift, and how the gaze is held while the head turns."""
+"""Shares of eyes and head in a gaze shift, and stability of the gaze while the head turns."""
 
 from math import nan
 from typing import NamedTuple
@@ -15,10 +15,10 @@ from gazerig.robot.analysis.saccade_finder import THRESHOLD_DEG_S
 LEAST_DEG = 5.0
 _AFTER_S, _BEFORE_S, _LEAST_AFTER_S = 0.9, 0.15, 0.45
 _SOON_S = 0.5
-"""A head that starts later does not go with the eyes' shift."""
+"""A head that starts later does not belong to the eyes' shift."""
 
 _NEXT_DEG = 8.0
-"""A saccade as large as this begins another shift."""
+"""A saccade of this size begins another shift."""
 
 _STILL_DEG_S, _STARTS_DEG_S = 10.0, 8.0
 _MOVES_DEG = 5.0
@@ -29,12 +29,11 @@ _ASIDE_DEG = 10.0
 
 
 class Shift(NamedTuple):
-    """One gaze shift with what the head did in it; sideways angles, along the shift.
+    """One gaze shift and the head's motion in it; sideways angles, along the shift.
 
-    aside_deg: the target, seen from where the head pointed before; also of a shift homeward
-    head_deg: how far the head turned until the next shift, 0.9 s at most
-    head_after_s: from the eyes' start to the head's, nan where it did not go with them
-    head_peak_deg_s: its highest speed
+    aside_deg: target from the previous direction of the head; also for a shift back to it
+    head_deg: turn of the head until the next shift, 0.9 s at most
+    head_after_s: start of the head after that of the eyes, nan if the head did not move with them
     """
 
     aside_deg: float
@@ -70,7 +69,7 @@ def gaze_shifts(run: GazeTrace) -> list[Shift]:
             or float(np.median(moves[window])) > _STILL_DEG_S
         ):
             continue
-        # Where the gaze was to go: an eye at the end of its range is there only with the head.
+        # The target, because an eye at the end of its range reaches it only with the head.
         aside = float(np.median(goal[landing]) - head[window.start])
         sign = 1.0 if aside >= 0.0 else -1.0
         turned = sign * float(head[window.stop - 1] - head[window.start])
@@ -81,7 +80,7 @@ def gaze_shifts(run: GazeTrace) -> list[Shift]:
 def _shift(
     run: GazeTrace, onset_s: float, sign: float, aside: float, turned: float, speed: Floats
 ) -> Shift:
-    """Add when the head started and how fast it was."""
+    """Return a shift with the start and the speed of the head."""
     window = run.between(onset_s - _BEFORE_S, onset_s + _AFTER_S)
     t, fast = run.column("t")[window], speed[window]
     moving = np.flatnonzero((fast > _STARTS_DEG_S) & (t < onset_s + _SOON_S))
@@ -90,7 +89,7 @@ def _shift(
 
 
 def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: float) -> list[slice]:
-    """Return the runs of rows where ``mask`` holds and the target stays the same."""
+    """Return the runs of rows with a true ``mask`` and an unchanged target."""
     edges = np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0))
     out = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
@@ -104,8 +103,8 @@ def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: floa
 def vor(run: GazeTrace) -> Floats:
     """Return (n, 2) gain of the eyes against the head and the head's speed, one row a stretch.
 
-    What the eyes have to do is the target's motion seen from the head, less the head's: a near
-    target asks for more than the head turns, and that is no fault of the gain.
+    The required eye motion is the target's motion seen from the head, less the head's: a near
+    target requires more than the head's turn, which is no fault of the gain.
     """
     t = run.column("t")
     if len(t) < 20:
@@ -114,7 +113,7 @@ def vor(run: GazeTrace) -> Floats:
     gaze_y, gaze_p, at_y, at_p, head_y, head_p = (rate(t, run.column(name)) for name in names)
     still = np.hypot(run.column("target_yaw_rate"), run.column("target_pitch_rate"))
     mask = run.slow() & (still < _STILL_TARGET_DEG_S) & (np.hypot(head_y, head_p) > _HEAD_DEG_S)
-    # A fast head that the eyes cannot follow is part of the shift, and its target is not reached.
+    # If the eyes cannot follow a fast head, that is part of the shift, short of the target.
     mask &= run.column("off_left") < 3.0
     rows = []
     for part in stretches(mask, t, run.column("shift"), _STRETCH_S):
@@ -132,7 +131,7 @@ def vor(run: GazeTrace) -> Floats:
 
 
 def rolls(run: GazeTrace) -> Floats:
-    """Return (n,) how far the head is rolled in each fixation of something aside, in deg."""
+    """Return (n,) the roll of the head in each fixation of a target to the side, in deg."""
     roll, aside = np.abs(run.column("head_roll")), np.abs(run.column("target_yaw"))
     parts = [run.between(f.start_s, f.end_s) for f in run.fixations]
     return np.array(
@@ -141,7 +140,7 @@ def rolls(run: GazeTrace) -> Floats:
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about eyes and head."""
+    """Return the measures of eyes and head."""
     shifts = gaze_shifts(run)
     seen = np.array([(s.aside_deg, s.head_deg) for s in shifts]).reshape(-1, 2)
     beyond = seen[seen[:, 0] > human.STAHL_FREE_DEG]

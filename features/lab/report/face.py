@@ -1,4 +1,4 @@
-"""Where on the face the gaze rests, for how long, and where it goes next."""
+"""Gaze on a face: parts, dwell times and transitions."""
 
 from functools import cache
 from typing import NamedTuple
@@ -16,7 +16,7 @@ N = len(PARTS)
 _EYES = (PARTS.index("LE"), PARTS.index("RE"))
 _SETTLED_S = 0.04
 _PAUSE_S = 0.3
-"""Visits farther apart in time do not follow each other."""
+"""Visits farther apart in time are not consecutive."""
 
 # Grid of the heat map: 4 mm, and half a degree seen from a metre away.
 _Y_M, _Z_M = np.arange(-0.1, 0.1001, 0.004), np.arange(-0.13, 0.1301, 0.004)
@@ -26,7 +26,7 @@ GRID_M = (_Y_M, _Z_M)
 
 
 class Visit(NamedTuple):
-    """Time on one part, refixations of it included."""
+    """Time on one part, including refixations."""
 
     part: int
     start_s: float
@@ -58,15 +58,15 @@ def shifts(run: GazeTrace) -> Floats:
     return np.array(rows, dtype=float).reshape(-1, 2)
 
 
-def counted(rows: Floats) -> Floats:
-    """Return (8, 8) counts of shifts, rows from."""
+def count_shifts(rows: Floats) -> Floats:
+    """Return (8, 8) counts of shifts; rows are the parts of origin."""
     out = np.zeros((N, N))
     np.add.at(out, (rows[:, 0].astype(int), rows[:, 1].astype(int)), 1.0)
     return out
 
 
 def on_parts(run: GazeTrace) -> Floats:
-    """Return (n, 2) part and seconds of every fixation on one."""
+    """Return (n, 2) part and seconds of every fixation on a part."""
     rows = [(PARTS.index(f.part), f.duration_s) for f in run.fixations if f.part is not None]
     return np.array(rows, dtype=float).reshape(-1, 2)
 
@@ -82,7 +82,7 @@ def share(rows: Floats) -> Floats:
 def human_share() -> Floats:
     """Return the share of time that people spend on each part (Nakamoto & Tsuruno), (8,).
 
-    Asked for thousands of times by figures of samples drawn again, so computed once.
+    Figures of bootstrap samples need it thousands of times, so it is computed once.
     """
     out = human.time_share(human.matrix(), human.DWELL_MEAN_S)
     out.setflags(write=False)
@@ -90,9 +90,9 @@ def human_share() -> Floats:
 
 
 def points(run: GazeTrace) -> Floats:
-    """Return (n, 3) y and z on the face in metres, and seconds, of fixations meant for a face.
+    """Return (n, 3) y and z on the face in metres, and seconds, of fixations with a face as target.
 
-    They may well lie beside it.
+    The fixations may miss the face.
     """
     y, z = run.column("face_y"), run.column("face_z")
     rows = []
@@ -117,7 +117,7 @@ def density(rows: Floats) -> Floats:
 
 @cache
 def expected_density() -> Floats:
-    """Return the density that people's share of time on the parts makes; computed once."""
+    """Return the density of people's share of time on the parts; computed once."""
     places = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
     out = density(np.column_stack([places, human_share()]))
     out.setflags(write=False)
@@ -125,7 +125,7 @@ def expected_density() -> Floats:
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about the gaze on faces."""
+    """Return the measures of the gaze on faces."""
     parts, moves, seen = on_parts(run), shifts(run), visits(run)
     on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
     never = human.matrix() == 0.0
@@ -133,19 +133,19 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     lengths = np.array([visit.end_s - visit.start_s for visit in seen])
     meant = [(float(f.part is not None), f.duration_s) for f in run.fixations if f.kind == "face"]
     return [
-        MeasuredValue("on_parts", np.array(meant).reshape(-1, 2), _weighted),
-        MeasuredValue("part_share", parts, _share_apart),
-        MeasuredValue("eyes_share", np.column_stack([on_eyes, parts[:, 1]]), _weighted),
+        MeasuredValue("on_parts", np.array(meant).reshape(-1, 2), _weighted_mean),
+        MeasuredValue("part_share", parts, _share_difference),
+        MeasuredValue("eyes_share", np.column_stack([on_eyes, parts[:, 1]]), _weighted_mean),
         MeasuredValue("visit", lengths, mean),
         MeasuredValue("never_taken", forbidden, mean),
-        MeasuredValue("transitions", moves, _rows_apart),
-        MeasuredValue("heat", points(run), _alike),
+        MeasuredValue("transitions", moves, _transition_difference),
+        MeasuredValue("heat", points(run), _heat_correlation),
         *_axes(run),
     ]
 
 
 def _axes(run: GazeTrace) -> list[MeasuredValue]:
-    """Measure where both eyes point, one row a fixation on a face."""
+    """Measure the directions of both eyes, one row a fixation on a face."""
     rows = axes(run)
     vergence = rows[:, 6]
     good = (vergence >= -2.5) & (vergence <= 4.5)
@@ -162,8 +162,8 @@ def _axes(run: GazeTrace) -> list[MeasuredValue]:
 def axes(run: GazeTrace) -> Floats:
     """Return (n, 7) medians of fixations on a face.
 
-    Columns: where the left, then the right pupil axis passes the point looked at (y, z, in mm
-    of the face's plane); angles off it, in deg; vergence beyond what is due, in deg.
+    Columns: miss distance of the left, then of the right pupil axis from the target point (y, z, in
+    mm of the face's plane); angles of both from it, in deg; vergence error, in deg.
     """
     names = ("left_y_mm", "left_z_mm", "right_y_mm", "right_z_mm", "off_left", "off_right")
     due = run.column("vergence") - run.column("vergence_due")
@@ -176,14 +176,14 @@ def axes(run: GazeTrace) -> Floats:
     return whole
 
 
-def _share_apart(rows: Floats) -> float:
-    """Return half the sum of the differences to people's shares: 0 alike, 1 nothing in common."""
+def _share_difference(rows: Floats) -> float:
+    """Return half the sum of the differences from people's shares: 0 equal, 1 disjoint."""
     return float(0.5 * np.abs(share(rows) - human_share()).sum())
 
 
-def _rows_apart(rows: Floats) -> float:
-    """Return that difference of the rows of the transition matrix, weighted by their shifts."""
-    counts = counted(rows)
+def _transition_difference(rows: Floats) -> float:
+    """Return that difference for the rows of the transition matrix, weighted by their shifts."""
+    counts = count_shifts(rows)
     total = counts.sum(axis=1)
     here = total > 0.0
     ours = counts[here] / total[here, None]
@@ -191,23 +191,23 @@ def _rows_apart(rows: Floats) -> float:
     return float(np.average(apart, weights=total[here]))
 
 
-def _weighted(rows: Floats) -> float:
+def _weighted_mean(rows: Floats) -> float:
     return float(np.average(rows[:, 0], weights=rows[:, 1]))
 
 
-def _alike(rows: Floats) -> float:
-    """Return the correlation of the heat map with that expected of people."""
+def _heat_correlation(rows: Floats) -> float:
+    """Return the correlation of the heat map with the heat map expected of people."""
     ours = density(rows).ravel()
     ours = ours - ours.mean()
     size = float(np.sqrt(ours @ ours))
-    if size == 0.0:  # all of it beside the face
+    if size == 0.0:  # no time on the face
         return 0.0
     return float(ours @ _expected_unit()) / size
 
 
 @cache
 def _expected_unit() -> Floats:
-    """Return the heat map expected of people, less its mean, of length 1."""
+    """Return the heat map expected of people, less its mean, with norm 1."""
     expected = expected_density().ravel()
     expected = expected - expected.mean()
     out: Floats = expected / np.sqrt(expected @ expected)
@@ -215,7 +215,7 @@ def _expected_unit() -> Floats:
 
 
 def _cells(places: Floats, centres: Floats) -> NDArray[np.intp]:
-    """Return in which cell of an axis each place is; outside it, a number that no cell has."""
+    """Return the index of each place's cell on an axis; an invalid index outside the axis."""
     step = centres[1] - centres[0]
     out: NDArray[np.intp] = np.floor((places - centres[0]) / step + 0.5).astype(np.intp)
     return out

@@ -19,7 +19,7 @@ from gazerig.features.lab.report.plotting import (
     legend,
     nothing,
 )
-from gazerig.features.lab.report.reference_walk import published
+from gazerig.features.lab.report.reference_walk import published_walk
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
@@ -60,12 +60,12 @@ def _time_share(figure: Figure, runs: Sequence[Shown]) -> None:
 
 
 def _dwell(figure: Figure, runs: Sequence[Shown]) -> None:
-    """Draw how visits to each part are distributed, beside the law of table 1."""
+    """Draw the distribution of visits to each part, with the law of table 1."""
     panels = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
     rng = np.random.default_rng(7)
     grid = np.geomspace(0.03, 4.0, 120)
     for part, axes in enumerate(panels):
-        law = published().visits(part, 2000, rng)
+        law = published_walk().visits(part, 2000, rng)
         axes.plot(grid, _below(law, grid), color=HUMAN, lw=1.6, label="table 1")
         for shown in runs:
             if shown.model is not None:
@@ -105,7 +105,7 @@ def _transitions(figure: Figure, runs: Sequence[Shown]) -> None:
         if not len(moves):
             nothing(axes, "no shift between parts")
             continue
-        counts = face.counted(moves)
+        counts = face.count_shifts(moves)
         total = counts.sum(axis=1, keepdims=True)
         ours = np.divide(counts, total, out=np.zeros_like(counts), where=total > 0)
         _matrix(axes, ours, f"{shown.name} ({len(moves)} shifts)", theirs)
@@ -173,7 +173,7 @@ def _pupils(figure: Figure, runs: Sequence[Shown]) -> None:
 
 
 def _spot(axes: Axes, points: Floats, colour: str) -> None:
-    """Draw where one axis passes, its mean, and the ellipse of two standard deviations."""
+    """Draw the points of one axis, their mean, and the ellipse of two standard deviations."""
     if len(points) < 3:
         axes.text(0, 0, "too few", ha="center", color=HUMAN)
         return

@@ -71,7 +71,7 @@ def _following(figure: Figure, runs: Sequence[Shown]) -> None:
     response.axhspan(0.85, 1.05, color=HUMAN_FILL, lw=0, zorder=0)
     some = False
     for shown in runs:
-        rows = following.followed(shown.run)
+        rows = following.pursuit_stretches(shown.run)
         gains.scatter(rows[:, 0], rows[:, 1], s=14, alpha=0.65, lw=0, color=shown.colour,
                       label=f"{shown.name} ({len(rows)})")  # fmt: skip
         bode = following.response(shown.run)

@@ -71,7 +71,7 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
 
 
 def _mean_blink(shown: Shown, column: str = "lid") -> np.ndarray | None:
-    """Return the lid openings about every blink on one time axis, (n, times)."""
+    """Return the lid openings of every blink on one time axis, (n, times)."""
     t, lid = shown.run.column("t"), shown.run.column(column)
     inside = [
         b.onset_s for b in shown.run.blinks if t[0] < b.onset_s - 0.1 < b.onset_s + 0.5 < t[-1]
@@ -90,7 +90,7 @@ def _when(figure: Figure, runs: Sequence[Shown]) -> None:
             weights = np.full(len(apart), 1.0 / len(apart))
             gaps.hist(np.minimum(apart, 15.0), bins, weights=weights, histtype="step", lw=1.6,
                       color=shown.colour, label=f"{shown.name} ({len(apart)})")  # fmt: skip
-        rows = blinks.evoked(shown.run)
+        rows = blinks.evoked_blinks(shown.run)
         edges = np.array([0.0, 5.0, 10.0, 17.0, 25.0, 33.0, 50.0, 90.0])
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             here = rows[(rows[:, 0] >= low) & (rows[:, 0] < high)]

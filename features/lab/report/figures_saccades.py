@@ -1,4 +1,4 @@
-"""Figures of saccades and fixations beside human curves."""
+"""Figures of saccades and fixations with human curves."""
 
 from collections.abc import Sequence
 
@@ -52,7 +52,7 @@ def _main_sequence(figure: Figure, runs: Sequence[Shown]) -> None:
     _human(peaks, a, human.slowest_peak(a), human.fastest_peak(a))
     _human(durations, a, human.shortest_ms(a), human.longest_ms(a))
     for shown, table in zip(runs, tables, strict=True):
-        asked = saccades.asked_table(shown.run)
+        asked = saccades.commanded_table(shown.run)
         style = {"s": 9, "alpha": 0.45, "lw": 0}
         if not len(table):
             continue

@@ -1,4 +1,4 @@
-"""The files of a report: one page that needs no other file, PNGs beside it, numbers as JSON."""
+"""The files of a report: one self-contained page, its PNGs, and its numbers as JSON."""
 
 import json
 from collections.abc import Collection, Sequence
@@ -10,13 +10,13 @@ from gazerig.features.lab.report.page import Figure
 
 
 def numbers_file(out: Path) -> Path:
-    """Return where the numbers of a page go: never the name that a run's own summary has."""
+    """Return the file of a page's numbers; its name differs from that of a run's own summary."""
     return out.with_name(f"{out.stem}_measures.json")
 
 
 _PAGE_MARK = b'name="generator" content="gazerig"'
 _MARKS = {".json": b'[\n {\n  "key": ', ".png": b"Matplotlib"}
-"""What stands near the beginning of the files that reports and comparisons make."""
+"""Text near the beginning of the files of reports and comparisons."""
 
 _HEAD_BYTES = 4096
 
@@ -28,22 +28,22 @@ def files_of(out: Path, figures: Collection[str]) -> tuple[Path, ...]:
 
 
 def refuse_foreign(paths: Collection[Path], force: bool = False) -> None:
-    """Refuse files that are there; with ``force`` only those that no report has made.
+    """Refuse existing files; with ``force`` only those that are no report's.
 
     Raises:
         SetupError: something already exists or cannot be written.
     """
     refuse_existing(*paths, force=force)
     for path in paths:
-        if path.is_file() and not _made_here(path):
+        if path.is_file() and not _is_own_file(path):
             raise SetupError(
                 f"{path} was not made by gazerig report or compare, and is kept even with --force: "
                 "name another file, or remove it"
             )
 
 
-def _made_here(path: Path) -> bool:
-    """Whether a file looks like those of this module; an empty one holds nothing to lose."""
+def _is_own_file(path: Path) -> bool:
+    """Return whether a file looks like those of this module; an empty one counts too."""
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)
@@ -59,9 +59,9 @@ def write_all(
     numbers: Sequence[dict[str, object]],
     force: bool = False,
 ) -> tuple[tuple[Path, ...], Path]:
-    """Write page, figures and numbers; give the figures' paths and that of the numbers.
+    """Write page, figures and numbers; return the figures' paths and that of the numbers.
 
-    force: replace files that an earlier report has made
+    force: replace files of an earlier report
 
     Raises:
         SetupError: something already exists or cannot be written.

@@ -1,4 +1,4 @@
-"""One pass over the ticks of a run: what every measure and figure of the report rests on."""
+"""One pass over the ticks of a run: the data of every measure and figure of the report."""
 
 from array import array
 from collections import defaultdict
@@ -35,24 +35,24 @@ PLANE_M = -0.028
 
 MODES = ("none", "talk", "listen", "think")
 PHASES = ("fixate", "saccade", "pursue")
-"""What the eyes do, as ``phase`` counts it."""
+"""States of the eyes, in the order of ``phase``."""
 
 _IDLE = frozenset(("search", "glance", "rest"))
 _LONGEST_FORESEEN_S = 0.3
 
 
 class TraceRow(NamedTuple):
-    """One tick; degrees, seconds, metres where the name says no other; nan where unknown.
+    """One tick; degrees, seconds or metres unless the name has a unit; nan if unknown.
 
     gaze_*: mean line of sight in space; head_*, eye_*: neck, and mean eye in the head
-    idle: whether the target is one of those with no one there
-    eye_limited: whether an eye is at the end of its range, short of where it should point
-    target_*: direction of the point in force from the head, now; target_*_rate: its speed
-    vergence, vergence_due: as it is, and as the point's place asks for
-    off_left, off_right: angle of each line of sight off the point
-    left_y_mm ... right_z_mm: where each pupil axis passes the point, in the face's plane
-    face_y, face_z: where the gaze meets the face, from the tip of the nose
-    face_off: how far the person's face is turned away from the robot
+    idle: whether the target is one of those without a person
+    eye_limited: whether an eye is at the end of its range, short of its target
+    target_*: direction of the current target from the head; target_*_rate: its speed
+    vergence, vergence_due: measured, and required by the target's distance
+    off_left, off_right: angle of each line of sight from the target
+    left_y_mm ... right_z_mm: miss distance of each pupil axis, in the face's plane
+    face_y, face_z: intersection of the gaze with the face, from the tip of the nose
+    face_off: angle of the person's face away from the robot
     lid, lower_lid: the wider opening of the upper and of the lower lids, 0 shut .. 1 open
     shift: the target's event count; mode: index in MODES
     """
@@ -94,11 +94,11 @@ class TraceRow(NamedTuple):
 
 @dataclass(frozen=True)
 class GazeTrace:
-    """A whole run: columns (one value a tick), and events in the order of their beginning.
+    """A whole run: columns (one value a tick), and events in the order of their start.
 
-    asked_blinks: as the models commanded them; kinds: seconds per kind of target
-    joints: of the rig, and which of them are estimated
-    reactions: to what came into view
+    asked_blinks: blinks as commanded by the models; kinds: seconds per kind of target
+    joints: joints of the rig, and which of them are estimated
+    reactions: to things that came into view
     """
 
     rows: Floats
@@ -123,13 +123,13 @@ class GazeTrace:
 
     @property
     def rate_hz(self) -> float:
-        """Return the median tick rate, 0 of nothing."""
+        """Return the median tick rate, 0 for an empty run."""
         t = self.column("t")
         return float(1.0 / np.median(np.diff(t))) if len(t) > 1 else 0.0
 
     @property
     def mode(self) -> str:
-        """Return the mode of conversation that was in force for longest."""
+        """Return the mode of conversation with the longest time."""
         modes = self.column("mode")
         return MODES[int(np.bincount(modes.astype(int)).argmax())] if len(modes) else "none"
 
@@ -163,7 +163,7 @@ class GazeTraceBuilder:
         self._estimated: dict[str, None] = {}
 
     def update(self, tick: Tick) -> None:
-        """Add a tick; time during which a user has stopped the robot does not count."""
+        """Add a tick; time while a user has stopped the robot does not count."""
         for command in tick.commands:
             if (
                 isinstance(command, Ask)
@@ -191,8 +191,8 @@ class GazeTraceBuilder:
             pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
             self._asked_lids.extend((max(lids or (nan,)), degrees(pitch)))
 
-    def gathered(self) -> GazeTrace:
-        """Return all of it as it is now."""
+    def trace(self) -> GazeTrace:
+        """Return the trace of all added ticks."""
         rows = np.array(self._flat).reshape(-1, len(TraceRow._fields))
         t_s, lid, pitch = (
             rows[:, TraceRow._fields.index(name)] for name in ("t", "lid", "eye_pitch")
@@ -228,7 +228,7 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
     off_deg = nan
     if face is not None:
         since_s = min(max(0.0, tick.t_s - face[1]), _LONGEST_FORESEEN_S)
-        off_deg = _turned_deg(face[0], head)
+        off_deg = _face_angle_deg(face[0], head)
         gaze_at = _on_plane(face[0], since_s, head, way)
         if target.kind == "face":
             R = face[0].R_world_face
@@ -255,7 +255,7 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
 
 
 def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:
-    """Return yaw and pitch rate of a point that moves, seen from a head that stands still."""
+    """Return yaw and pitch rate of a moving point, seen from a head at rest."""
     x, y, z = rel
     level2 = x * x + y * y
     if level2 < 1e-6:
@@ -267,7 +267,7 @@ def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:
 
 
 def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
-    """Return the target's face, or else the one looked at, with its time; and whether it is."""
+    """Return the target's face, or else the gazed one, with its time; and whether it is gazed."""
     if tick.percept is None:
         return None, False
     captured_s, found = tick.percept.captured_s, None
@@ -282,14 +282,14 @@ def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
     return (found, captured_s), seen
 
 
-def _turned_deg(face: Face, head: Vec3) -> float:
-    """Return how far a face is turned away from the robot's."""
+def _face_angle_deg(face: Face, head: Vec3) -> float:
+    """Return the angle of a face away from the robot's."""
     R = face.R_world_face
     return degrees(angle_between((R[0][0], R[1][0], R[2][0]), sub(head, face.p_world_m)))
 
 
 def _on_plane(face: Face, since_s: float, head: Vec3, way: Vec3) -> tuple[float, float]:
-    """Return where the gaze meets the face's plane, (y, z) from the nose, nan where it does not."""
+    """Return the gaze's intersection with the face's plane, (y, z) from the nose, nan if none."""
     R = face.R_world_face
     out = scale((R[0][0], R[1][0], R[2][0]), PLANE_M)
     centre = add(add(face.p_world_m, scale(face.v_world_m_s, since_s)), out)

@@ -1,4 +1,4 @@
-"""How two heads of one world looked at each other, from the recordings of both."""
+"""Mutual gaze of two heads of one world, from the recordings of both."""
 
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
@@ -27,7 +27,7 @@ _BOTH_GREEN = "#2b8a5a"
 
 
 class _Measure(NamedTuple):
-    """A figure of ``mutual_gaze``; {a} and {b} in its title are the heads; people: what they do."""
+    """A figure of ``mutual_gaze``; {a} and {b} in its title: the heads; people: human value."""
 
     key: str
     title: str
@@ -64,13 +64,13 @@ class GazeLine(NamedTuple):
 
 
 class MutualGazeReport(NamedTuple):
-    """What is said of two heads.
+    """The report of two heads.
 
     Attributes:
         first: name of the head that the report is about.
         second: name of the other one.
-        figures: as ``mutual_gaze`` gives them, as in the summary of the run.
-        png: who looked when.
+        figures: result of ``mutual_gaze``, as in the summary of the run.
+        png: timeline of the looks.
     """
 
     first: str
@@ -93,12 +93,12 @@ class MutualGazeReport(NamedTuple):
 
     @property
     def data_uri(self) -> str:
-        """Return the picture as the page holds it."""
+        """Return the picture as embedded in the page."""
         return f"data:image/png;base64,{b64encode(self.png).decode()}"
 
     @property
     def as_json(self) -> dict[str, object]:
-        """Return the figures as the report's numbers hold them."""
+        """Return the figures as in the report's numbers."""
         return {"key": GAZE_KEY, "first": self.first, "second": self.second, **self.figures}
 
 
@@ -107,29 +107,31 @@ def mutual_gaze_report(
     stands: tuple[Sequence[float], Sequence[float]],
     names: tuple[str, str],
 ) -> MutualGazeReport:
-    """Return how two heads looked at each other.
+    """Return the report of the mutual gaze of two heads.
 
     Args:
         ticks: of both runs, on one clock.
-        stands: where each stood in their world, as ``RunInfo.stands`` has it.
+        stands: place of each head in their world, as in ``RunInfo.stands``.
         names: of both.
 
     Raises:
-        SetupError: there was only one head, or both stood in one place.
+        SetupError: there was only one head, or both had the same place.
     """
     for name, place in zip(names, stands, strict=True):
         if not place:
             raise SetupError(
-                f"{name} is of a head that was alone: --with takes the recordings of two heads of "
+                f"{name} is from a run with one head: --with takes the recordings of two heads of "
                 "one run, for example run.mcap and run-other.mcap"
             )
     if tuple(stands[0]) == tuple(stands[1]):
-        raise SetupError(f"{names[0]} and {names[1]} are of one head: --with takes the other's")
+        raise SetupError(
+            f"{names[0]} and {names[1]} are from the same head: --with takes the other's"
+        )
     trace = MutualGazeTrace(HeadPlace.of(stands[0]), HeadPlace.of(stands[1]))
     both = merge(
         ((tick.t_s, 0, tick) for tick in ticks[0]),
         ((tick.t_s, 1, tick) for tick in ticks[1]),
-        key=lambda each: each[:2],  # of one instant the first head's comes first, as in the run
+        key=lambda each: each[:2],  # at one instant the first head comes first, as in the run
     )
     for _, head, tick in both:
         trace.update(head, tick)
@@ -141,7 +143,7 @@ def mutual_gaze_report(
 
 
 def _timeline(figure: Figure, looks: MutualLooks, names: tuple[str, str]) -> None:
-    """Draw who looked when."""
+    """Draw the looks of both heads over time."""
     axes = figure.subplots()
     first, second = bridged(looks.t_s, looks.first), bridged(looks.t_s, looks.second)
     rows = ((first, COLOURS[0]), (first & second, _BOTH_GREEN), (second, COLOURS[1]))
@@ -155,7 +157,7 @@ def _timeline(figure: Figure, looks: MutualLooks, names: tuple[str, str]) -> Non
 
 
 def _spans(looks: MutualLooks, mask: Mask) -> list[tuple[float, float]]:
-    """Return begin and length of each time it holds, seconds since the beginning."""
+    """Return start and length of each time with a true mask, seconds since the beginning."""
     t_s = looks.t_s
     return [
         (float(t_s[begin] - t_s[0]), float(t_s[min(end, len(t_s) - 1)] - t_s[begin]))

@@ -1,4 +1,4 @@
-"""What a rig's joints allow to be said of its gaze, and what that rests on."""
+"""The measures that a rig's joints permit, and whether they are measured or estimated."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from gazerig.robot.model.types import in_order
 class JointBasis:
     """The joints of a run.
 
-    names: in their order; empty if unknown, and then nothing is left out
-    estimated: those whose servos tell nothing
+    names: in their order; if empty, the joints are unknown and nothing is left out
+    estimated: joints whose servos have no feedback
     """
 
     names: tuple[str, ...] = ()
     estimated: tuple[str, ...] = ()
 
     def has(self, *names: str) -> bool:
-        """Return whether any of some joints is there."""
+        """Return whether the rig has any of some joints."""
         return not self.names or not frozenset(names).isdisjoint(self.names)
 
     @property
@@ -31,26 +31,26 @@ class JointBasis:
 
     @property
     def styles(self) -> frozenset[str]:
-        """Return which notes of the bands apply."""
+        """Return the styles that select notes of the bands."""
         return frozenset((PARALLEL,)) if self.parallel else frozenset()
 
     def basis(self, group: str) -> Basis:
-        """Return what a section of the report rests on: its lids, or eyes and neck."""
+        """Return the basis of a section of the report: its lids, or eyes and neck."""
         lids = group == LIDS
         return basis_of(self.names, self.estimated, lambda name: name.endswith("_lid") == lids)
 
     @property
     def whole_basis(self) -> Basis:
-        """Return what the whole report rests on."""
+        """Return the basis of the whole report."""
         each = {self.basis(group) for group in GROUPS if group != LIDS or self.has(*UPPER)}
         return each.pop() if len(each) == 1 else "partly estimated"
 
     def left_out(self, key: str) -> str:
-        """Return why a measure or a figure can say nothing of these joints, "" where it can."""
+        """Return why a measure or a figure needs other joints, "" if it does not."""
         return next((why for keys, cannot, why in _RULES if key in keys and cannot(self)), "")
 
     def all_left_out(self, keys: Iterable[str]) -> tuple[str, ...]:
-        """Return why some of these measures and figures are left out, each reason once."""
+        """Return the reasons for leaving out some of these measures and figures, each once."""
         return tuple(dict.fromkeys(why for key in keys if (why := self.left_out(key))))
 
 
@@ -75,12 +75,12 @@ _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     (
         (*_HEAD_PART, "head_roll", "vor"),
         _no_neck,
-        "This rig has no neck: there is no head movement to look at.",
+        "This rig has no neck, so it has no head movement.",
     ),
     (
         _HEAD_PART,
         lambda joints: not joints.has("neck_yaw"),
-        "No joint turns the head sideways: its part in shifts of the gaze is left out.",
+        "No joint turns the head sideways: the head's part in gaze shifts is left out.",
     ),
     (
         ("head_roll",),
@@ -90,7 +90,7 @@ _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     (
         ("vor",),
         lambda joints: not joints.has("neck_yaw", "neck_pitch"),
-        "No joint turns the head sideways or up: there is no turn to hold the gaze in.",
+        "No joint turns the head sideways or up, so the gaze need not be stabilised.",
     ),
     (
         ("vergence", "vergence_ok"),
@@ -100,17 +100,17 @@ _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     (
         _BLINKS,
         lambda joints: not joints.has(*UPPER),
-        "This rig has no upper lids: there are no blinks to look at.",
+        "This rig has no upper lids, so it has no blinks.",
     ),
     (
         ("unasked",),
         _eyes_estimated,
-        "Saccades that no model asked for are left out: an estimated eye follows its command, whatever "
-        "the real one does.",
+        "Saccades without a command are left out: an estimated eye follows its command, whatever "
+        "the real eye does.",
     ),
 )
 
 
 def joints_of(names: Iterable[str], estimated: Iterable[str]) -> JointBasis:
-    """Gather what ticks say of their joints."""
+    """Return the basis from the joints of ticks."""
     return JointBasis(in_order(names), in_order(estimated))

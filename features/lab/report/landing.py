@@ -1,4 +1,4 @@
-"""How saccades land: beyond or short of their targets, and what corrects them."""
+"""Landing points of saccades: overshoot, undershoot and corrections."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from gazerig.gaze.types import Floats
 
 OVERSHOOT_DEG = (5.0, 20.0)
 FAR_DEG = 10.0
-"""From here on people's saccades fall short."""
+"""From this size on people's saccades fall short."""
 
 _SETTLED_S = (0.06, 0.1)
 _LANDED_S = (0.02, 0.04)
@@ -19,7 +19,7 @@ _CORRECTION_S = (0.08, 0.35)
 def planned_saccades(run: GazeTrace) -> Floats:
     """Return (n, 4) of each saccade that the models planned.
 
-    Columns: onset and end in s, how far the measured gaze went in deg, and 1 on a face.
+    Columns: onset and end in s, measured gaze amplitude in deg, and 1 on a face.
     """
     t, flying = run.column("t"), run.column("phase") == PHASES.index("saccade")
     edges = np.flatnonzero(np.diff(flying.astype(int), prepend=0, append=0)).reshape(-1, 2)
@@ -34,7 +34,7 @@ def planned_saccades(run: GazeTrace) -> Floats:
 
 
 def overshoots(run: GazeTrace) -> Floats:
-    """Return (n,) how far each saccade of 5 to 20 deg went beyond its rest, as a share of it."""
+    """Return (n,) the overshoot of each saccade of 5 to 20 deg, as a share of its amplitude."""
     rows = []
     moves = np.hypot(run.column("target_yaw_rate"), run.column("target_pitch_rate"))
     asked = [s for s in run.saccades if s.commanded is not None]
@@ -56,11 +56,11 @@ def overshoots(run: GazeTrace) -> Floats:
 
 
 def landings(run: GazeTrace) -> Floats:
-    """Return (n, 2) of saccades to targets 10 deg away and more: share of the way, and corrected.
+    """Return (n, 2) of saccades to targets 10 deg away and more: share of the distance, corrected.
 
-    An eye that stops at the end of its range is brought on by the head, and no landing of its own.
+    Saccades that end at the end of an eye's range are left out: the head completes them.
 
-    corrected: 1 where another saccade to the same target follows within .35 s
+    corrected: 1 if another saccade to the same target follows within .35 s
     """
     t, shift = run.column("t"), run.column("shift")
     at = np.column_stack([run.column("target_yaw"), run.column("target_pitch")])
@@ -80,11 +80,11 @@ def landings(run: GazeTrace) -> Floats:
         if far < FAR_DEG:
             continue
         share = float((np.median(gaze, axis=0) - start) @ way) / far**2
-        rows.append((share, float(_corrected(jumps, number, t, shift))))
+        rows.append((share, float(_is_corrected(jumps, number, t, shift))))
     return np.array(rows).reshape(-1, 2)
 
 
-def _corrected(jumps: Floats, number: int, t: Floats, shift: Floats) -> bool:
+def _is_corrected(jumps: Floats, number: int, t: Floats, shift: Floats) -> bool:
     """Return whether the next saccade follows soon and has the same target."""
     if number + 1 >= len(jumps):
         return False
@@ -100,7 +100,7 @@ def _gaze(run: GazeTrace, part: slice) -> Floats:
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about landings."""
+    """Return the measures of landings."""
     landed = landings(run)
     return [
         MeasuredValue("overshoot", overshoots(run), median),

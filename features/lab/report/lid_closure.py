@@ -1,9 +1,9 @@
-"""Blinks of a whole run: what lids do beyond following the gaze.
+"""Blinks of a whole run, separated from the lids' motion with the gaze.
 
-Upper lids go up and down with the eyes. A gaze shift that brings a blink also moves the lids to
-another opening, so a blink found in the opening itself would begin with the shift rather than when
-it does, or never end because the lid does not come back to where it was. In the opening over that
-of lids at rest with such a gaze it is found as it is.
+Upper lids move up and down with the eyes. A gaze shift with a blink also moves the lids to another
+opening. So a blink found in the opening itself would begin with the shift rather than at its own
+onset, or never end because the lid does not return to its old opening. The share of the opening of
+lids at rest with the same gaze has neither fault.
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 
 _BIN_DEG = 2.0
 _LEAST_SHARE = 0.002
-"""A gaze that is held for less of the run does not tell where lids rest with it."""
+"""A rarer gaze gives no estimate of the lids' opening at rest."""
 
 _LEAST_OPEN = 0.15
 _GAP_S = 0.1
 
 
 def resting_opening(opening: Floats, pitch_deg: Floats) -> Floats:
-    """Return (n,) how far the lids would be open without blinks, from how the run shows them.
+    """Return (n,) the opening of the lids without blinks, estimated from the run.
 
     Args:
         opening: (n,) of the upper lids, 0 shut .. 1 open.

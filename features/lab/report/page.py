@@ -1,4 +1,4 @@
-"""The page of a report: words, numbers and figures put into the HTML templates."""
+"""The page of a report: text, numbers and figures in the HTML templates."""
 
 from base64 import b64encode
 from collections import Counter
@@ -32,14 +32,14 @@ class Figure(NamedTuple):
 
     @property
     def data_uri(self) -> str:
-        """Return it as the page holds it."""
+        """Return the figure as embedded in the page."""
         return f"data:image/png;base64,{b64encode(self.png).decode()}"
 
 
 class TextLine(NamedTuple):
     """One row of a table of the page, ready to print.
 
-    css: class of its verdict; gauge: SVG of the value beside its band; notes: why it is so
+    css: class of its verdict; gauge: SVG of the value and its band; notes: possible reasons
     """
 
     title: str
@@ -96,7 +96,7 @@ def report_page(
     )
     counts = Counter(finding.verdict for finding in findings)
     facts = (*about.facts, *_facts(run))
-    return rendered(
+    return render(
         "report.html", about=about, facts=facts, sections=sections, counts=counts,
         outside=[f.band.title for f in findings if f.verdict == "outside"],
         uncertain=[f.band.title for f in findings if f.verdict == "uncertain"],
@@ -106,31 +106,30 @@ def report_page(
 
 
 def left_out(joints: JointBasis, group: str) -> tuple[str, ...]:
-    """Return why a section says less than it could of another rig."""
+    """Return the reasons for missing measures of a section."""
     return joints.all_left_out(band.key for band in BANDS if band.group == group)
 
 
 def banner(joints: JointBasis) -> str:
-    """Return what a reader must know first where servos tell nothing, "" where all measure."""
+    """Return the warning about servos without feedback, "" if all are measured."""
     if not joints.estimated:
         return ""
     if joints.whole_basis == "estimated":
         return (
-            "Nothing here is measured: the servos of this rig tell nothing. Where this page speaks "
-            f"of what was found, it is {ESTIMATED}. Real eyes may lag, stick or swing, and the "
-            "verdicts would not know."
+            "Nothing here is measured: the servos of this rig have no feedback. All results are "
+            f"{ESTIMATED}. Real eyes may lag, stick or swing without an effect on the verdicts."
         )
     return (
-        f"Not all of this is measured: the servos of {', '.join(joints.estimated)} tell nothing. "
-        f"What rests on them is {ESTIMATED}; sections that do so say it."
+        f"Not all of this is measured: the servos of {', '.join(joints.estimated)} have no "
+        f"feedback. Results that depend on them are {ESTIMATED}; their sections are marked."
     )
 
 
 FOLDER = Path(__file__).parent
-"""Has the templates."""
+"""Folder of the templates."""
 
 
-def rendered(template: str, folder: Path = FOLDER, **values: object) -> str:
+def render(template: str, folder: Path = FOLDER, **values: object) -> str:
     """Fill a template of a folder; it may extend those of this folder."""
     loader = jinja2.FileSystemLoader((folder, FOLDER))
     environment = jinja2.Environment(
@@ -165,7 +164,7 @@ def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
 
 
 def gauge(finding: MeasureResult) -> Gauge:
-    """Place band and value on one scale; a value far away stands at its end."""
+    """Return band and value on one scale; a distant value is at the end of the scale."""
     band = finding.band
     margin = 0.75 * (band.high - band.low)
     start, span = band.low - margin, band.high - band.low + 2.0 * margin
@@ -188,7 +187,7 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def _facts(run: GazeTrace) -> tuple[tuple[str, str], ...]:
-    """Return what the ticks themselves say of the run."""
+    """Return the facts of the run from its ticks."""
     total = sum(run.kinds.values()) or 1.0
     shares = sorted(run.kinds.items(), key=lambda item: -item[1])
     return (

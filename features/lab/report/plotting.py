@@ -1,6 +1,6 @@
-"""How figures look: one style, drawn without a screen, given as PNG.
+"""Style of all figures, which are drawn without a screen and returned as PNG.
 
-The one place where matplotlib is imported: it is an extra, and importing this module without it
+Only this module imports matplotlib. matplotlib is an extra; without it, importing this module
 raises SetupError with the command that installs it.
 """
 
@@ -26,7 +26,7 @@ except ImportError as error:
 
 COLOURS = ("#1c6ea4", "#d9660a")
 HUMAN = "#7f8c8d"
-"""What people do is grey in every figure."""
+"""Human values are grey in every figure."""
 
 HUMAN_FILL = "#dfe4e6"
 INK = "#2c3136"
@@ -42,13 +42,13 @@ _STYLE: Any = {
 }  # fmt: skip
 _DPI = 110
 _LAYOUT: Literal["constrained"] | None = "constrained"
-"""Finds room for all labels, which takes most of the time of drawing; tests do without."""
+"""Makes room for all labels, which takes most of the drawing time; tests disable it."""
 
 _Corner = Literal["upper left", "upper right", "lower right", "center right"]
 
 
 class Shown(NamedTuple):
-    """A run as figures show it; model: the walk over faces that its rig asks for."""
+    """A run in figures; model: the walk over faces of its rig."""
 
     name: str
     run: GazeTrace
@@ -57,9 +57,9 @@ class Shown(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """One figure: its key (the file's name), the section it stands in, title and caption.
+    """One figure: its key (the file's name), its section, title and caption.
 
-    caption: "{measured}" in it becomes what the runs' figures are: measured, or estimated
+    caption: "{measured}" in it becomes the basis of the runs' figures: measured, or estimated
     """
 
     key: str
@@ -76,7 +76,7 @@ def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
 
 
 def basis_text(runs: Sequence[Shown], group: str) -> str:
-    """Return what several runs rest on together, e.g. "measured or estimated"."""
+    """Return the basis of several runs together, e.g. "measured or estimated"."""
     return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
 
 
@@ -86,19 +86,19 @@ def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:
 
 
 def png_of(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> bytes:
-    """Return what a function draws into an empty figure in the style of all figures."""
+    """Return a PNG of a function's drawing in an empty figure, in the style of all figures."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=size_in, dpi=_DPI, layout=_LAYOUT)
         canvas = FigureCanvasAgg(figure)
         draw(figure)
         out = BytesIO()
-        # print_figure would draw everything twice, the first time only to lay it out.
+        # print_figure would draw everything twice, once only for the layout.
         canvas.print_png(out)  # type: ignore[no-untyped-call]
     return out.getvalue()
 
 
 def nothing(axes: Axes, what: str) -> None:
-    """Write in place of a figure that there is nothing to draw."""
+    """Write a text in place of a figure without data."""
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(False)
@@ -106,13 +106,13 @@ def nothing(axes: Axes, what: str) -> None:
 
 
 def legend(axes: Axes, where: _Corner, columns: int = 1) -> None:
-    """Name what has a label, where there is any."""
+    """Add a legend if anything has a label."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc=where, ncols=columns, markerscale=1.4)
 
 
 def label(axes: Axes, x: str, y: str, title: str = "") -> None:
-    """Write what the axes show."""
+    """Set the labels of the axes and the title."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     if title:

@@ -1,4 +1,4 @@
-"""How smoothly the gaze follows what moves: gain and lag between saccades."""
+"""Smooth pursuit of moving targets: gain and lag between saccades."""
 
 from math import nan
 
@@ -16,7 +16,7 @@ _WINDOW_S = 10.0
 _LOWEST_HZ, _HIGHEST_HZ, _COHERENT = 0.08, 1.0, 0.6
 
 
-def followed(run: GazeTrace) -> Floats:
+def pursuit_stretches(run: GazeTrace) -> Floats:
     """Return (n, 3) target speed in deg/s, gain, and lag in ms: one row a stretch."""
     t = run.column("t")
     if len(t) < 20:
@@ -44,7 +44,7 @@ def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
     """Return frequencies (k,) in Hz, and (n, 4 k) spectra of both sideways speeds, by window.
 
     Columns: cross spectrum of target and slow gaze, real and imaginary, power of the target, power
-    of the gaze; what saccades did is bridged. Windows of 10 s overlap by half.
+    of the gaze; saccades are bridged. Windows of 10 s overlap by half.
     """
     t, clear = run.column("t"), run.slow()
     rate_hz = run.rate_hz
@@ -71,7 +71,7 @@ def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
 def response(run: GazeTrace) -> Floats:
     """Return (n, 3) frequency in Hz, gain, and phase in deg of the slow gaze against its target.
 
-    Only where the two go together: a frequency that the target does not have tells nothing.
+    Only coherent frequencies are returned: a frequency without target motion has no response.
     """
     f, rows = spectra(run)
     if not len(rows):
@@ -82,7 +82,7 @@ def response(run: GazeTrace) -> Floats:
 
 
 def highest_gain(rows: Floats) -> float:
-    """Return the largest gain at any frequency of (n, 4 k) spectra, nan where none is coherent."""
+    """Return the largest coherent gain of (n, 4 k) spectra, nan without coherent frequencies."""
     transfer, coherent = _transfer(rows)
     gains = np.abs(transfer[coherent > _COHERENT])
     return float(gains.max()) if len(gains) else nan
@@ -97,7 +97,7 @@ def _transfer(rows: Floats) -> tuple[NDArray[np.complex128], Floats]:
 
 
 def smooth_speeds(run: GazeTrace) -> Floats:
-    """Return (n,) how fast the gaze was at the most in each stretch of smooth following."""
+    """Return (n,) the highest speed of the gaze in each stretch of smooth pursuit."""
     t = run.column("t")
     if len(t) < 20:
         return np.zeros(0)
@@ -105,15 +105,15 @@ def smooth_speeds(run: GazeTrace) -> Floats:
     mask = run.slow(0.03, 0.08) & (run.column("phase") == PHASES.index("pursue"))
     flying = np.flatnonzero(run.column("phase") == PHASES.index("saccade"))
     since = np.searchsorted(flying, np.arange(len(t)), side="right") - 1
-    # What is planned arrives later at the joints, and small saccades are not found by their speed.
+    # Plans reach the joints later, and the speed criterion misses small saccades.
     mask &= (since < 0) | (t - t[flying[np.maximum(since, 0)]] > 0.08) if len(flying) else True
     parts = stretches(mask, t, run.column("shift"), _STRETCH_S)
     return np.array([speed[part].max() for part in parts])
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about following."""
-    rows, smooth = followed(run), smooth_speeds(run)
+    """Return the measures of pursuit."""
+    rows, smooth = pursuit_stretches(run), smooth_speeds(run)
     return [
         MeasuredValue("pursuit_gain", rows[:, 1], median),
         MeasuredValue("pursuit_lag", rows[:, 2], median),

@@ -1,4 +1,4 @@
-"""How soon the gaze goes to what has come into view."""
+"""Latency of the gaze to things that come into view."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
 
 EXPRESS_MS = 120.0
-"""Sooner than this are express saccades."""
+"""Faster reactions are express saccades."""
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about reactions."""
+    """Return the measures of reactions."""
     latency_ms = np.array([1e3 * reaction.latency_s for reaction in run.reactions])
     return [
         MeasuredValue("reaction", latency_ms, median),

@@ -1,4 +1,4 @@
-"""What a walk over a face is expected to show: time on each part, visits with refixations."""
+"""Expected results of a walk over a face: time on each part, visits with refixations."""
 
 from collections.abc import Sequence
 
@@ -37,7 +37,7 @@ class ReferenceWalk:
         return np.array([self._laws[part](rng) for _ in range(count)])
 
 
-def published() -> ReferenceWalk:
+def published_walk() -> ReferenceWalk:
     """Return the walk of Nakamoto & Tsuruno, eq 1 and table 1."""
     table = zip(human.DWELL_MEAN_S, human.DWELL_SD_S, strict=True)
     return ReferenceWalk(
@@ -45,8 +45,8 @@ def published() -> ReferenceWalk:
     )
 
 
-def own(params: ScanpathParams, walk: Walk) -> ReferenceWalk | None:
-    """Return the walk that a rig's parameters ask for, None where it has another model."""
+def rig_walk(params: ScanpathParams, walk: Walk) -> ReferenceWalk | None:
+    """Return the walk of a rig's parameters, None for another scanpath model."""
     if params.model != "markov":
         return None
     steps, dwells = steps_and_dwells(params, walk)

@@ -1,4 +1,4 @@
-"""From ticks to a report: gather, measure, judge, draw, write."""
+"""From ticks to a report: gather, measure, compare with bands, draw, write."""
 
 from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
@@ -27,12 +27,12 @@ from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.page import Figure, report_page
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, caption_of, png
 from gazerig.features.lab.report.run_header import RunHeader
-from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judged
+from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
 from gazerig.robot.analysis.norm_bands import BY_KEY, applies
 from gazerig.robot.control.tick import Tick
 
 Progress = Callable[[str, float], None]
-"""Told what is being done and the share of it that is done, 0..1."""
+"""Receives the current activity and its completed share, 0..1."""
 
 DRAWINGS: tuple[Drawing, ...] = (
     *figures_saccades.DRAWINGS,
@@ -43,12 +43,12 @@ DRAWINGS: tuple[Drawing, ...] = (
 
 FIGURE_KEYS = tuple(drawing.key for drawing in DRAWINGS)
 
-_TOLD_EVERY, _LEAST_TICKS = 400, 20
+_PROGRESS_EVERY, _LEAST_TICKS = 400, 20
 READING, DRAWING = "reading the run", "drawing figures"
 
 
 class Report(NamedTuple):
-    """What was found, and the files that say so: the page, its figures, and the figures as JSON."""
+    """The findings, and the files with them: the page, its figures, and the numbers as JSON."""
 
     findings: tuple[MeasureResult, ...]
     page: Path
@@ -59,10 +59,10 @@ class Report(NamedTuple):
 def report(
     ticks: Iterable[Tick], about: RunHeader, out: Path, progress: Progress, force: bool = False
 ) -> Report:
-    """Write one HTML page, a PNG a figure, and the numbers as JSON; give what was found.
+    """Write one HTML page, a PNG a figure, and the numbers as JSON; return the findings.
 
-    out: the page to write; the PNGs go into a folder beside it, NAME_figures
-    force: replace files that are there
+    out: the page to write; the PNGs go into the folder NAME_figures of the same parent
+    force: replace existing files
 
     Raises:
         SetupError: a file cannot be written.
@@ -78,15 +78,15 @@ def report_of(
     force: bool = False,
     gaze: MutualGazeReport | None = None,
 ) -> Report:
-    """Do the same with a run that is gathered already.
+    """Write the report of a trace; see ``report``.
 
-    gaze: how this head and another one looked at each other, None where there was no other
+    gaze: mutual gaze of this head and another one, None without another head
 
     Raises:
         SetupError: a file cannot be written.
     """
-    findings = found(run)
-    figures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
+    findings = findings_of(run)
+    figures = draw_figures([Shown(about.name, run, COLOURS[0], about.model)], progress)
     page = report_page(about, run, findings, figures, gaze)
     numbers = [_numbers(f, run) for f in findings] + ([gaze.as_json] if gaze else [])
     written = write_all(out, page, figures, numbers, force)
@@ -97,24 +97,24 @@ def read(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTra
     """Gather a run in one pass.
 
     Raises:
-        SetupError: there is nothing in it.
+        SetupError: the run is too short.
     """
-    gathering, first_s = GazeTraceBuilder(), None
+    builder, first_s = GazeTraceBuilder(), None
     progress(READING, 0.0)
     for count, tick in enumerate(ticks):
-        gathering.update(tick)
+        builder.update(tick)
         first_s = tick.t_s if first_s is None else first_s
-        if about.duration_s and count % _TOLD_EVERY == 0:
+        if about.duration_s and count % _PROGRESS_EVERY == 0:
             progress(READING, min(1.0, (tick.t_s - first_s) / about.duration_s))
     progress(READING, 1.0)
-    run = gathering.gathered()
+    run = builder.trace()
     if len(run.rows) < _LEAST_TICKS:
-        raise SetupError(f"{about.name}: {len(run.rows)} ticks are nothing to report on")
+        raise SetupError(f"{about.name}: {len(run.rows)} ticks are too few for a report")
     return run
 
 
-def measured(run: GazeTrace) -> tuple[MeasuredValue, ...]:
-    """Measure all that applies to the rig's joints and in the run's mode of conversation."""
+def measure_run(run: GazeTrace) -> tuple[MeasuredValue, ...]:
+    """Measure everything that applies to the rig's joints and the run's mode of conversation."""
     each = (
         saccades.measures(run), landing.measures(run), rests.measures(run), face.measures(run),
         eye_head.measures(run), pursuit.measures(run), blinks.measures(run),
@@ -128,13 +128,13 @@ def measured(run: GazeTrace) -> tuple[MeasuredValue, ...]:
     )
 
 
-def found(run: GazeTrace) -> tuple[MeasureResult, ...]:
-    """Measure and judge a run."""
-    return tuple(judged(m, BY_KEY[m.key]) for m in measured(run))
+def findings_of(run: GazeTrace) -> tuple[MeasureResult, ...]:
+    """Measure a run and compare it with the bands."""
+    return tuple(judge(m, BY_KEY[m.key]) for m in measure_run(run))
 
 
-def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...]:
-    """Draw every figure of one run, or of two beside each other, of those that it can show."""
+def draw_figures(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...]:
+    """Draw every figure of one run, or of two runs together; skip runs without its joints."""
     figures = []
     for count, drawing in enumerate(DRAWINGS):
         progress(DRAWING, count / len(DRAWINGS))
@@ -146,20 +146,20 @@ def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...]:
 
 
 def _numbers(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
-    """Return a finding as plain JSON; what is not known is null.
+    """Return a finding as plain JSON; unknown values are null.
 
     basis: "measured", "partly estimated" or "estimated"
     """
     band = finding.band
     return {
         "key": band.key, "title": band.title, "unit": band.unit,
-        "value": _known(finding.value), "low95": _known(finding.low95),
-        "high95": _known(finding.high95), "asked": _known(finding.measured.asked),
+        "value": _or_none(finding.value), "low95": _or_none(finding.low95),
+        "high95": _or_none(finding.high95), "asked": _or_none(finding.measured.asked),
         "events": finding.measured.events, "least_events": band.least,
         "band": [band.low, band.high], "verdict": finding.verdict, "source": band.source,
         "basis": run.joints.basis(band.group),
     }  # fmt: skip
 
 
-def _known(value: float) -> float | None:
+def _or_none(value: float) -> float | None:
     return value if isfinite(value) else None

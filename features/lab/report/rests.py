@@ -1,4 +1,4 @@
-"""How long the gaze rests, its small shifts within a part, and what it does with no one there."""
+"""Durations of gaze rests, small shifts within a part, and shifts without a person."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ _BRIDGED_S = 0.15
 
 
 def face_rests(run: GazeTrace) -> Floats:
-    """Return (n,) seconds of each rest on a face, from landing to the shift to something else.
+    """Return (n,) seconds of each rest on a face, from landing to the shift to another target.
 
     Corrections, catch-up saccades and small shifts within a part are within the rest.
     """
@@ -36,18 +36,18 @@ def face_rests(run: GazeTrace) -> Floats:
 
 
 def spike(rests_s: Floats) -> float:
-    """Return the largest share of rests in one slot of 10 ms beyond that of the slots about it.
+    """Return the largest excess share of rests in one slot of 10 ms over its neighbours.
 
-    A law of dwell times that people could have is smooth; a floor heaps rests up at one length.
-    The slot is chosen by every other rest and judged by those between, and the other way round:
-    the fullest of a hundred slots would be fuller than the law by chance alone.
+    A plausible law of dwell times is smooth; a floor gathers rests at one length. The slot is
+    chosen by every second rest and measured by the others, and vice versa: by chance alone, the
+    fullest of a hundred slots is fuller than the law.
     """
     one, other = _beyond_neighbours(rests_s[::2]), _beyond_neighbours(rests_s[1::2])
     return 0.5 * float(other[np.argmax(one)] + one[np.argmax(other)])
 
 
 def _beyond_neighbours(rests_s: Floats) -> Floats:
-    """Return the share of rests in each slot beyond that of the slots about it."""
+    """Return the excess share of rests in each slot over its neighbours."""
     edges = np.arange(_SPIKES_S[0], _SPIKES_S[1] + SLOT_S, SLOT_S)
     share = np.histogram(rests_s, edges)[0] / max(1, len(rests_s))
     near = np.ones(2 * _NEAR_SLOTS + 1)
@@ -58,7 +58,7 @@ def _beyond_neighbours(rests_s: Floats) -> Floats:
 
 
 def small_shifts(run: GazeTrace) -> Floats:
-    """Return (n, 2) shifts of .4 to 1.5 deg on a face, and seconds on one, of each piece."""
+    """Return (n, 2) shifts of .4 to 1.5 deg on a face, and seconds on one, per piece of the run."""
     jumps = planned_saccades(run)
     size = jumps[:, 2]
     small = jumps[(size >= _SMALL_DEG[0]) & (size <= _SMALL_DEG[1]) & (jumps[:, 3] > 0.0)]
@@ -66,7 +66,7 @@ def small_shifts(run: GazeTrace) -> Floats:
 
 
 def idle_shifts(run: GazeTrace) -> Floats:
-    """Return (n, 2) saccades and seconds with no one there, of each piece of the run."""
+    """Return (n, 2) saccades and seconds without a person, per piece of the run."""
     idle = run.column("idle") > 0.0
     onsets = planned_saccades(run)[:, 0]
     at = np.searchsorted(run.column("t"), onsets)
@@ -91,7 +91,7 @@ def per_second(rows: Floats) -> float:
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about rests."""
+    """Return the measures of rests."""
     rests, small, idle = face_rests(run), small_shifts(run), idle_shifts(run)
     return [
         MeasuredValue("short_rests", (rests < SHORT_S).astype(float), mean),

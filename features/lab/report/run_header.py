@@ -1,4 +1,4 @@
-"""What a report says of the run itself: whose it was, and in what style."""
+"""Description of the run in a report: its origin and its style of gaze."""
 
 from dataclasses import dataclass, field
 
@@ -11,9 +11,9 @@ class RunHeader:
 
     name: short, for figures; facts: (what, value) rows of the page's head
     styles: e.g. "saccade min_jerk", "scanpath markov": which notes of the bands apply
-    model: the walk over faces that was configured, None where it was another model
-    warnings: what a reader must know, e.g. that the recording is not whole
-    duration_s: how long the run lasts, None if unknown before it is read
+    model: the configured walk over faces, None for another scanpath model
+    warnings: e.g. that the recording is incomplete
+    duration_s: length of the run, None if unknown before it is read
     """
 
     name: str

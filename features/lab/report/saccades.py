@@ -1,4 +1,4 @@
-"""Saccades of a run against the main sequence of human ones."""
+"""Saccades of a run and the human main sequence."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.analysis import human_norms as human
 
 LEAST_DEG = 1.0
-"""Below, threshold and encoder steps shape what is measured."""
+"""Smaller saccades depend on the threshold and the encoder's resolution."""
 
 _SMALL_PEAK_DEG, _SMALL_DURATION_DEG = 8.0, 12.0
 _SOON_S, _PAUSE_S = 0.1, 2.0
@@ -23,7 +23,7 @@ _SOON_S, _PAUSE_S = 0.1, 2.0
 def table(run: GazeTrace) -> Floats:
     """Return (n, 4) amplitude in deg, duration in ms, peak in deg/s, time of the peak 0..1.
 
-    Only saccades that had been asked for: a servo that swings back makes none.
+    Only commanded saccades count: a servo that swings back makes none.
     """
     rows = [
         (s.amplitude_deg, 1e3 * s.duration_s, s.peak_deg_s, s.peak_at)
@@ -33,7 +33,7 @@ def table(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 4)
 
 
-def asked_table(run: GazeTrace) -> Floats:
+def commanded_table(run: GazeTrace) -> Floats:
     """Return (n, 3) amplitude in deg, duration in ms and peak in deg/s as commanded."""
     asked = [s.commanded for s in run.saccades if s.commanded is not None]
     rows = [(c.amplitude_deg, 1e3 * c.duration_s, c.peak_deg_s) for c in asked]
@@ -42,8 +42,8 @@ def asked_table(run: GazeTrace) -> Floats:
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:
-    """Return what there is to say about saccades."""
-    seen, asked = table(run), asked_table(run)
+    """Return the measures of saccades."""
+    seen, asked = table(run), commanded_table(run)
     every = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG]
     unasked = np.array([s.commanded is None for s in every], dtype=float)
     skew = seen[:, 3] - human.peak_at(seen[:, 0])
@@ -67,7 +67,7 @@ _DURATIONS = (
 
 
 def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> MeasuredValue:
-    """Return whether each peak speed lies between the human curves."""
+    """Return whether each peak speed is between the human curves."""
 
     def inside(rows: Floats) -> Floats:
         a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
@@ -80,7 +80,7 @@ def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float
 def _duration(
     key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float
 ) -> MeasuredValue:
-    """Return whether each duration lies between the human lines."""
+    """Return whether each duration is between the human lines."""
 
     def inside(rows: Floats) -> Floats:
         a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
@@ -91,13 +91,13 @@ def _duration(
 
 
 def _intervals(run: GazeTrace) -> Floats:
-    """Return seconds from each saccade asked for to the next."""
+    """Return seconds from each commanded saccade to the next."""
     onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
     return np.diff(onsets)
 
 
 def _pauses(run: GazeTrace) -> Floats:
-    """Return seconds from the end of each saccade to the next, of those that follow soon."""
+    """Return seconds from the end of each saccade to the next, for those that follow soon."""
     asked = [s for s in run.saccades if s.commanded is not None]
     ends = np.array([s.end_s for s in asked])
     onsets = np.array([s.onset_s for s in asked])
@@ -107,7 +107,7 @@ def _pauses(run: GazeTrace) -> Floats:
 
 
 def rest_errors(run: GazeTrace) -> Floats:
-    """Return per fixation the median angle of the lines of sight off the target, in deg."""
+    """Return per fixation the median angle of the lines of sight from the target, in deg."""
     off = 0.5 * (run.column("off_left") + run.column("off_right"))
     parts = [off[run.between(f.start_s + 0.04, f.end_s)] for f in run.fixations]
     return np.array([np.median(part) for part in parts if len(part)])

@@ -1,4 +1,4 @@
-"""A measure: rows, one an event, and what is made of them; and the verdict by a pass band."""
+"""A measure: rows, one per event, and a statistic of them; and the verdict by a pass band."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.norm_bands import NormBand
 
 VerdictWord = Literal["pass", "uncertain", "outside", "too few events"]
-"""uncertain: the figure is outside, but what it may be by chance reaches into the band"""
+"""uncertain: the figure is outside, but its interval reaches into the band"""
 
 Indices = NDArray[np.int64]
 Statistic = Callable[[Floats], float]
@@ -23,16 +23,16 @@ _DRAWS = 300
 _SEED = 20060301
 _Z95 = 1.96
 _AT_ONCE = 250_000
-"""Rows of samples whose figures are made at once: 2 MB."""
+"""Rows of samples in one evaluation: 2 MB."""
 
 
 @dataclass(frozen=True)
 class MeasuredValue:
-    """What a run shows of one measure.
+    """The data of one measure in a run.
 
-    key: of its band; rows: one row an event; of: the figure made of them
-    asked: the same figure of what the models asked for, nan where that is not told
-    count: events it rests on, where a row is not one
+    key: key of its band; rows: one row an event; of: the statistic
+    asked: the same figure of the models' commands, nan if unknown
+    count: number of events, if a row is not an event
     """
 
     key: str
@@ -50,7 +50,7 @@ class MeasuredValue:
 class MeasureResult(NamedTuple):
     """A measure with its verdict.
 
-    value, low95, high95: the figure and its 95 % interval, nan where there is none
+    value, low95, high95: the figure and its 95 % interval, nan if unknown
     """
 
     band: NormBand
@@ -61,13 +61,13 @@ class MeasureResult(NamedTuple):
     verdict: VerdictWord
 
 
-def judged(measured: MeasuredValue, band: NormBand) -> MeasureResult:
-    """Compare a figure with its pass band, given what it may be by chance.
+def judge(measured: MeasuredValue, band: NormBand) -> MeasureResult:
+    """Compare a figure and its interval with its pass band.
 
     A figure outside whose interval reaches into the band is uncertain: a run of a person could have
-    shown it. One inside passes, however wide its interval is.
+    shown it. A figure inside passes, whatever its interval.
     """
-    result = compared(measured, band)
+    result = judge_without_interval(measured, band)
     if result.verdict == "too few events":
         return result
     low, high = interval(measured)
@@ -77,9 +77,9 @@ def judged(measured: MeasuredValue, band: NormBand) -> MeasureResult:
 
 
 def interval(measured: MeasuredValue) -> tuple[float, float]:
-    """Return the 95 % interval of a figure, (nan, nan) of an extreme, which has happened.
+    """Return the 95 % interval of a figure, (nan, nan) for an extreme, which has no chance.
 
-    Shares have the score interval of Wilson (1927), which holds for few events too; all others
+    Shares have the score interval of Wilson (1927), which is valid for few events too; all others
     that of the bootstrap (Efron 1979).
     """
     rows, of = measured.rows, measured.of
@@ -87,8 +87,8 @@ def interval(measured: MeasuredValue) -> tuple[float, float]:
         return nan, nan
     if of is mean and rows.ndim == 1 and np.isin(rows, (0.0, 1.0)).all():
         return _wilson(float(rows.mean()), len(rows))
-    spread = drawn(measured, np.random.default_rng(_SEED))
-    # Figures that cannot be below 0 are larger in samples drawn again: that much is taken off.
+    spread = bootstrap(measured, np.random.default_rng(_SEED))
+    # Figures that cannot be below 0 are biased upwards in bootstrap samples: subtract the bias.
     bias = float(spread.mean()) - figure(of, rows)
     low, high = np.percentile(spread, (2.5, 97.5))
     return float(low) - bias, float(high) - bias
@@ -98,12 +98,12 @@ def _wilson(share: float, n: int) -> tuple[float, float]:
     z2 = _Z95 * _Z95
     middle = (share + 0.5 * z2 / n) / (1.0 + z2 / n)
     half = _Z95 * sqrt(share * (1.0 - share) / n + 0.25 * z2 / n**2) / (1.0 + z2 / n)
-    # Nor does rounding leave the share itself out.
+    # Rounding must not exclude the share itself.
     return min(share, middle - half), max(share, middle + half)
 
 
-def compared(measured: MeasuredValue, band: NormBand) -> MeasureResult:
-    """Compare a figure with its pass band, without an interval; too few events are no pass."""
+def judge_without_interval(measured: MeasuredValue, band: NormBand) -> MeasureResult:
+    """Compare a figure with its pass band, without an interval; too few events do not pass."""
     value = figure(measured.of, measured.rows)
     verdict: VerdictWord = "outside"
     if measured.events < band.least or not isfinite(value):
@@ -113,7 +113,7 @@ def compared(measured: MeasuredValue, band: NormBand) -> MeasureResult:
     return MeasureResult(band, measured, value, nan, nan, verdict)
 
 
-def drawn(measured: MeasuredValue, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
+def bootstrap(measured: MeasuredValue, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:
     """Return the figure of ``draws`` bootstrap samples of the events (Efron 1979)."""
     rows, n = measured.rows, len(measured.rows)
     values = figures(measured.of, rows, (rng.integers(0, n, n) for _ in range(draws)))
@@ -122,7 +122,7 @@ def drawn(measured: MeasuredValue, rng: np.random.Generator, draws: int = _DRAWS
 
 
 def figure(of: Statistic, rows: Floats) -> float:
-    """Return the figure of rows, nan of none."""
+    """Return the figure of rows, nan without rows."""
     if not len(rows):
         return nan
     return float(of(rows))
@@ -131,7 +131,7 @@ def figure(of: Statistic, rows: Floats) -> float:
 def figures(of: Statistic, rows: Floats, samples: Iterable[Indices]) -> Floats:
     """Return the figure of each sample of the rows.
 
-    Statistics that NumPy has along an axis are made of many samples at once.
+    Statistics with an axis in NumPy are evaluated for many samples at once.
 
     Args:
         of: the statistic.
@@ -153,7 +153,7 @@ def median(rows: Floats) -> float:
 
 
 def mean(rows: Floats) -> float:
-    """Return the mean, which is the share where rows are 0 or 1."""
+    """Return the mean, which is a share if rows are 0 or 1."""
     return float(np.mean(rows))
 
 
@@ -163,7 +163,7 @@ def spread_over_mean(rows: Floats) -> float:
 
 
 def one_over_mean(rows: Floats) -> float:
-    """Return events a second of the intervals between them."""
+    """Return events a second from the intervals between them."""
     return float(1.0 / np.mean(rows))
 
 
@@ -186,11 +186,11 @@ _ALONG: Mapping[Statistic, Callable[[Floats], Floats]] = {
     one_over_mean: lambda rows: 1.0 / np.mean(rows, axis=1),
     longest: lambda rows: np.max(rows, axis=1),
 }
-"""The statistics of many samples at once, (samples, n) -> (samples,)."""
+"""Versions of the statistics for many samples at once, (samples, n) -> (samples,)."""
 
 
 def number(value: float) -> str:
-    """Return a number with as many digits as are of use."""
+    """Return a number with a useful number of digits."""
     size = abs(value)
     if size >= 100.0:
         return f"{value:.0f}"

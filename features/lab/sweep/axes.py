@@ -1,4 +1,4 @@
-"""Axes of a sweep: which parameter takes which values, and the points that they make.
+"""Axes of a sweep: the parameters to vary, their values, and the points of these.
 
 A point is a mapping from keys of the rig's YAML to values, as ``changed`` takes it.
 """
@@ -27,12 +27,12 @@ _SPACED = re.compile(rf"({_NUMBER}):({_NUMBER}):(\d+)")
 _RANGE = re.compile(rf"({_NUMBER})(?::|\.\.)({_NUMBER})")
 _FORMS = "LOW:HIGH:STEPS, LOW:HIGH or A,B,C"
 _OPTIONS = {"profile": "--profile", "name": "RIG"}
-"""Keys that act only while the rig's files are read, and what to type instead."""
+"""Keys that act only while the rig's files are read, and the option to use instead."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter and what it takes.
+    """One parameter and its values.
 
     Attributes:
         key: dotted path in the rig's YAML.
@@ -51,18 +51,18 @@ class Axis:
 
     @property
     def is_range(self) -> bool:
-        """Return whether any number between two ends is meant."""
+        """Return whether the axis is a continuous range."""
         return not self.values
 
     def has(self, value: Value) -> bool:
-        """Return whether a value lies on the axis."""
+        """Return whether a value is on the axis."""
         if self.values:
-            return _frozen(value) in self.values
+            return _freeze(value) in self.values
         return isinstance(value, int | float) and self.low <= value <= self.high
 
     def index(self, value: Value) -> int:
-        """Return which level a value is."""
-        return self.values.index(_frozen(value))
+        """Return the index of a level."""
+        return self.values.index(_freeze(value))
 
     def at(self, share: float) -> Value:
         """Return the value at a share 0 <= share <= 1 of the axis."""
@@ -75,7 +75,7 @@ class Axis:
         return min(max(value, self.low), self.high)
 
     def share(self, value: Value) -> float:
-        """Return where a value lies on the axis, 0..1; of a level, the middle of its part."""
+        """Return the position of a value on the axis, 0..1; for a level, the middle of its part."""
         if self.values:
             return (self.index(value) + 0.5) / len(self.values)
         assert isinstance(value, int | float)
@@ -90,21 +90,21 @@ class Axis:
         return f"{self.key}, {self.unit}" if self.unit else self.key
 
 
-def _frozen(value: Value) -> Value:
-    """Return lists as tuples: points are JSON once they have been on the disk."""
-    return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
+def _freeze(value: Value) -> Value:
+    """Return lists as tuples: points become JSON on the disk."""
+    return tuple(map(_freeze, value)) if isinstance(value, list | tuple) else value
 
 
 def axes_of(rig: Rig, settings: Sequence[str], read: Callable[[str, str], Value]) -> list[Axis]:
     """Return the axes of ``--set KEY=VALUES`` options.
 
     Args:
-        rig: whose parameters they are.
+        rig: rig with the parameters.
         settings: KEY=LOW:HIGH:STEPS, KEY=LOW:HIGH (or LOW..HIGH), KEY=A,B,C.
-        read: reads a key's value as it would stand in YAML.
+        read: reads a key's value as written in YAML.
 
     Raises:
-        SetupError: a setting has none of these forms, or a key stands twice.
+        SetupError: a setting has none of these forms, or a key is repeated.
         ConfigError: with every unknown key and every end of a range out of its bounds.
     """
     known = {param.key: param for param in parameters(rig, rig)}
@@ -115,7 +115,7 @@ def axes_of(rig: Rig, settings: Sequence[str], read: Callable[[str, str], Value]
         if not equals or not text.strip():
             raise SetupError(f"--set {setting}: not KEY=VALUES; values are {_FORMS}")
         if any(axis.key == key for axis in axes):
-            raise SetupError(f"--set {key}: stands twice; give it all values at once")
+            raise SetupError(f"--set {key}: is given twice; give all values in one option")
         try:
             axes.append(_axis(rig, _param(rig, known, key), text.strip(), read))
         except ConfigError as error:
@@ -129,8 +129,8 @@ def _param(rig: Rig, known: Mapping[str, Parameter], key: str) -> Parameter:
     """Return the parameter at a key.
 
     Raises:
-        ConfigError: there is none; the message says what is near.
-        SetupError: it is one of the keys that files are read with.
+        ConfigError: there is none; the message names similar keys.
+        SetupError: the key acts only while files are read.
     """
     if key in _OPTIONS:
         raise SetupError(f"--set {key}: it acts while files are read; give {_OPTIONS[key]}")
@@ -150,7 +150,7 @@ def _axis(rig: Rig, param: Parameter, text: str, read: Callable[[str, str], Valu
         SetupError: the text has none of the forms.
     """
     if spaced := _SPACED.fullmatch(text):
-        return _spaced(param, text, *_ends(param, text, spaced), int(spaced[3]))
+        return _even_axis(param, text, *_ends(param, text, spaced), int(spaced[3]))
     if ends := _RANGE.fullmatch(text):
         low, high = _ends(param, text, ends)
         faults = [f for end in (low, high) for f in _out_of_bounds(rig, param, end)]
@@ -161,8 +161,8 @@ def _axis(rig: Rig, param: Parameter, text: str, read: Callable[[str, str], Valu
     if not isinstance(listed, tuple | list) or not listed:
         raise SetupError(f"--set {param.key}={text}: no values; write {_FORMS}")
     if len(set(map(repr, listed))) < len(listed):
-        raise SetupError(f"--set {param.key}={text}: a value stands twice")
-    return Axis(param.key, tuple(map(_frozen, listed)), unit=param.unit)
+        raise SetupError(f"--set {param.key}={text}: a value is given twice")
+    return Axis(param.key, tuple(map(_freeze, listed)), unit=param.unit)
 
 
 def _ends(param: Parameter, text: str, found: re.Match[str]) -> tuple[float, float]:
@@ -178,8 +178,8 @@ def _ends(param: Parameter, text: str, found: re.Match[str]) -> tuple[float, flo
     return low, high
 
 
-def _spaced(param: Parameter, text: str, low: float, high: float, steps: int) -> Axis:
-    """Return the axis of so many values at equal distances."""
+def _even_axis(param: Parameter, text: str, low: float, high: float, steps: int) -> Axis:
+    """Return the axis of ``steps`` values at equal distances."""
     if not 2 <= steps <= MAX_POINTS:
         raise SetupError(f"--set {param.key}={text}: {steps} steps; wanted 2 to {MAX_POINTS}")
     values = tuple(float(f"{x:.9g}") for x in np.linspace(low, high, steps))
@@ -192,7 +192,7 @@ def _spaced(param: Parameter, text: str, low: float, high: float, steps: int) ->
 
 
 def _out_of_bounds(rig: Rig, param: Parameter, end: float) -> Sequence[ConfigFault]:
-    """Return what is wrong with one end of a range by itself, as the YAML's check says it."""
+    """Return the faults of one end of a range alone, from the check of the YAML."""
     inside = (param.low is None or end >= param.low) and (param.high is None or end <= param.high)
     whole = param.kind == "whole" and end.is_integer()
     if inside and (whole or param.kind == "number"):
@@ -229,13 +229,14 @@ def one_by_one(axes: Sequence[Axis]) -> list[Point]:
 
 
 def latin_hypercube(axes: Sequence[Axis], samples: int, seed: int) -> list[Point]:
-    """Return samples of which each falls into a part of its own of every axis (McKay 1979).
+    """Return samples, each in its own part of every axis (McKay 1979).
 
-    The same on every machine and with every version of a library: a sweep goes on with it.
+    The result is the same on every machine and with every version of a library, so that a sweep can
+    be continued.
 
     Args:
         axes: ranges and levels.
-        samples: how many; each axis is cut into as many parts of equal width.
+        samples: number of points; each axis is cut into as many parts of equal width.
         seed: of the sample.
     """
     shares = latin_shares(len(axes), samples, np.random.default_rng(seed))
@@ -254,13 +255,13 @@ def point_at(axes: Sequence[Axis], shares: Iterable[float]) -> Point:
     return {axis.key: axis.at(float(share)) for axis, share in zip(axes, shares, strict=True)}
 
 
-def checked(rig: Rig, axes: Sequence[Axis], points: Sequence[Point]) -> None:
+def check_points(rig: Rig, axes: Sequence[Axis], points: Sequence[Point]) -> None:
     """Refuse levels that the rig's rules allow at no point.
 
-    A point that breaks a rule between two parameters is left: its runs say so.
+    A point that breaks a rule between two parameters is kept: its runs report the fault.
 
     Raises:
-        ConfigError: with one fault of each such level.
+        ConfigError: with one fault for each such level.
     """
     allowed, refused = set[tuple[str, str]](), dict[tuple[str, str], ConfigFault]()
     for point in points:

@@ -1,6 +1,6 @@
 """The parameters that put most of the report's measures inside their bands.
 
-What is made small is the number of measures outside, each graded by its distance
+The search minimises the number of measures outside their bands, each graded by its distance
 (``gazerig.features.lab.sweep.outcome.grade``), so that a step towards a band counts, too.
 """
 
@@ -21,12 +21,12 @@ _JUDGED = ("pass", "outside")
 
 
 class Trial(NamedTuple):
-    """One point that was tried.
+    """One tried point.
 
     Attributes:
         point: its parameters.
         score: graded measures outside, mean of the seeds.
-        outside: how many are outside or not judged any more, mean of the seeds.
+        outside: number of measures outside or no longer decidable, mean of the seeds.
         failed: why a run failed, "" if none did.
     """
 
@@ -37,13 +37,13 @@ class Trial(NamedTuple):
 
 
 class SweepFit(NamedTuple):
-    """What a search found.
+    """The result of a search.
 
     Attributes:
-        counted: keys of the measures that count, those that the rig's own values allow to judge.
+        counted: keys of the measures that count: those with a verdict for the rig's own values.
         start: the rig's own values.
         best: the lowest score; of equal ones the first.
-        trials: all points in the order tried, the rig's own first.
+        trials: all points in the order of the trials, the rig's own first.
     """
 
     counted: tuple[str, ...]
@@ -55,21 +55,21 @@ class SweepFit(NamedTuple):
 def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) -> SweepFit:
     """Search the axes for the best point.
 
-    The same arguments and outcomes make the same search: an interrupted one is repeated from runs
-    that are kept.
+    The same arguments and outcomes make the same search, so an interrupted search is repeated from
+    the kept runs.
 
     Args:
         run: runs points.
-        axes: what may be varied.
+        axes: parameters to vary.
         start: the rig's own values.
-        count: points to try besides.
+        count: number of further points to try.
         seed: of the search.
 
     Raises:
-        SetupError: the rig's own values cannot be run, or no measure can be judged.
+        SetupError: the rig's own values cannot be run, or no measure has enough events.
     """
     own = run([start])[0]
-    counted = counted_in(own)
+    counted = counted_measures(own)
     tried = {_key(start): trial_of(start, own, counted)}
 
     def scores(points: Sequence[Point]) -> list[float]:
@@ -83,8 +83,8 @@ def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) 
     return SweepFit(counted, trials[0], min(trials, key=lambda trial: trial.score), trials)
 
 
-def counted_in(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
-    """Return the measures that are judged in at least half of the runs.
+def counted_measures(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
+    """Return the measures with a verdict in at least half of the runs.
 
     Raises:
         SetupError: a run failed, or there are none.
@@ -105,17 +105,17 @@ def counted_in(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
 
 
 def trial_of(point: Point, outcomes: Sequence[Outcome], counted: Sequence[str]) -> Trial:
-    """Return the score of a point's runs; one with a run that failed is the worst there can be."""
+    """Return the score of a point's runs; a failed run makes the worst possible score."""
     failed = next((one.failed for one in outcomes if one.failed), "")
     if failed:
         return Trial(point, len(counted) + 1.0, float(len(counted)), failed)
-    rows = [[_graded(one, key) for key in counted] for one in outcomes]
+    rows = [[_measure_grade(one, key) for key in counted] for one in outcomes]
     score = sum(map(sum, rows)) / len(rows)
     return Trial(point, score, sum(x > 0.0 for row in rows for x in row) / len(rows))
 
 
-def _graded(outcome: Outcome, key: str) -> float:
-    """Return how far a measure is outside, 1 where too few events are left to judge it."""
+def _measure_grade(outcome: Outcome, key: str) -> float:
+    """Return the grade of a measure outside its band, 1 if too few events are left."""
     verdict, value = outcome.figures.get(f"{VERDICT}{key}"), outcome.figures.get(f"{REPORT}{key}")
     if verdict not in _JUDGED or not isinstance(value, int | float):
         return 1.0

@@ -1,12 +1,12 @@
-"""What one run of a sweep leaves: the summary's figures and the report's, as flat columns."""
+"""The result of one run of a sweep: figures of the summary and of the report as flat columns."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from typing import NamedTuple
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.report import measured
-from gazerig.features.lab.report.statistics import MeasureResult, compared
+from gazerig.features.lab.report.report import measure_run
+from gazerig.features.lab.report.statistics import MeasureResult, judge_without_interval
 from gazerig.features.lab.sweep.axes import Point
 from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
 
@@ -14,7 +14,7 @@ Column = float | int | str | bool | None
 Figures = Mapping[str, Column]
 
 OUTSIDE, DISTANCE = "report.outside", "report.distance"
-"""Columns: measures outside their bands, and the same graded (see ``graded``)."""
+"""Columns: measures outside their bands, and the same graded (see ``result_grade``)."""
 VERDICT = "verdict."
 REPORT = "report."
 _HALF = 0.25
@@ -22,14 +22,14 @@ _NOT_REPRODUCED = ("wall_seconds", "reckoned")
 
 
 class Outcome(NamedTuple):
-    """One run.
+    """The result of one run.
 
     Attributes:
         point: its parameters.
-        seed: of its random generators.
+        seed: seed of its random generators.
         figures: columns; empty if it failed.
-        failed: why it has no figures, "" if it has.
-        died: its process ended, perhaps for a reason that another time does not have.
+        failed: reason of a failure, "" otherwise.
+        died: whether its process ended, perhaps for a reason that does not recur.
     """
 
     point: Point
@@ -42,15 +42,15 @@ class Outcome(NamedTuple):
 def figures_of(figures: Mapping[str, object], trace: GazeTrace) -> dict[str, Column]:
     """Return the columns of a run, in the order of a table.
 
-    A measure KEY of the report stands in ``report.KEY``, its verdict in ``verdict.KEY``.
+    A measure KEY of the report is in ``report.KEY``, its verdict in ``verdict.KEY``.
     """
-    results = [compared(one, BY_KEY[one.key]) for one in measured(trace)]
+    results = [judge_without_interval(one, BY_KEY[one.key]) for one in measure_run(trace)]
     words = [result.verdict for result in results]
     columns: dict[str, Column] = {
         OUTSIDE: words.count("outside"),
         "report.pass": words.count("pass"),
         "report.too_few_events": words.count("too few events"),
-        DISTANCE: sum(graded(result) for result in results),
+        DISTANCE: sum(result_grade(result) for result in results),
     }
     for result in results:
         columns[REPORT + result.band.key] = result.value if isfinite(result.value) else None
@@ -59,21 +59,21 @@ def figures_of(figures: Mapping[str, object], trace: GazeTrace) -> dict[str, Col
     return columns | dict(_flat(shown))
 
 
-def graded(result: MeasureResult) -> float:
-    """Return how far a measure is outside its band: 0 inside, 1 far away, 0.5 at a quarter."""
+def result_grade(result: MeasureResult) -> float:
+    """Return the distance of a measure from its band: 0 inside, 1 far away, 0.5 at a quarter."""
     if result.verdict != "outside":
         return 0.0
     return grade(result.value, result.band.low, result.band.high)
 
 
 def grade(value: float, low: float, high: float) -> float:
-    """Return how far a value is outside a band, in widths of the band w: w / (w + 0.25)."""
+    """Return the distance of a value from a band, in widths of the band w: w / (w + 0.25)."""
     widths = max(low - value, value - high, 0.0) / (high - low)
     return widths / (widths + _HALF)
 
 
 def columns_of(outcomes: Sequence[Outcome]) -> list[str]:
-    """Return every column of figures that a run has, those of the report first."""
+    """Return all columns of the runs' figures, those of the report first."""
     names = {name: None for one in outcomes for name in one.figures}
     known = [OUTSIDE, "report.pass", "report.too_few_events", DISTANCE]
     known += [f"{kind}{band.key}" for band in BANDS for kind in (REPORT, VERDICT)]
@@ -81,7 +81,7 @@ def columns_of(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def _flat(held: Mapping[str, object], above: str = "") -> Iterator[tuple[str, Column]]:
-    """Return nested figures as columns with dotted names; of a list, its length."""
+    """Yield nested figures as columns with dotted names; for a list, its length."""
     for name, value in held.items():
         key = f"{above}{name}"
         if isinstance(value, Mapping):

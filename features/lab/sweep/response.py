@@ -1,4 +1,4 @@
-"""How the figures of a sweep respond to its parameters: groups of runs, and which respond most."""
+"""Response of the figures of a sweep to its parameters: groups of runs and strongest responses."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY, NormBand
 
 _BINS = 5
 _WEAK = 0.05
-"""Measures that respond less are not worth a panel."""
+"""Measures with a weaker response get no panel."""
 
 
 class LevelGroup(NamedTuple):
@@ -26,25 +26,25 @@ class LevelGroup(NamedTuple):
 
 
 def is_number(value: object) -> bool:
-    """Return whether a value can stand on an axis of numbers."""
+    """Return whether a value fits on a numeric axis."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def positions(axis: Axis, outcomes: Sequence[Outcome]) -> Floats:
-    """Return where each run lies on an axis: its number, or the index of its level."""
+    """Return the position of each run on an axis: its number, or the index of its level."""
     if axis.is_range or all(is_number(value) for value in axis.values):
         return np.array([float(str(one.point[axis.key])) for one in outcomes])
     return np.array([float(axis.index(one.point[axis.key])) for one in outcomes])
 
 
 def column(name: str, outcomes: Sequence[Outcome]) -> Floats:
-    """Return a column's figure in each run, nan where it has none."""
+    """Return a column's figure in each run, nan if missing."""
     found = (one.figures.get(name) for one in outcomes)
     return np.array([float(x) if isinstance(x, int | float) else np.nan for x in found])
 
 
 def groups(axis: Axis, at: Floats, values: Floats) -> list[LevelGroup]:
-    """Return the runs by level of an axis; of a range, by parts with equally many runs."""
+    """Return the runs by level of an axis; for a range, by parts with equally many runs."""
     known = np.isfinite(values)
     at, values = at[known], values[known]
     if not axis.is_range:
@@ -55,11 +55,11 @@ def groups(axis: Axis, at: Floats, values: Floats) -> list[LevelGroup]:
 
 
 def strength(axes: Sequence[Axis], outcomes: Sequence[Outcome], band: NormBand) -> float:
-    """Return how much a measure responds to the parameter that it responds to most, 0..1.
+    """Return the strongest response of a measure to any parameter, 0..1.
 
-    It is the share of its variance that the parameter explains, less what as many groups explain by
-    chance (epsilon squared, Kelley 1935), times the change of its mean in widths of its band, at
-    most 1.
+    The response is the share of variance that a parameter explains, less the share that as many
+    groups explain by chance (epsilon squared, Kelley 1935), times the change of the mean in widths
+    of its band, at most 1.
     """
     values = column(f"{REPORT}{band.key}", outcomes)
     best = 0.0
@@ -78,12 +78,12 @@ def strength(axes: Sequence[Axis], outcomes: Sequence[Outcome], band: NormBand) 
 
 
 def most_responsive(axes: Sequence[Axis], outcomes: Sequence[Outcome], most: int) -> list[str]:
-    """Return columns to show: measures outside their bands, then the measures that respond most."""
+    """Return columns to show: measures outside their bands, then the strongest responses."""
     found = {f"{REPORT}{band.key}": strength(axes, outcomes, band) for band in BANDS}
     order = sorted(found, key=lambda name: -found[name])
     return [OUTSIDE, *(name for name in order if found[name] > _WEAK)][:most]
 
 
 def band_of(name: str) -> NormBand | None:
-    """Return the band of a column of a measure, None of any other."""
+    """Return the band of a measure's column, None for any other column."""
     return BY_KEY.get(name.removeprefix(REPORT)) if name.startswith(REPORT) else None

@@ -30,7 +30,7 @@ from gazerig.robot.analysis.norm_bands import NormBand
 PICTURE = "response.png"
 
 _MOST = {1: 6, 2: 6}
-"""Columns shown, by number of axes; of more axes, as rows of panels, ``_ROWS``."""
+"""Number of columns shown, by number of axes; for more axes, ``_ROWS`` rows of panels."""
 _ROWS = 3
 _PANEL_IN = (3.3, 2.7)
 _ANNOTATED = 64
@@ -42,12 +42,12 @@ _HEAT_KEY = "mean over seeds; bold: inside the band of people"
 def response_png(
     axes: Sequence[Axis], outcomes: Sequence[Outcome], shown: Sequence[str] = ()
 ) -> bytes:
-    """Draw how figures respond to the parameters.
+    """Draw the response of figures to the parameters.
 
     Args:
-        axes: what was varied.
-        outcomes: all runs; those that failed are left out, and those beside the axes.
-        shown: columns; empty: measures outside their bands, and those that respond most.
+        axes: the varied parameters.
+        outcomes: all runs; failed runs and runs off the axes are left out.
+        shown: columns; empty: measures outside their bands, and those with the strongest response.
     """
     runs = [
         one
@@ -78,7 +78,7 @@ def response_png(
 def _curve(
     panel: Axes, axis: Axis, runs: Sequence[Outcome], name: str, titled: bool = True
 ) -> None:
-    """Draw runs as dots, their mean over an axis as a line, and one standard deviation about it."""
+    """Draw runs as dots, their mean over an axis as a line, and one standard deviation."""
     at, values = positions(axis, runs), column(name, runs)
     parts = groups(axis, at, values)
     if not parts:
@@ -103,7 +103,7 @@ def _curve(
 
 
 def _limits(panel: Axes, values: Floats, band: NormBand | None) -> None:
-    """Show the values, and so much of the band that a small change looks small."""
+    """Set limits that show all values, and enough of the band that a small change looks small."""
     known = values[np.isfinite(values)]
     if not len(known):
         return
@@ -140,7 +140,7 @@ def _heat_map(
 
 
 def _cells(panel: Axes, name: str, means: Floats) -> None:
-    """Write small maps' values; those inside the band of people are bold."""
+    """Write the values of a small map; values inside the band of people are bold."""
     if means.size > _ANNOTATED:
         return
     band, middle = band_of(name), np.nanmean([np.nanmin(means), np.nanmax(means)])
@@ -164,7 +164,7 @@ def _index(axis: Axis, runs: Sequence[Outcome]) -> Floats:
 
 
 def _ticks(panel: Axes, axis: Axis, x: bool, indexed: bool = False) -> None:
-    """Write levels that are no numbers, and all levels of a heat map, where they stand."""
+    """Label levels that are no numbers, and all levels of a heat map."""
     numbers = all(is_number(value) for value in axis.values)
     if numbers and not indexed:
         return
@@ -173,7 +173,7 @@ def _ticks(panel: Axes, axis: Axis, x: bool, indexed: bool = False) -> None:
 
 
 def _title(panel: Axes, name: str) -> None:
-    """Name a column: the measure's title, with its unit."""
+    """Set the title: the measure's title, with its unit."""
     band = band_of(name)
     if band is None:
         text = "measures outside their bands" if name == OUTSIDE else name

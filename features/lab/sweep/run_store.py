@@ -1,7 +1,7 @@
-"""The folder of a sweep: what was asked for, and every finished run as soon as it is finished.
+"""The folder of a sweep: its arguments, and every finished run immediately after its end.
 
-``arguments.json`` holds what decides about the runs, ``runs.jsonl`` one line for each run. A second
-sweep with the same arguments goes on where the first one stopped.
+``arguments.json`` contains everything that affects the runs, ``runs.jsonl`` one line for each run.
+A second sweep with the same arguments continues an interrupted one.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ class RunStore:
     """Finished runs on the disk, by point and seed.
 
     Args:
-        folder: where they are.
+        folder: the folder of the sweep.
         file: ``RUNS`` in it, open for appending and locked.
     """
 
@@ -38,7 +38,7 @@ class RunStore:
         self._read()
 
     def _read(self) -> None:
-        """Read finished runs; a last line that is not whole was being written, and is cut off."""
+        """Read finished runs; remove an incomplete last line of an interrupted write."""
         self._file.seek(0)
         whole = 0
         for line in self._file:
@@ -60,7 +60,7 @@ class RunStore:
     def add(self, outcome: Outcome) -> None:
         """Write a finished run."""
         self._found[_key(outcome.point, outcome.seed)] = outcome
-        # Not flushed to the platter for each: a run is lost with the power, none with the program.
+        # No fsync for each run: a power loss may lose runs, an end of the program does not.
         self._file.write(json.dumps(list(outcome[:4])).encode() + b"\n")
         self._file.flush()
 
@@ -70,7 +70,7 @@ def run_store(folder: Path, arguments: Arguments) -> Iterator[RunStore]:
     """Open the folder of a sweep, a new one or one with the same arguments.
 
     Raises:
-        SetupError: it holds a sweep with other arguments, or something else, another program
+        SetupError: the folder contains a sweep with other arguments or other files, another program
             writes in it, or it cannot be written.
     """
     make_folder(folder)
@@ -97,7 +97,7 @@ def run_store(folder: Path, arguments: Arguments) -> Iterator[RunStore]:
 
 
 def _arguments_in(path: Path) -> dict[str, object]:
-    """Return what a folder was filled with."""
+    """Return the arguments of the sweep in a folder."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -108,7 +108,7 @@ def _arguments_in(path: Path) -> dict[str, object]:
 
 
 def _refuse_others(folder: Path, then: Mapping[str, object], now: Mapping[str, object]) -> None:
-    """Refuse to go on with other arguments, and say which.
+    """Refuse to continue with other arguments, and list them.
 
     Raises:
         SetupError: they differ.
@@ -124,7 +124,7 @@ def _refuse_others(folder: Path, then: Mapping[str, object], now: Mapping[str, o
 
 
 def _differences(then: object, now: object, key: str = "") -> Iterator[str]:
-    """Return what differs of two JSON values, as text."""
+    """Yield the differences of two JSON values, as text."""
     if isinstance(then, dict) and isinstance(now, dict):
         for name in {**then, **now}:
             below = f"{key}.{name}" if key else str(name)

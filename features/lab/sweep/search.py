@@ -1,4 +1,4 @@
-"""A search for a point with a low score, in batches that can be run beside each other."""
+"""A search for a point with a low score, in batches of parallel runs."""
 
 from collections.abc import Callable, Sequence
 
@@ -8,21 +8,21 @@ from gazerig.features.lab.sweep.axes import Axis, Point, latin_shares, point_at
 from gazerig.gaze.types import Floats
 
 Scores = Callable[[Sequence[Point]], Sequence[float]]
-"""Returns the score of each point, to be made small."""
+"""Returns the score of each point; the search minimises it."""
 
 _LEAST = 8
 
 
 def search(scores: Scores, axes: Sequence[Axis], start: Point, count: int, seed: int) -> None:
-    """Ask for the scores of points by differential evolution (Storn & Price 1997).
+    """Search for the lowest score by differential evolution (Storn & Price 1997).
 
-    Begins with a Latin hypercube, and ``start`` if it lies on the axes.
+    Begins with a Latin hypercube, and ``start`` if it is on the axes.
 
     Args:
-        scores: is asked for whole generations.
-        axes: what may be varied.
-        start: a point to begin with.
-        count: about how many points to ask for, at least two generations.
+        scores: called for whole generations.
+        axes: parameters to vary.
+        start: an initial point.
+        count: approximate number of points, at least two generations.
         seed: of the search.
     """
     from scipy.optimize import differential_evolution  # half a second of processor

@@ -1,4 +1,4 @@
-"""The best point of a fit as YAML: a layer over the rig, as a character is."""
+"""The best point of a fit as YAML: a layer over the rig, like a character."""
 
 from gazerig.config.parameters import differences, flattened
 from gazerig.config.schema import load_rig
@@ -12,7 +12,7 @@ SNIPPET = "best.yaml"
 def snippet_of(options: RunOptions, point: Point) -> str:
     """Return the values of a point as YAML that ``gazerig run RIG --character FILE`` takes.
 
-    As a run has one character, what the runs' own one changed of the rig is in it.
+    A run has only one character, so the changes of the runs' own character are included.
     """
     changes = dict(point)
     if options.character is not None:

@@ -1,4 +1,4 @@
-"""Runs at points times seeds, over all processors, each on the disk as soon as it is finished."""
+"""Runs at points times seeds on all processors; each is written to the disk when it ends."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,19 +16,19 @@ from gazerig.features.lab.sweep.worker_pool import Job, Simulation, WorkerPool, 
 from gazerig.robot.app.options import RunOptions
 
 Progress = Callable[[int, int], None]
-"""Told how many runs are finished, and of how many."""
+"""Receives the number of finished runs, and of all runs."""
 
 
 @dataclass(frozen=True)
 class SweepSpec:
-    """What decides about the runs of a sweep.
+    """Everything that affects the runs of a sweep.
 
     Attributes:
-        rig: before any point is applied; as the options' files make it.
-        options: of all runs but for the seed.
-        axes: what is varied.
-        seeds: of the runs at each point.
-        search: how points are chosen, e.g. {"samples": 50}; {} for a grid.
+        rig: rig before any point is applied, from the options' files.
+        options: options of all runs except the seed.
+        axes: the varied parameters.
+        seeds: seeds of the runs at each point.
+        search: choice of the points, e.g. {"samples": 50}; {} for a grid.
     """
 
     rig: Rig
@@ -57,12 +57,12 @@ class SweepSpec:
 
     @property
     def job(self) -> Job:
-        """Return what its processes need to know."""
+        """Return the input of its worker processes."""
         return Job(self.options, params_text(self.rig))
 
 
 class Sweep:
-    """Runs points, of which those that a folder holds are finished already.
+    """Runs points; runs that are already in the folder are not repeated.
 
     Args:
         seeds: of the runs at each point.
@@ -76,10 +76,10 @@ class Sweep:
     def run(self, points: Sequence[Point], progress: Progress) -> list[Outcome]:
         """Return the outcomes in the order of points and seeds.
 
-        A run whose process died is not kept in the folder: it is tried again the next time.
+        The outcome of a process that died is not stored, so it is tried again the next time.
 
         Raises:
-            SweepInterrupted: the user asked for the end.
+            SweepInterrupted: the user requested the end.
             SetupError: a run cannot be written, or no process started.
         """
         wanted: list[Simulation] = [(point, seed) for point in points for seed in self._seeds]
@@ -97,16 +97,16 @@ class Sweep:
 
 
 @contextlib.contextmanager
-def working(
+def open_sweep(
     spec: SweepSpec, folder: Path, jobs: int | None, stopped: Callable[[], str | None]
 ) -> Iterator[Sweep]:
-    """Return what runs the points of a sweep.
+    """Yield the sweep with its open store and its processes.
 
     Args:
-        spec: what decides about the runs.
-        folder: keeps them.
-        jobs: processes; None: one for each processor.
-        stopped: returns why to end, None to go on.
+        spec: everything that affects the runs.
+        folder: folder of the runs.
+        jobs: number of processes; None: one per processor.
+        stopped: returns why to end, None to continue.
 
     Raises:
         SetupError: the folder holds something else, or cannot be written.
@@ -119,5 +119,5 @@ def working(
 
 
 def _levels(axis: Axis) -> object:
-    """Return what an axis takes as JSON values."""
+    """Return the values of an axis as JSON."""
     return f"{axis.low:g}:{axis.high:g}" if axis.is_range else list(axis.values)

@@ -16,7 +16,7 @@ CSV, PARQUET = "table.csv", "table.parquet"
 
 
 def rows_of(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]:
-    """Return the columns (parameters, seed, why it failed, figures) and one row for each run."""
+    """Return the columns (parameters, seed, failure, figures) and one row for each run."""
     keys = list({key: None for one in outcomes for key in one.point})
     figures = columns_of(outcomes)
     rows = [
@@ -32,7 +32,7 @@ def rows_of(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]:
 
 
 def write_tables(folder: Path, outcomes: Sequence[Outcome]) -> tuple[Path, ...]:
-    """Write ``CSV`` and, where PyArrow can be imported, ``PARQUET``; return the files.
+    """Write ``CSV`` and, if PyArrow is installed, ``PARQUET``; return the files.
 
     Raises:
         SetupError: one cannot be written.
@@ -59,7 +59,7 @@ def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[A
 
 
 def _column(values: list[Any]) -> list[Any]:
-    """Return the values of a column as one type: numbers, or text where they are of several."""
+    """Return the values of a column as one type: numbers, or text for mixed types."""
     kinds = {type(value) for value in values if value is not None}
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
@@ -69,5 +69,5 @@ def _column(values: list[Any]) -> list[Any]:
 
 
 def _cell(value: object) -> object:
-    """Return a value of a parameter as one cell: lists as JSON."""
+    """Return a parameter's value as one cell: lists as JSON."""
     return json.dumps(value) if isinstance(value, list | tuple | dict) else value

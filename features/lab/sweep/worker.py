@@ -1,9 +1,9 @@
 """A process of a sweep: imports once, then simulates one run after the other.
 
-Run as ``python -m gazerig.features.lab.sweep.worker`` by gazerig.features.lab.sweep.worker_pool.
-Standard input: a pickled ``Job``, then a line of JSON for each run, [number, point, seed]. Standard
-output: a line of JSON for each, [number, figures, why it failed]. It ends when its input
-does, and in the middle of a run when the program that started it is gone.
+The module gazerig.features.lab.sweep.worker_pool runs it as ``python -m
+gazerig.features.lab.sweep.worker``. Standard input: a pickled ``Job``, then a line of JSON for each
+run, [number, point, seed]. Standard output: a line of JSON for each, [number, figures, reason of a
+failure]. It ends with its input, and during a run if its parent process has ended.
 """
 
 import json
@@ -24,7 +24,7 @@ from gazerig.features.lab.sweep.worker_pool import Job
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
 
-PARENT_GONE = "the program that asked for it is gone"
+PARENT_GONE = "the program that started it has ended"
 _NICE = 5
 
 
@@ -45,7 +45,7 @@ def main() -> None:
     os.nice(_NICE)
     parent = os.getppid()
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a package prints is no answer
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # a package may print text
     job: Job = pickle.load(sys.stdin.buffer)
     rig = run_rig(job.options)
     changed_meanwhile = params_text(rig) != job.config
@@ -68,7 +68,7 @@ def main() -> None:
 
 
 def reason(error: Exception) -> str:
-    """Return why a run failed as one line."""
+    """Return the reason of a failed run as one line."""
     text = "; ".join(map(str.strip, str(error).splitlines()))
     expected = isinstance(error, Error)
     return text if expected and text else f"{type(error).__name__}: {text}"

@@ -1,7 +1,7 @@
-"""Processes that run simulations beside each other, each one run at a time.
+"""Parallel processes that simulate one run at a time each.
 
-A process that dies (killed for its memory, say) costs the run it was at, and is replaced.
-Whatever ends the program, no process stays behind: see gazerig.features.lab.sweep.worker.
+A process that dies (killed for its memory, for example) loses its current run, and is replaced.
+No process outlives the program: see gazerig.features.lab.sweep.worker.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ _ONE_THREAD = {
     name: "1"
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_NUM_THREADS")
 }
-"""Runs are spread over the processors; threads of one run would only wait for each other."""
+"""Runs are distributed over the processors; threads of one run would only wait for each other."""
 _LOOK_S = 0.2
 _END_S = 2.0
 
@@ -37,11 +37,11 @@ Simulation = tuple[Point, int]
 
 @dataclass(frozen=True)
 class Job:
-    """What all runs have in common.
+    """The common input of all runs.
 
     Attributes:
-        options: but for the seed.
-        config: the rig's configuration as the program has read and checked it.
+        options: options except the seed.
+        config: the rig's configuration as read and checked by the program.
     """
 
     options: RunOptions
@@ -49,17 +49,17 @@ class Job:
 
 
 class SweepInterrupted(Exception):
-    """The user asked for the end; what is finished is on the disk."""
+    """The user requested the end; finished runs are on the disk."""
 
 
 class _Worker(NamedTuple):
-    """A process and what it writes to standard error."""
+    """A process and its standard error."""
 
     process: subprocess.Popen[bytes]
     stderr: BinaryIO
 
     def send(self, line: bytes) -> None:
-        """Send bytes to its standard input; one that has died is noticed when it is read."""
+        """Send bytes to its standard input; the next read reports a dead process."""
         assert self.process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             self.process.stdin.write(line)
@@ -72,7 +72,7 @@ class _Worker(NamedTuple):
         return self.process.stdout  # type: ignore[return-value]
 
     def death(self) -> str:
-        """Return how it ended."""
+        """Return the reason of its end."""
         code = self.process.wait()
         self.stderr.seek(0)
         lines = self.stderr.read().decode(errors="replace").strip().splitlines()
@@ -81,12 +81,12 @@ class _Worker(NamedTuple):
 
 
 class WorkerPool:
-    """Worker processes, started when the first runs are asked for.
+    """Worker processes, started with the first runs.
 
     Args:
-        job: what all runs have in common.
-        jobs: how many processes.
-        stopped: returns why to end, None to go on.
+        job: the common input of all runs.
+        jobs: number of processes.
+        stopped: returns why to end, None to continue.
     """
 
     def __init__(self, job: Job, jobs: int, stopped: Callable[[], str | None]) -> None:
@@ -97,7 +97,7 @@ class WorkerPool:
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """End all processes, in the middle of a run too: nothing of it moves."""
+        """End all processes, even during a run: nothing moves in a simulation."""
         for worker in self._workers:
             worker.process.kill()
         for worker in self._workers:
@@ -106,14 +106,14 @@ class WorkerPool:
 
     @property
     def pids(self) -> list[int]:
-        """Return the processes that are there."""
+        """Return the numbers of the processes."""
         return [worker.process.pid for worker in self._workers]
 
     def outcomes(self, runs: Sequence[Simulation]) -> Iterator[tuple[int, Outcome]]:
-        """Run all; yield (index, outcome) as they are finished, in any order.
+        """Run all; yield (index, outcome) as they finish, in any order.
 
         Raises:
-            SweepInterrupted: ``stopped`` said so.
+            SweepInterrupted: ``stopped`` returned a reason.
             SetupError: no process can be started.
         """
         waiting = list(reversed(range(len(runs))))
@@ -134,10 +134,10 @@ class WorkerPool:
     def _idle(self, busy: dict[_Worker, int], wanted: int) -> list[_Worker]:
         """Return processes without a run, as many as are wanted and allowed."""
         while len(self._workers) < min(self._jobs, len(busy) + wanted):
-            self._workers.append(self._started())
+            self._workers.append(self._start())
         return [worker for worker in self._workers if worker not in busy][:wanted]
 
-    def _started(self) -> _Worker:
+    def _start(self) -> _Worker:
         stderr = tempfile.TemporaryFile()  # noqa: SIM115  # closed with its process
         try:
             process = child_process.start(
@@ -151,7 +151,7 @@ class WorkerPool:
         return worker
 
     def _answer(self, worker: _Worker, point: Point, seed: int) -> Outcome:
-        """Return what a worker found; one that has died is taken out."""
+        """Return the outcome of a worker's run; remove a dead worker."""
         line = worker.answers.readline()
         if line.endswith(b"\n"):
             _, figures, failed = json.loads(line)
@@ -164,7 +164,7 @@ class WorkerPool:
 
     @staticmethod
     def _close(worker: _Worker) -> None:
-        """Wait for a process that has ended or was killed, and close its pipes."""
+        """Wait for an ended or killed process, and close its pipes."""
         assert worker.process.stdin is not None
         with contextlib.suppress(OSError):
             worker.process.stdin.close()
@@ -175,5 +175,5 @@ class WorkerPool:
 
 
 def processors() -> int:
-    """Return how many processors this program may use."""
+    """Return the number of processors that this program may use."""
     return len(os.sched_getaffinity(0))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from gazerig.features.lab.report.page import rendered
+from gazerig.features.lab.report.page import render
 from gazerig.features.lab.report.statistics import number
 from gazerig.features.study.analysis import ChoiceSummary, MeasureSummary, StudyAnalysis
 from gazerig.features.study.decisions import Decision
@@ -93,7 +93,7 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
         if not _in_a_scale(one, study):
             sections.append(_measure_section(one, study))
     progress("drawing", 1.0)
-    return rendered(
+    return render(
         "study.html", Path(__file__).parent, study=study, made_by=made_by, banners=banners(study),
         facts=_facts(study), hypotheses=[_line(one, study) for one in study.decisions],
         tests=list(_tests(study)), forest=_forest(study) if study.decisions else None, sections=sections,

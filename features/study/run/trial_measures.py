@@ -13,7 +13,7 @@ import numpy as np
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.report import report
 from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
-from gazerig.features.lab.report.statistics import judged
+from gazerig.features.lab.report.statistics import judge
 from gazerig.features.study.measures import GAZE_MEASURES
 from gazerig.features.study.records import (
     STEP_DEG,
@@ -94,10 +94,10 @@ def _values(names: Sequence[str], ticks: Sequence[Tick], from_s: float) -> dict[
         building = GazeTraceBuilder()
         for tick in shown:
             building.update(tick)
-        of_run = {one.key: one for one in report.measured(building.gathered())} if shown else {}
+        of_run = {one.key: one for one in report.measure_run(building.trace())} if shown else {}
         for name in others:
             one = of_run.get(name)
-            values[name] = nan if one is None else judged(one, BY_KEY[name]).value
+            values[name] = nan if one is None else judge(one, BY_KEY[name]).value
     return values
 
 
