@@ -1,4 +1,4 @@
-"""Opens a head in this program."""
+"""Heads in this program."""
 
 from collections.abc import Callable
 from pathlib import Path

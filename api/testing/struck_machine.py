@@ -210,7 +210,7 @@ class Machine:
         """Run one tick at its time; return which joints work.
 
         Raises:
-            Broken: a servo has left its range or is too fast.
+            RuleViolation: a servo has left its range or is too fast.
             DriverError: as in a run.
         """
         # Slots that were overrun are skipped, as in the loop.
@@ -304,7 +304,7 @@ class Machine:
         i, j: indices of two joints of that bus; struck_s: duration of the fault
 
         Raises:
-            Broken: a servo has left its range or is too fast.
+            RuleViolation: a servo has left its range or is too fast.
         """
         words = {
             "i": self.setups[i].id, "j": self.setups[j].id, "volts": self.volts,

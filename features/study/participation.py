@@ -138,7 +138,7 @@ def check_records(
 
     Args:
         records: of one journal in order.
-        design: of the study.
+        design: the design of the study.
         questionnaires: by the keys in the design.
         folder: of the participant, for the message.
 
