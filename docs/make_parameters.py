@@ -20,24 +20,28 @@ and how to add one.
 """
 
 
+_TABLE = "| key | default | unit, range | meaning |\n|---|---|---|---|\n"
+
+
 def text() -> str:
-    """Return the whole page."""
+    """Return the whole page: one table for each top-level section of a rig file."""
     parts = [_HEAD]
-    listed: dict[type, str] = {}
-    for title, params, rows in _sections(Rig, ""):
-        parts.append(f"\n## {title or 'rig'}\n\n")
-        same = listed.setdefault(params, title)
-        if same != title:
-            parts.append(f"The keys of {same}.\n")
-        else:
-            parts += ["| key | default | unit, range | meaning |\n|---|---|---|---|\n", *rows]
+    last = None
+    for section, row in _rows(Rig, "", {}):
+        if section != last:
+            parts.append(f"\n## {section}\n\n{_TABLE}")
+        parts.append(row)
+        last = section
     return "".join(parts)
 
 
-def _sections(params: type, above: str) -> Iterator[tuple[str, type, list[str]]]:
-    """Return each section with its type and its rows, from the top."""
+def _rows(params: type, above: str, listed: dict[type, str]) -> Iterator[tuple[str, str]]:
+    """Yield the section and the row of each key, those of a section before its inner sections'."""
+    section = above.split(".")[0] or "rig"
+    if (same := listed.setdefault(params, above)) != above:
+        yield section, f"| `{above}` | | | the keys of {same} |\n"
+        return
     nested: list[tuple[str, type]] = []
-    rows: list[str] = []
     defaults = {f.name: _default(f) for f in fields(params)}
     for name, shape in shapes_of(params).items():
         key = f"{above}.{name}" if above else name
@@ -47,13 +51,10 @@ def _sections(params: type, above: str) -> Iterator[tuple[str, type, list[str]]]
         elif inner is not None and inner.params is not None:
             nested.append((f"{key}.*", inner.params))
         else:
-            rows.append(
-                f"| `{name}` | {defaults[name]} | {_limits(shape)} | {_cell(shape.description)} |\n"
-            )
-    if rows:
-        yield above, params, rows
+            cells = (f"`{key}`", defaults[name], _limits(shape), _cell(shape.description))
+            yield section, f"| {' | '.join(cells)} |\n"
     for key, inside in nested:
-        yield from _sections(inside, key)
+        yield from _rows(inside, key, listed)
 
 
 def _default(field: Any) -> str:
@@ -75,7 +76,7 @@ def _limits(shape: Shape) -> str:
         inner = inner.inner
     limits = ", ".join(map(str, inner.choices))
     if inner.low is not None and inner.high is not None:
-        limits = f"{inner.low:.12g} to {inner.high:.12g}"
+        limits = f"{inner.low:.12g}..{inner.high:.12g}"
     return _cell(", ".join(filter(None, (shape.unit, limits, "or null" if shape.optional else ""))))
 
 

@@ -1,10 +1,10 @@
-"""Pages of the documentation site that are made while it is built.
+"""Pages and menu of the documentation site, made while it is built.
 
 README, CHANGELOG and the pages about attacks and examples stay where readers of the repository
-look for them, and every package gets a page of its reference. Links between them are turned to
-where the pages are on the site; a link to any other file of the repository, or to a page of a
-feature that was deleted, becomes its words. A link to nothing is left as it is, and the build
-fails on it.
+look for them. docs/README.md becomes the menu and the entry page of each section, and every
+package gets a page of its reference. Links between them are turned to their pages on the site; a
+link to any other file of the repository, or to a page of a feature that was deleted, becomes its
+words. A link to nothing is left as it is, and the build fails on it.
 """
 
 import os
@@ -13,7 +13,6 @@ from pathlib import Path, PurePosixPath
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
-from mkdocs.structure.nav import Navigation, Section
 from mkdocs.structure.pages import Page
 
 from gazerig.drivers.plugins import SHIPPED
@@ -29,59 +28,61 @@ FROM_ELSEWHERE = {
 }
 """Pages whose source is not in docs/, and their names on the site."""
 
-FIRST = (
-    *(
-        "index",
-        "install",
-        "start",
-        "tour",
-        "glossary",
-        "troubleshooting",
-        "tutorial",
-        "examples",
-        "api",
-        "hardware",
-        "raspberry-pi",
-    ),
-    *("bringup", "tuning", "lab", "gestures", "world", "study", "stop", "plugins", "add-a-panel"),
-)
-"""Pages and folders at the head of the navigation, in this order; all others follow by name."""
+CONTENTS = "docs/README.md"
+"""The menu: one section for each of its headings, in this order."""
 
 _LINK = re.compile(r"(!?\[([^\]]*)\])\(([^)#\s]*)(#[^)\s]*)?\)")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add README, CHANGELOG and their like, and one page for each package."""
+    """Add README, CHANGELOG and their like, the entry of each section, and the reference."""
     for source, page in FROM_ELSEWHERE.items():
         text = (ROOT / source).read_text(encoding="utf-8")
         files.append(File.generated(config, page, content=_moved(text, source, page)))
-    for package, text in _reference().items():
-        files.append(File.generated(config, f"reference/{package}.md", content=text))
+    reference = _reference()
+    for page, text in reference.items():
+        files.append(File.generated(config, page, content=text))
+    config.nav = [{"Home": "index.md"}]
+    for title, text in _sections().items():
+        entry = f"{title.lower().replace(' ', '-')}/index.md"
+        files.append(
+            File.generated(config, entry, content=f"# {title}\n{_moved(text, CONTENTS, entry)}")
+        )
+        config.nav.append({title: [entry, *_menu(text, files)]})
+    config.nav[-1][title].append({"Reference": [*reference]})
     return files
 
 
-def on_nav(nav: Navigation, config: MkDocsConfig, files: Files) -> Navigation:
-    """Put what a newcomer reads before what is looked up."""
-    nav.items.sort(key=_place)
-    return nav
+def _sections() -> dict[str, str]:
+    """Return the text below each heading of the contents."""
+    text = (ROOT / CONTENTS).read_text(encoding="utf-8")
+    parts = re.split(r"^## (.+)$", text, flags=re.MULTILINE)[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
 
 
-def _place(item: object) -> int:
-    name = item.title.lower() if isinstance(item, Section) else ""
-    if isinstance(item, Page):
-        name = PurePosixPath(item.file.src_uri).stem
-    return FIRST.index(name) if name in FIRST else len(FIRST)
+def _menu(text: str, files: Files) -> list[dict[str, str | list[str]]]:
+    """Return the menu of a section; an index page brings the other pages of its folder."""
+    menu: list[dict[str, str | list[str]]] = []
+    for title, target in re.findall(r"^- \[(.+?)\]\((\S+?)\)", text, re.MULTILINE):
+        path = os.path.normpath(f"docs/{target}")
+        page = FROM_ELSEWHERE.get(path, path.removeprefix("docs/"))
+        if files.get_file_from_path(page) is None:
+            continue  # of a feature that was deleted
+        folder, _, name = page.rpartition("/")
+        pages = sorted(file.src_uri for file in files if file.src_uri.startswith(f"{folder}/00"))
+        menu.append({title: [page, *pages] if name == "index.md" else page})
+    return menu
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Turn the links of a page in docs/ to where the site has what they name."""
+    """Turn the links of a page in docs/ to their pages on the site."""
     if page.file.generated_by:
         return markdown
     return _moved(markdown, f"docs/{page.file.src_uri}", page.file.src_uri)
 
 
 def _reference() -> dict[str, str]:
-    """Return the page of each package: its own description, then its modules'."""
+    """Return the page of each package by its name: its own description, then its modules'."""
     pages = {}
     for room in ROOMS:
         for init in sorted((ROOT / room).rglob("__init__.py")):
@@ -90,7 +91,7 @@ def _reference() -> dict[str, str]:
             modules = sorted(path.stem for path in folder.glob("*.py") if path != init)
             parts = [f"# {package}", f"::: {package}\n    options:\n      show_submodules: false"]
             parts += [f"::: {package}.{module}" for module in modules]
-            pages[package] = "\n\n".join(parts) + "\n"
+            pages[f"reference/{package}.md"] = "\n\n".join(parts) + "\n"
     return pages
 
 
@@ -110,7 +111,8 @@ def _moved(text: str, source: str, page: str) -> str:
         if not target or ":" in target:
             return match[0]
         path = os.path.normpath(PurePosixPath(source).parent / target)
-        on_site = FROM_ELSEWHERE.get(path, path.removeprefix("docs/"))
+        on_site = "index.md" if path == CONTENTS else path.removeprefix("docs/")
+        on_site = FROM_ELSEWHERE.get(path, on_site)
         if path in FROM_ELSEWHERE or (path != on_site and (ROOT / path).is_file()):
             start = str(PurePosixPath(page).parent)
             return f"{label}({os.path.relpath(on_site, start)}{anchor})"
