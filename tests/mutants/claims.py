@@ -445,7 +445,7 @@ CLAIMS = (
     Mutant("robot/cli/entry_point.py", 'os.write(2, b"interrupted\\n")', "pass",
            "an interrupt at the start is silent",
            ("ways_out::test_ctrl_c_in_the_first_second_is_one_line",), ("B8",)),
-    Mutant("robot/guardian/hang_detector.py", "return self.silent_s >= HANG_S", "return False",
+    Mutant("robot/guardian/heartbeat.py", "return self.silent_s >= HANG_S", "return False",
            "a loop that hangs keeps its torque",
            ("guardian::test_silence_adds_up_to_a_hang",), ("B9", "A1")),
     Mutant("robot/guardian/process.py",

@@ -56,7 +56,7 @@ from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.control.loop import run as run_loop
-from gazerig.robot.remote.stop_only_server import StopOnlyServer
+from gazerig.robot.remote.live_server import StopOnlyServer
 
 STILL_SCENE = "sits-still"
 
