@@ -19,7 +19,7 @@ from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build, unpacked
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.pty.client import _Served
+from gazerig.sim_mock.pty.client import _ServerProcess
 
 START_S = 1000.0
 """No port was opened at the beginning of time."""
@@ -50,13 +50,13 @@ class _Wires:
     def __init__(self, clock: SimulatedClock) -> None:
         self._clock = clock
         self._devices: dict[str, Device] = {}
-        self._of: dict[_Served, dict[str, str]] = {}
+        self._of: dict[_ServerProcess, dict[str, str]] = {}
         self._terminals: dict[str, tuple[int, int]] = {}
 
     def start(
-        self, server: _Served, buses: Sequence[Mapping[str, object]], world: object = None
+        self, server: _ServerProcess, buses: Sequence[Mapping[str, object]], world: object = None
     ) -> list[str]:
-        """Stands for _Served._start."""
+        """Stands for _ServerProcess._start."""
         assert world is None  # a world's servos answer on terminals alone
         paths: dict[str, str] = {}
         for bus in buses:
@@ -72,15 +72,15 @@ class _Wires:
         self._of[server] = paths
         return list(paths.values())
 
-    def command(self, server: _Served, text: str, bus: str = "") -> str:
-        """Stands for _Served.command."""
+    def command(self, server: _ServerProcess, text: str, bus: str = "") -> str:
+        """Stands for _ServerProcess.command."""
         if server not in self._of:
             raise RuntimeError("the emulated bus is not running: start it first")
         done = self._devices[self._of[server][bus]].faults.command(text)
         return json.dumps({"ok": "status", **json.loads(done)}) if done[:1] == "{" else done
 
-    def stop(self, server: _Served) -> None:
-        """Stands for _Served.stop."""
+    def stop(self, server: _ServerProcess) -> None:
+        """Stands for _ServerProcess.stop."""
         for path in self._of.pop(server, {}).values():
             del self._devices[path]
             for end in self._terminals.pop(path):
@@ -102,11 +102,11 @@ def simulated_wires() -> Iterator[SimulatedClock]:
     clock = SimulatedClock(START_S)
     with pytest.MonkeyPatch.context() as patch:
         wires = _Wires(clock)
-        patch.setattr(_Served, "_start", lambda server, *given: wires.start(server, *given))
+        patch.setattr(_ServerProcess, "_start", lambda server, *given: wires.start(server, *given))
         patch.setattr(
-            _Served, "command", lambda server, text, bus="": wires.command(server, text, bus)
+            _ServerProcess, "command", lambda server, text, bus="": wires.command(server, text, bus)
         )
-        patch.setattr(_Served, "stop", lambda server: wires.stop(server))
+        patch.setattr(_ServerProcess, "stop", lambda server: wires.stop(server))
         patch.setattr(ports, "BlockingPort", wires.port)
         patch.setattr(RealClock, "now_s", lambda _: clock.now_s())
         patch.setattr(RealClock, "sleep_until", lambda _, t_s: clock.sleep_until(t_s))
