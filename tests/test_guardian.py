@@ -20,8 +20,16 @@ from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.process import child_process
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
 from gazerig.robot.guardian.guardian import HUNG_S, RETRY_S, GuardedBus, Guardian
-from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
-from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
+from gazerig.robot.guardian.heartbeat import (
+    HANG_S,
+    IDLE,
+    RELEASED,
+    RELEASING,
+    SIZE,
+    HangDetector,
+    Heartbeat,
+    shared_file,
+)
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
 from gazerig.testing.rows import rows
 

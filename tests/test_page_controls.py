@@ -299,7 +299,7 @@ def test_orders_are_obeyed(heard: Heard) -> None:
 
 def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
     words = heard.hear({"do": "jog", "angles_rad": [["the tail", 0.1]]})
-    assert words is not None and words.startswith("refused: 'the tail' is no name")
+    assert words is not None and words.startswith("refused: 'the tail' is not a joint name")
     unchecked = {"do": "tune", "changes": [["guard.max_speed", 1e9]]}
     words = heard.hear(unchecked)
     assert words is not None and words.startswith("refused") and heard.orders == []
@@ -332,7 +332,7 @@ def test_saving_says_where(heard: Heard) -> None:
     heard.hear({"do": "save", "path": "~/other.yaml"})
     assert heard.tuning.saved_as == Path.home() / "other.yaml"
     words = heard.hear({"do": "save", "path": "other.yaml"})
-    assert words is not None and "whole path" in words and len(heard.saved) == 2
+    assert words is not None and "absolute path" in words and len(heard.saved) == 2
 
 
 def test_the_feed_tells_all_once_and_then_what_changed() -> None:

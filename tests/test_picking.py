@@ -12,7 +12,7 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Bodies, Face, Percept, Vec3
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.requests.click_to_look import ClickToLook
+from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics

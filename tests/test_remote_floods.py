@@ -25,17 +25,16 @@ from remote_rig import (
 
 from gazerig.robot.model import lead, stop_latch
 from gazerig.robot.model.commands import Tune
-from gazerig.robot.remote import heartbeat
+from gazerig.robot.remote import client
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote import socket_server as server_module
-from gazerig.robot.remote.budget import Budget, RequestRate
 from gazerig.robot.remote.client import (
     RequestRejected,
     RobotClient,
 )
 from gazerig.robot.remote.request_handler import RequestHandler
 from gazerig.robot.remote.socket_io import REQUEST_BYTES
-from gazerig.robot.remote.socket_server import RemoteServer
+from gazerig.robot.remote.socket_server import Budget, RemoteServer, RequestRate
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -93,7 +92,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
     [
         (b"hello\n", "not a line of JSON"),
         (b"\n", "not a line of JSON"),
-        (b'{"do": "get", "prefix": NaN}\n', "no number"),
+        (b'{"do": "get", "prefix": NaN}\n', "not a number"),
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
         (b"[]\n", "not understood"),
@@ -102,7 +101,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b'{"do": "get", "prefix": 1}\n', "not understood"),
         (b'{"do": "get", "prefix": "", "more": 1}\n', "not understood"),
         (b'{"do": "set", "changes": [["a", 1]]}\n', "not understood"),
-        (b'{"do": "save", "path": "my.yaml"}\n', "whole path"),
+        (b'{"do": "save", "path": "my.yaml"}\n', "absolute path"),
         (b'{"do": "fly"}\n', "not understood; .*; ask; look_at"),
         (b'{"do": []}\n', "not understood"),
         (b'{"do": "tune", "changes": [["a", 1]]}\n', "request set"),
@@ -238,7 +237,7 @@ def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lead, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
-    monkeypatch.setattr(heartbeat, "_EVERY_S", 0.05)
+    monkeypatch.setattr(client, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
         reply = show.look_at(-1.0, 0.0, 0.3)
         assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.text()

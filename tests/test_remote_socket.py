@@ -249,7 +249,7 @@ def test_a_rig_that_ends_while_asked_is_gone_in_words(folder: Path) -> None:
 def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.robot.remote.client_connection._ANSWER_S", 0.1)
+    monkeypatch.setattr("gazerig.robot.remote.client._ANSWER_S", 0.1)
     folder.mkdir(mode=0o700)
     with remote_socket.listen(folder / "77.sock"), RobotClient.connect() as rig:
         for _ in range(2):

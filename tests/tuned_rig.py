@@ -29,8 +29,8 @@ from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.loop import run as run_loop
 from gazerig.robot.model import stop_latch
 from gazerig.robot.remote import socket_server
-from gazerig.robot.remote.budget import RequestRate
 from gazerig.robot.remote.live_server import LiveServer
+from gazerig.robot.remote.socket_server import RequestRate
 
 PACE_S = 0.01  # real seconds a tick
 

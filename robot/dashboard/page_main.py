@@ -27,7 +27,7 @@ import viser
 
 from gazerig.drivers.process import message_link
 from gazerig.drivers.process.message_link import MessageLink
-from gazerig.robot.dashboard.door.addresses import page_url
+from gazerig.robot.dashboard.door.admission import page_url
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.door.browsers import Browsers
 from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, open_server

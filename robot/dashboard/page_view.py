@@ -18,9 +18,9 @@ from gazerig.robot.dashboard.feed.page_process import (
     REPLAY,
     VALUES,
 )
+from gazerig.robot.dashboard.panels.animation_panel import refused_moves
 from gazerig.robot.dashboard.panels.controls import Controls
 from gazerig.robot.dashboard.panels.panel import PanelView
-from gazerig.robot.dashboard.panels.quick_moves import refused_moves
 from gazerig.robot.dashboard.panels.replay import ReplayView
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.view.head_view import HeadView
@@ -59,13 +59,13 @@ class PageView:
         self._tell = tell
         self._viewpoints = Viewpoints(server, lambda number: browser_of(server, number))
         furnish(server.scene)
-        _arrange(server)
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
         self._world = WorldView(server.scene)
         self._panel = PanelView(widgets)
         self._layers = OverlayPanel(server.scene)
-        self._panel.depth = self._ask_depth
+        self._panel.depth = lambda on: outbox.ask({"show": {"depth": on}}, ALL_USERS)
         self._controls = Controls(widgets, server.scene, outbox)
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
@@ -75,7 +75,10 @@ class PageView:
         self._image: ImageArray | None = None
         self._world_now: WorldNow | None = None
         self._drawn = self._watched = False
-        self._add_views()
+        buttons = self._panel.view.buttons("look from", NAMES, order=-1)
+        buttons.on_press(
+            lambda name, client: self._viewpoints.choose(widgets.browser(client), name)
+        )
 
     @property
     def choices(self) -> OverlayChoices:
@@ -85,17 +88,6 @@ class PageView:
     def watched(self) -> bool:
         """Return whether any browser shows the page."""
         return self._widgets.watched or bool(self._server.get_clients())
-
-    def _ask_depth(self, on: bool) -> None:
-        self._outbox.ask({"show": {"depth": on}}, ALL_USERS)
-
-    def _add_views(self) -> None:
-        buttons = self._panel.view.buttons("look from", NAMES, order=-1)
-        buttons.on_press(self._look_from)
-
-    def _look_from(self, name: str, client: str) -> None:
-        """Show another view in the tabs of a client's browser."""
-        self._viewpoints.choose(self._widgets.browser(client), name)
 
     def show(self, news: News) -> None:
         """Draw the newest data; without a browser it is kept until one connects."""
@@ -171,14 +163,13 @@ class PageView:
             self._controls.leave()
             self._tell({"recording": True})
             self._replay = ReplayView(
-                self._widgets.panel("replay"), self._ask_replay, float(duration_s)
+                self._widgets.panel("replay"),
+                lambda client, asked: self._outbox.ask(asked, client),
+                float(duration_s),
             )
         if state.get("pictures") is False:
             self._image = without_pictures()
         self._replay.show(state)
-
-    def _ask_replay(self, client: str, asked: Mapping[str, object]) -> None:
-        self._outbox.ask(asked, client)
 
     def _draw(self) -> None:
         if self._newest is not None:
@@ -228,7 +219,3 @@ def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
         "headline": shot.headline if shot is not None else "",
         "busy": shot.busy if shot is not None else "",
     }
-
-
-def _arrange(server: viser.ViserServer) -> None:
-    server.gui.configure_theme(show_logo=False, show_share_button=False)

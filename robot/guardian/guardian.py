@@ -145,7 +145,9 @@ class Guardian:
             self._process.kill()
             self._process.wait()
         self._close_pipes(self._process)
-        self._end_unfinished()
+        for i in range(len(self.plans)):
+            if self.releasing(i):  # the dead guardian cannot finish
+                self._heartbeat.set_state(i, RELEASED)
         why = "did not respond" if code is None else f"ended by itself ({_ending(code)})"
         self._events.append(f"the guardian {why}: started again")
         try:
@@ -210,12 +212,6 @@ class Guardian:
             bufsize=0,
             pass_fds=(self._fd,),
         )
-
-    def _end_unfinished(self) -> None:
-        """Mark plans as released that a dead guardian was releasing."""
-        for i in range(len(self.plans)):
-            if self.releasing(i):
-                self._heartbeat.set_state(i, RELEASED)
 
 
 def _ending(code: int) -> str:

@@ -1,4 +1,6 @@
-"""Memory that a program and its guardian share: two counters and one record for each port.
+"""Heartbeat of a control loop, and when it counts as hung.
+
+A program and its guardian share memory with two counters and one record for each port:
 
     offset 0     uint64   beats: counted up by the control loop's thread
     offset 8+2i  uint8    armed: the servos of plan i may be under torque   (the loop writes)
@@ -16,6 +18,18 @@ IDLE, RELEASING, RELEASED = 0, 1, 2
 
 SIZE = 4096
 MAX_PLANS = 64
+
+HANG_S = 0.4
+"""Time without a heartbeat after which the servos are released, s.
+
+Loops on a busy machine were up to 0.3 s late. The release may take 0.1 s more, so that the
+torque is off half a second after the last heartbeat."""
+
+MAX_COUNTED_S = 0.1
+"""Longest time that one interval between two checks counts, s.
+
+If the whole machine was suspended, the guardian was suspended as well. At least four checks in
+a row must find no heartbeat."""
 
 
 class Heartbeat:
@@ -74,3 +88,34 @@ def shared_file() -> int:
     fd = os.memfd_create("gazerig-heartbeat", os.MFD_CLOEXEC)
     os.ftruncate(fd, SIZE)
     return fd
+
+
+class HangDetector:
+    """Accumulates the time without a heartbeat.
+
+    Attributes:
+        silent_s: Accumulated time without a heartbeat, s.
+    """
+
+    def __init__(self, beats: int, now_s: float) -> None:
+        self._beats, self._now_s = beats, now_s
+        self.silent_s = 0.0
+
+    def step(self, beats: int, now_s: float) -> bool:
+        """Return whether the loop counts as hung.
+
+        Args:
+            beats: Present value of the loop's counter.
+            now_s: Present time, monotonic seconds.
+        """
+        elapsed_s, self._now_s = now_s - self._now_s, now_s
+        if beats != self._beats:
+            self._beats = beats
+            self.silent_s = 0.0
+        else:
+            self.silent_s += min(max(elapsed_s, 0.0), MAX_COUNTED_S)
+        return self.silent_s >= HANG_S
+
+    def reset(self) -> None:
+        """Reset the accumulated time to 0."""
+        self.silent_s = 0.0

@@ -28,8 +28,7 @@ from gazerig.drivers.errors import DriverError
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_by_path import port_of
-from gazerig.robot.guardian.hang_detector import HangDetector
-from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
+from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, HangDetector, Heartbeat
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe
 from gazerig.robot.model.clock import RealClock
 
@@ -84,15 +83,11 @@ def _pca9685(plan: ReleasePlan) -> Releaser:
     return lambda port: stop_pulses(port, params.baud, Pca9685Board(port, params), plan.ids)
 
 
-def _unpickled(text: str) -> Any:
-    """Return the parameters that ``release_plan.pickled`` wrote."""
-    return pickle.loads(base64.b85decode(text))
-
-
 def _of_package(plan: ReleasePlan) -> Releaser:
     from gazerig.drivers.plugins import BUS, BusPlugin, load
 
-    release, params = load(BUS, plan.kind, BusPlugin).release, _unpickled(plan.settings)
+    release = load(BUS, plan.kind, BusPlugin).release
+    params: Any = pickle.loads(base64.b85decode(plan.settings))  # written by release_plan.pickled
     if release is None:
         return lambda port: ()
     wanted = release

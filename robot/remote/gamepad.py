@@ -1,6 +1,6 @@
 """Gamepad of this computer, through evdev: an extra, only on Linux."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from gazerig.drivers.errors import DriverError, SetupError
@@ -92,7 +92,7 @@ class Gamepad:
         """
         pressed = []
         try:
-            for event in self._events():
+            for event in iter(self._device.read_one, None):
                 if event.type == _KEY and event.value == 1 and event.code in BUTTONS:
                     pressed.append(BUTTONS[event.code])
                 elif event.type == _ABS and event.code in self._ranges:
@@ -105,10 +105,6 @@ class Gamepad:
     def close(self) -> None:
         """Close the device."""
         self._device.close()
-
-    def _events(self) -> Iterator[Any]:
-        while (event := self._device.read_one()) is not None:
-            yield event
 
     def _share(self, code: int, value: int) -> float:
         """Return an axis' position, -1..1."""

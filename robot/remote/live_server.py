@@ -1,4 +1,7 @@
-"""Inputs of a running rig except the page: requests of programs, and edits of its files."""
+"""Inputs of a running rig except the page: requests of programs, and edits of its files.
+
+A rig that is being calibrated accepts only stops: ``StopOnlyServer``.
+"""
 
 import contextlib
 from collections.abc import Callable, Iterable, Mapping
@@ -7,8 +10,11 @@ from typing import Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.command_handler import Commandable, ParamAccess
+from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.commands import Command, Resume, Stop
+from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.remote.file_watch import FileWatch
 from gazerig.robot.remote.request_handler import Pulse, RequestHandler
@@ -107,3 +113,70 @@ class LiveServer:
             self._say("\n".join([f"{path} was edited: read again, in force", *lines]))
         else:
             self._say(f"{path} was written again: all it says is in force already")
+
+
+_FIXED = "it is being calibrated: its parameters stay as they are until that is over"
+
+
+class StopOnlyServer:
+    """Server that executes stop and resume, and refuses all other commands.
+
+    Args:
+        command: Queues a command for the next tick.
+        clock: Clock of the loop.
+        about: Constant fields of the status, as {"rig": name, "pid": process}.
+        say: Prints a line on the terminal.
+    """
+
+    def __init__(
+        self,
+        command: CommandTaker,
+        clock: Clock,
+        about: Mapping[str, object],
+        say: Callable[[str], None],
+    ) -> None:
+        self._say = say
+        self._pulse = Pulse(clock)
+        only = _OnlyStops(command)
+        requests = RequestHandler(only, None, self._pulse, about, fixed=_FIXED)
+        self._server = RemoteServer(requests, say)
+
+    def open(self) -> None:
+        """Listen to other programs; print a line if that fails."""
+        try:
+            self._server.open()
+        except SetupError as error:  # the head goes on without
+            self._say(f"gazerig stop will not find this rig: {error}")
+
+    def update(self, tick: Tick) -> None:
+        """Store the newest tick; called by the loop."""
+        self._pulse.update(tick)
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._server.close()
+
+
+class _OnlyStops:
+    """Robot that executes only stop and resume."""
+
+    def __init__(self, command: CommandTaker) -> None:
+        self._command = command
+
+    def command(self, command: Command) -> Ticket | None:
+        """Queue a stop or resume.
+
+        Raises:
+            ValueError: it is another command.
+        """
+        if not isinstance(command, Stop | Resume):
+            raise ValueError("it is being calibrated: besides stop and resume nothing goes")
+        return self._command(command)
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        """Return no menus."""
+        return {}
+
+    def gestures(self) -> tuple[GestureInfo, ...]:
+        """Return no gestures."""
+        return ()

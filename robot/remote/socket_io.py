@@ -16,7 +16,7 @@ import struct
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple, NoReturn, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.model.clock import RealClock
@@ -38,6 +38,20 @@ _TOKEN_S = 1.0
 def user_id() -> int:
     """Return the id of the user who runs this program, 0 on systems without user ids."""
     return os.getuid() if hasattr(os, "getuid") else 0
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Return the value of a JSON text.
+
+    Raises:
+        ValueError: it is not JSON; NaN and Infinity are not.
+        RecursionError: it is nested too deep.
+    """
+
+    def refuse(word: str) -> NoReturn:
+        raise ValueError(f"{word} is not a number in JSON")
+
+    return json.loads(text, parse_constant=refuse)
 
 
 class MalformedMessage(ValueError):
@@ -305,7 +319,7 @@ class Wire:
         """
         line = self._line(first_s, rest_s)
         try:
-            return json.loads(line, parse_constant=_no_number)
+            return parse_json(line)
         except RecursionError:
             raise MalformedMessage("nested too deep", over=False) from None
         except ValueError as error:
@@ -344,8 +358,3 @@ class Wire:
         if not data:
             raise EOFError
         return data
-
-
-def _no_number(word: str) -> NoReturn:
-    """Refuse NaN and Infinity, which are not JSON."""
-    raise ValueError(f"{word} is no number of JSON")

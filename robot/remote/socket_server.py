@@ -11,12 +11,56 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_io as remote_socket
-from gazerig.robot.remote.budget import ALL, EACH, Budget
 from gazerig.robot.remote.request_handler import RequestHandler, is_stop
 from gazerig.robot.remote.socket_io import REQUEST_BYTES, Listener, MalformedMessage, Wire
+
+
+class RequestRate(NamedTuple):
+    """Share of one processor, and the largest burst, s."""
+
+    share: float
+    burst_s: float
+
+
+EACH = RequestRate(0.06, 0.2)
+ALL = RequestRate(0.1, 0.4)
+
+
+class Budget:
+    """Token bucket of processor time.
+
+    Args:
+        rate: Share and size of the bucket.
+        now_s: Time of the start, at which it is full, s.
+    """
+
+    def __init__(self, rate: RequestRate, now_s: float) -> None:
+        self._rate = rate
+        self._left_s = rate.burst_s
+        self._at_s = now_s
+        self._lock = threading.Lock()
+
+    def spend(self, used_s: float, now_s: float) -> None:
+        """Deduct processor time that was used, even if none is left."""
+        with self._lock:
+            self._fill(now_s)
+            self._left_s -= used_s
+
+    def wait_s(self, now_s: float) -> float:
+        """Return the time until the bucket is no longer empty, s."""
+        with self._lock:
+            self._fill(now_s)
+            return max(0.0, -self._left_s / self._rate.share)
+
+    def _fill(self, now_s: float) -> None:
+        gained = self._rate.share * max(0.0, now_s - self._at_s)
+        self._left_s = min(self._rate.burst_s, self._left_s + gained)
+        self._at_s = now_s
+
 
 _REST_S = 2.0
 """Timeout of the rest of a request, s."""

@@ -20,8 +20,8 @@ from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_server as server
-from gazerig.robot.remote.budget import ALL, EACH, RequestRate
 from gazerig.robot.remote.live_server import LiveServer
+from gazerig.robot.remote.socket_server import ALL, EACH, RequestRate
 
 FLOODS = {
     "nothing": "",

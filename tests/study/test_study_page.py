@@ -22,7 +22,7 @@ from gazerig.features.study.records import Closed, Consented, ItemAnswered, Tria
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.shipped import HOME
 from gazerig.robot.dashboard.door import connection_limits
-from gazerig.robot.dashboard.door.addresses import page_url
+from gazerig.robot.dashboard.door.admission import page_url
 
 STUDIES = sorted(path.stem for path in (HOME / "studies").glob("*.yaml"))
 

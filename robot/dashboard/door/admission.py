@@ -1,4 +1,4 @@
-"""Admission of requests to a page.
+"""Admission of requests to a page, and the addresses of pages.
 
 A client shows a token, once, in the query of the first address; a cookie takes its place. That
 holds on this machine as well, which may have other users. The Origin of every websocket and of
@@ -7,11 +7,36 @@ name of the loopback, or a foreign name made to point here would do (DNS rebindi
 """
 
 import hmac
+import socket
 from collections.abc import Mapping
+from urllib.parse import urlsplit
 
 from aiohttp import web
 
-from gazerig.robot.dashboard.door.addresses import hostname, netloc
+_EVERYWHERE = ("0.0.0.0", "::")
+
+
+def page_url(host: str, port: int) -> str:
+    """Return the URL for browsers, with this machine's name if all addresses are served."""
+    name = socket.gethostname() if host in _EVERYWHERE else host
+    return f"http://[{name}]:{port}" if ":" in name else f"http://{name}:{port}"
+
+
+def netloc(origin: str) -> str | None:
+    """Return host and port of an origin, None if it is not an origin."""
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return None
+
+
+def hostname(host: str) -> str | None:
+    """Return the name in a Host header, None if it has none."""
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None
+
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 

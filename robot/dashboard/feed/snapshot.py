@@ -209,7 +209,7 @@ def snapshot(
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,
-        field_deg=_field_deg(rig.field) if rig is not None else None,
+        field_deg=None if rig is None else _field_deg(rig.field),
         servos=_servos(tick, rig),
         worst=tick.guard_result.level,
         trail=(_trail(tick),),

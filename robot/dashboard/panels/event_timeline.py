@@ -54,16 +54,13 @@ class Timeline(PagePanel):
         self._events: deque[SeenEvent] = deque()
         self._now_s: float | None = None
 
-    def _clear(self) -> None:
-        self._events.clear()
-        for stretches in self._rows.values():
-            stretches.clear()
-
     def update(self, snapshot: Snapshot) -> None:
         """Add a snapshot; one with an earlier time than the last resets the strip."""
         t_s = snapshot.t_s
         if self._now_s is not None and t_s < self._now_s:
-            self._clear()
+            self._events.clear()
+            for stretches in self._rows.values():
+                stretches.clear()
         self._now_s = t_s
         target = snapshot.target_name.partition(":")[0]
         self._lengthen("target", t_s, target, snapshot.target_kind)

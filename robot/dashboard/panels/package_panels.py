@@ -69,13 +69,13 @@ class PagePanels:
             self._add(part, part.title, place)
         for one in registrations(PAGE_PANEL):
             try:
-                part = one.load()
-                if not (isinstance(part, type) and issubclass(part, PagePanel)):
+                loaded = one.load()
+                if not (isinstance(loaded, type) and issubclass(loaded, PagePanel)):
                     raise PluginError(f"{one.label} is no subclass of PagePanel")
             except PluginError as error:
                 place.section(one.name, order=PagePanel.order).html(note(str(error)))
             else:
-                self._add(part, part.title or one.name, place)
+                self._add(loaded, loaded.title or one.name, place)
 
     def _add(self, part: type[PagePanel], title: str, place: Container) -> None:
         section = place.section(title, is_open=part.is_open, order=part.order)

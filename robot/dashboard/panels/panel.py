@@ -40,7 +40,7 @@ class PanelView:
         self._widgets = widgets
         self._shown = 0
         self._open: frozenset[str] = frozenset()
-        self.depth: Callable[[bool], None] = _ignore
+        self.depth: Callable[[bool], object] = lambda on: None
         self.silence = widgets.panel("watch").html(order=0)
         self.panels = PagePanels(widgets.panel("watch"))
         self._begin()
@@ -170,7 +170,3 @@ def _setter(layers: OverlayChoices, name: str) -> Callable[[bool, str], None]:
         setattr(layers, name, wanted)
 
     return put
-
-
-def _ignore(wanted: bool) -> None:
-    """Do nothing, without a receiver."""

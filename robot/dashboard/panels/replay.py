@@ -11,7 +11,7 @@ from typing import Any
 from gazerig.robot.dashboard.feed.page_process import MARK_KINDS, SPEEDS
 from gazerig.robot.dashboard.widgets.container import Container
 
-Tell = Callable[[str, Mapping[str, object]], None]
+Tell = Callable[[str, Mapping[str, object]], object]
 """Sends a user's request to the rig's process: the browser's tab, and the request."""
 
 _WIDTH, _HEIGHT = 340, 26

@@ -2,9 +2,9 @@
 
 import json
 from collections.abc import Mapping
-from typing import NoReturn
 
 from gazerig.robot.model.commands import COMMANDS, Leading
+from gazerig.robot.remote.socket_io import parse_json
 
 ASKED_BYTES = 2048
 """Longest request, bytes; a stop with its reason has a hundred."""
@@ -22,7 +22,7 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
         who: the name of the browser; what it calls itself in the request is overwritten
     """
     try:
-        asked = json.loads(body, parse_constant=_no_number)
+        asked = parse_json(body)
     except (ValueError, RecursionError):
         return None
     if not isinstance(asked, dict):
@@ -42,8 +42,3 @@ def leads(asked: Mapping[str, object]) -> bool:
 def compact(asked: Mapping[str, object]) -> bytes:
     """Return a request as JSON without blanks, its "do" first."""
     return json.dumps(asked, separators=(",", ":")).encode()
-
-
-def _no_number(word: str) -> NoReturn:
-    """Refuse NaN and Infinity, which are not JSON."""
-    raise ValueError(f"{word} is no number of JSON")

@@ -1,8 +1,8 @@
-"""Conversion of a pointer over the view to a gaze target between viewer and head.
+"""Conversion of a pointer over the view, or a click in the image, to a gaze target.
 
-The eyes seem to look at the pointer because they look at a point of the line of sight on which
-the viewer sees it. A pointer controls the gaze only while its points arrive: after a second the
-gaze is free again.
+The target of a pointer is between viewer and head: the eyes seem to look at the pointer because
+they look at a point of the line of sight on which the viewer sees it. A pointer controls the gaze
+only while its points arrive: after a second the gaze models take over again.
 """
 
 from collections.abc import Callable
@@ -11,8 +11,10 @@ from typing import NamedTuple
 
 from gazerig.gaze.angles import add, dot, norm, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.perception.pixel_to_world import PixelToWorld
 
 PER_S, BURST = 40.0, 40.0
 """Rate limit of points of all browsers together; one sends 20 a second."""
@@ -112,3 +114,32 @@ class PointerToLook:
             return False
         self._look(point, who)
         return True
+
+
+class ClickToLook:
+    """Stores the newest frame and the pose of the camera at its capture.
+
+    Args:
+        pixels: places pixels in the world.
+
+    newest: the newest tick, left here by the loop
+    """
+
+    def __init__(self, pixels: PixelToWorld) -> None:
+        self._pixels = pixels
+        self.newest: Tick | None = None
+
+    def point(self, x: float, y: float) -> Vec3 | None:
+        """Return the world point at a position in the newest frame, None without one.
+
+        x, y: 0..1 from the left and from the top
+        """
+        tick = self.newest
+        if tick is None or tick.detections is None:
+            return None
+        found = tick.detections
+        pixel = (
+            min(max(x, 0.0), 1.0) * (found.width_px - 1),
+            min(max(y, 0.0), 1.0) * (found.height_px - 1),
+        )
+        return self._pixels.point(pixel, found, tick.percept)

@@ -9,7 +9,7 @@ class TokenBucket:
         self._left, self._at_s = burst, -1.0
 
     def take(self, now_s: float, amount: float = 1.0) -> bool:
-        """Take one token; return whether there was one."""
+        """Take tokens; return whether any were left before."""
         if self.wait_s(now_s) > 0.0:
             return False
         self._left -= amount

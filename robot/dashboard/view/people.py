@@ -38,11 +38,6 @@ def _person_glb(look: int) -> tuple[bytes, bytes]:
     return glb(head(look, _FINENESS), SKIN), glb(torso(look, _CHEST_M), CLOTH)
 
 
-def _look(number: int) -> int:
-    """Return the look of a face; the first face is the scene's first person."""
-    return (number - 1) % len(LOOKS)
-
-
 class _Shade:
     """Dark spot on the floor below an object."""
 
@@ -67,7 +62,7 @@ class _Person:
 
     def __init__(self, scene: viser.SceneApi, frame: str, face: SeenFace) -> None:
         self._shade = _Shade(scene, f"/shades/{face.id}", 0.3)
-        shown, chest = _person_glb(_look(face.id))
+        shown, chest = _person_glb((face.id - 1) % len(LOOKS))
         self._head = scene.add_glb(f"{frame}/head", shown, cast_shadow=False, receive_shadow=False)
         self._chest = scene.add_glb(
             f"/chests/{face.id}", chest, cast_shadow=False, receive_shadow=False

@@ -10,10 +10,11 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 from gazerig.robot.dashboard.widgets.container import Container, Make, W
 from gazerig.robot.dashboard.widgets.widget import Widget, WidgetPlace
+from gazerig.robot.remote.socket_io import parse_json
 
 PANELS = ("headline", "camera", "replay", "watch", "steer", "tune", "health", "report")
 """Names of the panels, as in browser/index.html."""
@@ -263,7 +264,7 @@ class Widgets:
         Input that is not valid is refused by a message to that client.
         """
         try:
-            self._take(client, json.loads(text, parse_constant=_no_number))
+            self._take(client, parse_json(text))
         except (ValueError, RecursionError) as error:
             self.notify(str(error), client.name, refused=True)
 
@@ -292,8 +293,3 @@ class Widgets:
         with self._lock:
             if (now := client.changes.setdefault(widget.place.number, {})) is not None:
                 now["value"] = widget.props.get("value")
-
-
-def _no_number(word: str) -> NoReturn:
-    """Refuse NaN and Infinity, which are not JSON."""
-    raise ValueError(f"{word} is no number of JSON")
