@@ -122,12 +122,12 @@ def search(
         yield looked
 
 
-def found_of(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:
+def found_servos(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:
     """Return all servos that answered, with their kinds."""
     return [(one.kind, servo) for one in rounds for servo in one.found]
 
 
-def known_kinds(text: str) -> tuple[BusKind, ...]:
+def parse_kinds(text: str) -> tuple[BusKind, ...]:
     """Read the name of a kind, or "all".
 
     Raises:

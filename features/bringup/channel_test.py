@@ -66,26 +66,26 @@ def walk(
     )
     gone: list[ChannelPosition] = []
     now_s = board.line.port.now_s
-    with given(board, slow) as channel:
+    with give_pulses(board, slow) as channel:
         start = round(channel.ramp.pulse_steps)
         for nth, asked in enumerate(places):
             channel.aim(channel.clip(asked), now_s())
             board.send_goals([channel])
             takes_s = abs(asked - start) / speed_steps_s + SETTLE_S
             until_s = now_s() + takes_s + LATE_S
-            start = _led(board, channel, sleep_until)
+            start = _advance(board, channel, sleep_until)
             while abs(start - asked) > FINE_STEPS and now_s() < until_s:
-                start = _led(board, channel, sleep_until)
+                start = _advance(board, channel, sleep_until)
             gone.append(ChannelPosition(asked, start))
             until_s = now_s() + SETTLE_S
             # The board may have a timeout, so it is read meanwhile.
             while not nth and now_s() < until_s:
-                _led(board, channel, sleep_until)
+                _advance(board, channel, sleep_until)
     return tuple(gone)
 
 
 @contextmanager
-def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
+def give_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     """Send pulses on a channel: its present pulse, or its servo's rest pulse; off at the end.
 
     Raises:
@@ -110,7 +110,7 @@ def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
         _end(board, setup)
 
 
-def _led(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
+def _advance(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
     """Wait a moment and return the pulse; move it on if the board does not do so itself."""
     sleep_until(board.line.port.now_s() + LOOK_S)
     channel.advance(board.line.port.now_s())
@@ -137,7 +137,7 @@ def _end(board: Board, setup: ServoConfig) -> None:
         raise ServoFault(f"{servo_label(setup)} may still get pulses: switch the servo supply off")
 
 
-def sent_home(line: MaestroLink) -> tuple[str, ...]:
+def send_home(line: MaestroLink) -> tuple[str, ...]:
     """Send all channels home and clear the errors; return those that the board held, by name.
 
     Raises:

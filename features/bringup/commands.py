@@ -75,7 +75,7 @@ HOME = CommandEntry(
 )
 LOOK_AT = CommandEntry(
     "gazerig.features.bringup.cli.motion",
-    "Turn eyes and head to a point and tell how well they meet it: X Y Z in metres.",
+    "Turn eyes and head to a point and report the gaze error: X Y Z in metres.",
     "Bring-up",
     examples={
         "look-at": (("look-at my.yaml 1 0.2 0.3", "1 m ahead, 20 cm left, 30 cm up"),),

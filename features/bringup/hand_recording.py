@@ -21,7 +21,7 @@ _LEAST_SHARE = 0.5
 
 
 class HandRecording(NamedTuple):
-    """A recording.
+    """A recording by hand.
 
     series: times in seconds from the beginning, and angles in degrees, by joint
     left_out: joints whose servos were silent too often
@@ -34,7 +34,7 @@ class HandRecording(NamedTuple):
 
 
 def switch_off(joints: Mapping[str, JointParams], port: BusPort) -> None:
-    """Switch the torque of all servos of a line off, and see that it is.
+    """Switch the torque of all servos of a line off, and verify it.
 
     All are tried, whatever one of them does.
 
@@ -84,10 +84,10 @@ def record(
         ended_by = stopped()
         slot = max(slot + 1, int((clock.now_s() - start_s) * RATE_HZ))
         clock.sleep_until(start_s + slot / RATE_HZ)
-    return _gathered(rows, start_s, ended_by or "the time is over")
+    return _series(rows, start_s, ended_by or "the time is over")
 
 
-def _gathered(rows: Sequence[TelemetrySample], start_s: float, ended_by: str) -> HandRecording:
+def _series(rows: Sequence[TelemetrySample], start_s: float, ended_by: str) -> HandRecording:
     """Turn readings into one row of times and angles for each joint."""
     series, left_out = {}, []
     for name in rows[0].servos if rows else ():

@@ -22,7 +22,7 @@ TOGETHER = "eyes_pan"
 """The joint that turns both eyes to the sides by one linkage."""
 
 
-class LookedAt(NamedTuple):
+class GazeResult(NamedTuple):
     """Measured gaze error of both eyes at the end. Degrees, metres.
 
     left_error, right_error: angle between each eye's line of sight and the point
@@ -51,7 +51,7 @@ def look_at(
     oculomotor: Oculomotor,
     p_world_m: Vec3,
     seconds: float,
-) -> LookedAt:
+) -> GazeResult:
     """Turn eyes and head to a point for some seconds; ``control`` has been started.
 
     p_world_m: x forward, y left, z up from the neck base
@@ -83,20 +83,22 @@ def look_at(
 
     moved = control.follow(desired, over, seconds + 1.0)
     converges = TOGETHER not in kinematics.names
-    return judged(p_world_m, kinematics.forward(moved.last.joints), moved, converges)
+    return measure_gaze(p_world_m, kinematics.forward(moved.last.joints), moved, converges)
 
 
-def judged(p_world_m: Vec3, pose: GazeState, moved: MoveResult, converges: bool = True) -> LookedAt:
-    """Return how measured eyes point at a point.
+def measure_gaze(
+    p_world_m: Vec3, pose: GazeState, moved: MoveResult, converges: bool = True
+) -> GazeResult:
+    """Return the gaze error of a measured pose.
 
-    converges: as in LookedAt
+    converges: as in GazeResult
     """
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     to_left = sub(p_world_m, pose.p_world_eye_left_m)
     to_right = sub(p_world_m, pose.p_world_eye_right_m)
     yaw, pitch, roll = pose.head_rad
     error = gaze_error(p_world_m, pose, converges)
-    return LookedAt(
+    return GazeResult(
         degrees(error.left),
         degrees(error.right),
         degrees(angle_between(left, right)),
@@ -109,8 +111,8 @@ def judged(p_world_m: Vec3, pose: GazeState, moved: MoveResult, converges: bool 
     )
 
 
-def met(looked: LookedAt) -> tuple[str, ...]:
-    """Return a text: how closely the gaze reaches the point, within the mechanism's range."""
+def gaze_text(looked: GazeResult) -> tuple[str, ...]:
+    """Return gaze error and vergence as text, as far as the mechanism has them."""
     eyes = [part for part in looked.moved.joints if part.joint.endswith(("_pan", "_tilt"))]
     known = " (estimated, not measured)" if any(part.estimated for part in eyes) else ""
     away = f"of a point {looked.distance_m:.2f} m away{known}"
@@ -146,7 +148,7 @@ def ends_reached(
 
 
 def refuse_not_finite(p_world_m: Vec3) -> None:
-    """Refuse what is no point.
+    """Refuse coordinates that are not numbers.
 
     Raises:
         SetupError: a coordinate is no number.
@@ -164,6 +166,6 @@ def refuse_inside(p_world_m: Vec3, pose: GazeState) -> None:
     if norm(sub(p_world_m, pose.p_world_head_m)) < 0.03:
         x, y, z = p_world_m
         raise SetupError(
-            f"{x:g} {y:g} {z:g} lies in the head itself: metres from the neck base, "
+            f"{x:g} {y:g} {z:g} is inside the head: metres from the neck base, "
             "x forward, y left, z up, e.g. 1.0 0.2 0.3"
         )

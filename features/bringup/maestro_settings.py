@@ -133,7 +133,7 @@ def settings_file(params: MaestroParams, setups: Sequence[ServoConfig], usb: boo
     return tostring(root, encoding="unicode") + "\n"
 
 
-def clipped(setup: ServoConfig, asked_steps: float, got_steps: float) -> str:
+def clipping_text(setup: ServoConfig, asked_steps: float, got_steps: float) -> str:
     """Return a message that a board clips its goals, with the remedy."""
     low, high = range_us(setup)
     if not got_steps:

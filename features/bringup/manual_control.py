@@ -22,7 +22,13 @@ from math import degrees, isfinite, radians, sqrt
 from typing import Annotated
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.move_result import GuardReasons, MoveResult, Step, outcome, standing
+from gazerig.features.bringup.move_result import (
+    GuardReasons,
+    MoveResult,
+    Step,
+    outcome,
+    rest_result,
+)
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.params import Bounds
 from gazerig.robot.control.body import Body
@@ -114,7 +120,7 @@ class ManualControl:
         return self.body.stop()
 
     def jog(self, joint: str, angle_deg: float) -> MoveResult:
-        """Move one joint slowly; the others hold where they are.
+        """Move one joint slowly; the others hold.
 
         Raises:
             SetupError: there is no such joint, or the angle is no number or
@@ -150,7 +156,7 @@ class ManualControl:
         def there(step: Step) -> str | None:
             if step.t_s - start_s < takes_s:
                 return None
-            return standing(step, desired, moving, radians(self._params.near_deg))
+            return rest_result(step, desired, moving, radians(self._params.near_deg))
 
         longest_s = takes_s + self._params.timeout_s
         return self.follow(on_the_way, there, longest_s, desired, gently=True)
@@ -242,7 +248,7 @@ class ManualControl:
         return step
 
 
-def parked(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
+def park_slowly(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
     """Park slowly unless the user requests the end again; return the result as text."""
     moved = control.park(park_deg, lambda: "interrupted" if again() else None)
     return "parked" if moved.arrived else f"not parked ({moved})"
@@ -256,7 +262,7 @@ def duration_s(distance_rad: float, params: JogParams) -> float:
 
 
 def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> None:
-    """Refuse what is no joint of the rig or no angle.
+    """Refuse unknown joints, and angles that are not numbers.
 
     Raises:
         SetupError: with what there is.

@@ -78,7 +78,7 @@ class MoveResult(NamedTuple):
         return f"{self.ended} ({'; '.join(reasons)})" if reasons else self.ended
 
     def of(self, joint: str) -> JointResult:
-        """Return one joint's part."""
+        """Return one joint's result."""
         return next(part for part in self.joints if part.joint == joint)
 
     def remarkable(self) -> tuple[JointResult, ...]:
@@ -105,7 +105,7 @@ class GuardReasons:
 
 
 def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointResult, ...]:
-    """Return every joint's part of how a movement ended."""
+    """Return every joint's result of a movement."""
     guard_result, joints = step.guard_result, step.joints
     has_feedback = joints.measured or (True,) * len(guard_result.joints)
     rows = zip(
@@ -122,7 +122,7 @@ def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[Join
     )
 
 
-def standing(
+def rest_result(
     step: Step, desired: JointAngles, moving: Iterable[int], near_rad: float
 ) -> str | None:
     """Return the result for joints at rest: at their goals or held back; None while they move."""

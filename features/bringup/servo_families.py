@@ -26,7 +26,7 @@ class Setting(NamedTuple):
     mask: int = ~0
 
     def of(self, now: int) -> int:
-        """Return what the register should be, being this now."""
+        """Return the correct value of the register, whose present value is ``now``."""
         return now & ~self.mask | self.value & self.mask
 
 

@@ -14,7 +14,7 @@ BACK_S = 3.0
 PAUSE_S = 0.1
 
 
-class Standing(NamedTuple):
+class ServoSnapshot(NamedTuple):
     """Status of a servo.
 
     errors: by name; torque: None if it could not be read
@@ -37,15 +37,15 @@ class Standing(NamedTuple):
         return f"{errors}, {torque}, at step {self.position}{volts}"
 
 
-class Rebooted(NamedTuple):
+class RebootResult(NamedTuple):
     """A servo before and after its restart, and how long it was away."""
 
-    before: Standing
-    after: Standing
+    before: ServoSnapshot
+    after: ServoSnapshot
     away_s: float
 
 
-def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> FoundServo:
+def find_servo(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> FoundServo:
     """Find one servo.
 
     Raises:
@@ -55,12 +55,12 @@ def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> FoundSe
     if found is None:
         raise ServoMissing(
             f"{port.port_name}: servo {servo_id} does not answer at {baud} bit/s: "
-            "gazerig scan tells who does"
+            "gazerig scan lists those that do"
         )
     return found
 
 
-def standing(port: BusPort, kind: ServoKind, servo_id: int) -> Standing:
+def read_snapshot(port: BusPort, kind: ServoKind, servo_id: int) -> ServoSnapshot:
     """Return the status of a servo.
 
     Raises:
@@ -70,7 +70,7 @@ def standing(port: BusPort, kind: ServoKind, servo_id: int) -> Standing:
     status = registers.read(servo_id, kind.family.error_register)
     torque = registers.read(servo_id, "torque_enable")
     volts = registers.read(servo_id, "present_input_voltage")
-    return Standing(
+    return ServoSnapshot(
         kind.family.name_errors(status or 0),
         None if torque is None else bool(torque),
         registers.read(servo_id, "present_position"),
@@ -85,7 +85,7 @@ def restart(
     servo_id: int,
     baud: int,
     sleep_until: Callable[[float], None],
-) -> Rebooted:
+) -> RebootResult:
     """Restart a servo and wait until it answers; its torque is off then.
 
     Raises:
@@ -93,21 +93,21 @@ def restart(
         ServoFault: it answers, but has not restarted.
         BusLost: the port is gone.
     """
-    present(port, kind, servo_id, baud)
-    before, began_s = standing(port, kind, servo_id), port.now_s()
+    find_servo(port, kind, servo_id, baud)
+    before, began_s = read_snapshot(port, kind, servo_id), port.now_s()
     reboot(port, kind.family, servo_id)
     for _ in range(round(BACK_S / PAUSE_S)):
         sleep_until(port.now_s() + PAUSE_S)
         if ping(port, kind.family, servo_id, baud, 1) is None:
             continue
         away_s = port.now_s() - began_s
-        after = standing(port, kind, servo_id)
+        after = read_snapshot(port, kind, servo_id)
         if before.torque and after.torque:
             raise ServoFault(
                 f"{port.port_name}: servo {servo_id} has not restarted, its torque is still on: "
                 "its firmware may not know how; switch its power off and on"
             )
-        return Rebooted(before, after, away_s)
+        return RebootResult(before, after, away_s)
     raise ServoMissing(
         f"{port.port_name}: servo {servo_id} does not come back after its restart: "
         "switch its power off and on"

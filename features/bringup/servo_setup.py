@@ -27,7 +27,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.servo_families import ServoKind, Tell
 
 
-class SetUp(NamedTuple):
+class SetupResult(NamedTuple):
     """Result for one servo: as it was found, as it is now, and what was written."""
 
     before: FoundServo
@@ -78,7 +78,7 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
 
 
 def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: str) -> None:
-    """See that the servo found is of the model the joint wants.
+    """Refuse a servo of another model than the joint's.
 
     Raises:
         ServoMissing: it is another.
@@ -92,7 +92,7 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: 
 
 def assign(
     port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
-) -> SetUp:
+) -> SetupResult:
     """Give the servo found the id of a joint and the bus's baud rate, and verify them.
 
     Its torque goes off. The message of every failure names id and rate of the servo now.
@@ -113,7 +113,7 @@ def assign(
 
 
 class _Assignment:
-    """One servo alone on a line, being given its id and baud rate."""
+    """Assignment of id and baud rate to one servo alone on a line."""
 
     def __init__(self, port: BusPort, kind: ServoKind, found: FoundServo) -> None:
         self._port, self._kind, self._found = port, kind, found
@@ -121,8 +121,8 @@ class _Assignment:
         self._id, self._baud = found.id, found.baud
         self._done: list[str] = []
 
-    def carry_out(self, servo_id: int, baud: int, tell: Tell) -> SetUp:
-        """Write what differs, and see that the servo answers so."""
+    def carry_out(self, servo_id: int, baud: int, tell: Tell) -> SetupResult:
+        """Write the differences, and verify that the servo answers with them."""
         registers, kind = self._registers, self._kind
         self._open(self._found.baud)
         # It then replies to every instruction.
@@ -142,11 +142,11 @@ class _Assignment:
         if seen is None or seen.number != self._found.number:
             raise ServoMissing(
                 f"{self._port.port_name}: the servo does not answer as id {self._id} at "
-                f"{self._baud} bit/s: gazerig scan tells where it is"
+                f"{self._baud} bit/s: gazerig scan finds it"
             )
         if kind.family.lock is not None and not registers.settle(self._id, kind.family.lock, 1):
             raise self._refused("close its lock")
-        return SetUp(self._found, seen, tuple(self._done))
+        return SetupResult(self._found, seen, tuple(self._done))
 
     def _change_id(self, servo_id: int) -> None:
         self._unlock()

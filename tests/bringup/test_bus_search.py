@@ -6,8 +6,8 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.features.bringup.bus_search import (
     BOARD_RATES,
     SearchRound,
-    found_of,
-    known_kinds,
+    found_servos,
+    parse_kinds,
     plan,
     search,
 )
@@ -17,7 +17,7 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-ALL = known_kinds("all")
+ALL = parse_kinds("all")
 FEW = (1_000_000, 57_600)
 MICRO, MINI = "1ffb:0089", "1ffb:008a"
 
@@ -74,7 +74,7 @@ def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers(
     (only,) = line.search(usb=MINI, rates=None, to_the_end=True)
     assert only.board is None and line.sent and b"\xff" not in line.sent
     for kind in ("dynamixel", "feetech"):
-        assert plan(MINI, known_kinds(kind), None) == ()
+        assert plan(MINI, parse_kinds(kind), None) == ()
     assert plan(MICRO, ALL, (1_000_000,)) == (("maestro", BOARD_RATES[0]),)
 
 
@@ -115,7 +115,7 @@ def test_dynamixel_servos_are_found_and_the_search_ends_there():
     chain = build_dynamixel([ServoSpec(1, "xl330-m077"), ServoSpec(7, "xc330-m288")], lambda: 0.0)
     rounds = Line(chain).search()
     assert {one.kind for one in rounds} == {"maestro", "dynamixel"}
-    kinds = {(kind, servo.id) for kind, servo in found_of(rounds)}
+    kinds = {(kind, servo.id) for kind, servo in found_servos(rounds)}
     assert kinds == {("dynamixel", 1), ("dynamixel", 7)}
 
 
@@ -139,7 +139,7 @@ def test_no_packet_changes_sts_servos():
     before = [chain[i].read(0, 56) for i in (1, 49, 253)]
     places = chain.positions_steps()
     rounds = Line(chain).search(to_the_end=True, thorough=True)
-    assert {(kind, servo.id) for kind, servo in found_of(rounds)} == {
+    assert {(kind, servo.id) for kind, servo in found_servos(rounds)} == {
         ("feetech", 1), ("feetech", 49), ("feetech", 253),
     }  # fmt: skip
     assert [chain[i].read(0, 56) for i in (1, 49, 253)] == before
@@ -163,9 +163,9 @@ def test_all_rates_of_a_kind_are_in_the_plan():
 
 
 def test_words_for_kinds():
-    assert known_kinds("feetech") == ("feetech",)
+    assert parse_kinds("feetech") == ("feetech",)
     with pytest.raises(ValueError, match="pca: not all or one of dynamixel, feetech, maestro"):
-        known_kinds("pca")
+        parse_kinds("pca")
     assert not SearchRound("feetech", 9600).answered
 
 

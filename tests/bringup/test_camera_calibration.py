@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from camera_bench import BOARD, SIZE, seen_board
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.features.bringup.calibration.camera_calibration import (
@@ -20,13 +21,11 @@ from gazerig.features.bringup.calibration.charuco_views import (
     coverage,
     view_of,
 )
-from gazerig.robot.model.charuco_board import CharucoBoard, SeenBoard
+from gazerig.robot.model.charuco_board import SeenBoard
 from gazerig.robot.model.intrinsics import project
 from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
 from gazerig.sim_mock.cameras.charuco_scene import hand_held_pose
 
-SIZE = (640, 400)
-BOARD = CharucoBoard()
 LENS = true_lens(*SIZE)
 GUESS = intrinsics_of_view(radians(69.0), *SIZE)
 VIEWS = 16
@@ -34,11 +33,9 @@ VIEWS = 16
 
 def corners(number: int, noise_px: float, rng: np.random.Generator, lens: Intrinsics) -> SeenBoard:
     """What a detector would find of the board, without a picture."""
-    R, p = hand_held_pose(number, BoardCameraParams(), lens, BOARD)
-    px = project(BOARD.corners_m @ np.array(R).T + p, lens)
-    inside = ((px > 0.0) & (px < np.array(SIZE) - 1.0)).all(axis=1)
-    px += rng.normal(0.0, noise_px, px.shape)
-    return SeenBoard(np.flatnonzero(inside), px[inside], BOARD.corners_m[inside])
+    return seen_board(
+        *hand_held_pose(number, BoardCameraParams(), lens, BOARD), lens, noise_px, rng
+    )
 
 
 def some_views(noise_px: float = 0.3, seed: int = 0, count: int = VIEWS) -> list[SeenBoard]:

@@ -5,7 +5,7 @@ from math import radians
 
 import numpy as np
 import pytest
-from desk import GAZE_JOINTS, LIDS
+from camera_bench import BOARD, KINEMATICS, RANGES
 
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
@@ -22,16 +22,11 @@ from gazerig.features.bringup.calibration.camera_procedure import (
 from gazerig.features.bringup.calibration.charuco_views import ViewParams
 from gazerig.features.bringup.calibration.hand_eye import camera_on_head
 from gazerig.gaze.types import Angles3
-from gazerig.robot.model.charuco_board import CharucoBoard
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.frames import CameraParams
-from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
-BOARD = CharucoBoard()
-KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), GAZE_JOINTS, LIDS)
 CAMERA = CameraParams()
-RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
 FEW = NeckStepParams(frames=2, timeout_s=1.0)
 
 
@@ -96,14 +91,14 @@ def test_more_views_are_asked_for_until_the_lens_is_sure(scene: BoardScene) -> N
         most_focal_error_percent=0.01, views=ViewParams(least_views=4, most_views=14)
     )
     steps = LensSteps(BOARD, radians(CAMERA.horizontal_field_deg), strict)
-    assert steps.tried()[0] is None
+    assert steps.try_result()[0] is None
     for k in range(14):
         assert steps.take(scene.look(k / 30)).kept
         if k == 12:
-            lens, why = steps.tried()
+            lens, why = steps.try_result()
             assert lens is None and "show more views" in why
     with pytest.raises(CameraCalibrationRefused, match="sure to"):
-        steps.tried()
+        steps.try_result()
 
 
 def test_no_picture_at_all_is_no_lens() -> None:

@@ -36,7 +36,7 @@ def test_scan_of_a_maestro():
         code, out, _ = invoked("scan", "--port", path)
         assert code == 0 and "Pololu Maestro: 6 channels or more" in out
         assert "serial signal error" in out and "its own script runs" in out
-        assert "nothing else was sent" in out and "asked dynamixel" not in out
+        assert "nothing else was sent" in out and "searched dynamixel" not in out
         code, out, _ = invoked("scan", "--port", path, "--json", "--kind", "maestro")
         (board,) = json.loads(out)["boards"]
         assert code == 0 and board["script"] is True and board["errors"] == []

@@ -5,13 +5,17 @@ Most in simulated time; of each command one is on a pseudo-terminal too, and mar
 
 import json
 import re
+import shlex
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 from command_line import invoked
 from desk import GAZE_JOINTS
 from served_rigs import hide_real_ports, rig_files, served
+from typer.testing import CliRunner
 
 from gazerig.config.save import copy_shipped, save_rig
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -19,6 +23,7 @@ from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli import ports
+from gazerig.robot.cli.main import app
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -51,8 +56,8 @@ def test_scan_lists_every_servo():
     assert [int(row[0]) for row in rows] == list(range(1, 10))
     assert rows[0][1] == "xl330-m077" and rows[8][1] == "xc330-m288"
     assert {row[3] for row in rows} == {"1000000"}
-    assert "9 servos on" in out and "asked dynamixel at 1000000, 57600 bit/s" in out
-    assert "feetech was not asked, as others answered" in out
+    assert "9 servos on" in out and "searched dynamixel at 1000000, 57600 bit/s" in out
+    assert "feetech was not searched, as others answered" in out
     code, out, _ = invoked("scan", "--mock", "--bauds", "1000000", "--json")
     found = json.loads(out)
     assert code == 0 and [servo["id"] for servo in found["servos"]] == list(range(1, 10))
@@ -323,3 +328,45 @@ def test_reboot_by_a_number_needs_one_bus_that_has_it(mixed):
     assert code == 2 and "1: which bus (the main bus, bus tilt)? name the joint instead" in err
     code, _, err = invoked("reboot", mixed, "7", "--mock")
     assert code == 0 and "neck_yaw (servo 7): back after" in err
+
+
+# --- every remedy that the doctor suggests can be typed and reaches the same rig and port
+
+DESK = Path(__file__).parents[2] / "config/rigs/desk.yaml"
+
+
+def commands_in(text: str) -> list[list[str]]:
+    """Return every command of the family that reaches servos, as it would be typed."""
+    token = r"(?: (?:--[a-z]+|'[^']+'|/\S*[\w]|\w+\.yaml|\d+\b|(?<=--joint )\w+|desk\b))*"
+    found = re.findall(rf"gazerig (?:doctor|setup|reboot|calibrate|scan|home)\b{token}", text)
+    return [shlex.split(one)[1:] for one in found if one != "gazerig reboot"]
+
+
+def parsed(words: list[str]) -> dict[str, object]:
+    """Parse a command as the command line does, without running it."""
+    group = typer.main.get_command(app)
+    context = group.make_context("gazerig", list(words), resilient_parsing=False)
+    name, command, rest = group.resolve_command(context, list(words))  # type: ignore[attr-defined]
+    with command.make_context(name, rest, parent=context) as made:
+        return dict(made.params)
+
+
+@pytest.mark.parametrize("fault", ["overload 7", "stick 7"])
+@pytest.mark.parametrize("asked", [["doctor"], ["doctor", "--fix"], ["doctor", "--json"]])
+def test_every_cure_of_the_doctor_can_be_typed(
+    fault: str, asked: list[str], tmp_path, capfd
+) -> None:
+    rig = tmp_path / "mine.yaml"
+    rig.write_text(DESK.read_text())
+    with PtyBus() as bus:
+        path = bus.start(SMALL, baud=1_000_000)
+        bus.command(fault)
+        made = CliRunner().invoke(app, [*asked, str(rig), "--port", path])
+    said = made.output
+    found = commands_in(said)
+    assert found
+    for words in found:
+        values = parsed(words)
+        assert values["port"] == path, words
+        if "rig" in values and words[0] != "scan":
+            assert values["rig"] == str(rig), words

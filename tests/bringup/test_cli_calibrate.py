@@ -90,7 +90,7 @@ def test_what_makes_no_calibration_is_refused_and_the_rest_is_kept(
     words = ("--joint", "left_eye_pan", "--joint", "neck_yaw", "--mock", "--answers", answers)
     done = invoked("calibrate", str(rig), *words)
     assert done.code == 1
-    assert "refused: left_eye_pan: only 0.0 deg lie between the two ends" in done.err
+    assert "refused: left_eye_pan: only 0.0 deg are between the two ends" in done.err
     assert "not calibrated: left_eye_pan" in done.err
     assert load_rig(str(rig)).joints["neck_yaw"].zero_step == pytest.approx(1911, abs=8)
 
@@ -210,7 +210,7 @@ def test_places_on_several_lines_are_refused_before_anything_moves(rigs: dict[st
         ("desk", ("--answers", "/nowhere"), "No such file"),
         ("desk", ("--joint", "neck_yaw", "--answers", "EMPTY"), "no answer left to: turn neck_yaw"),
         ("desk", ("--joint", "neck_yaw", "--answers", "/dev/null"), "is a device"),
-        ("maker", ("--by", "motion"), "hobby servos do not tell where they are"),
+        ("maker", ("--by", "motion"), "hobby servos do not report their position"),
         ("maker", ("--pulses", "900"), "two pulse widths in us"),
         ("maker", ("--pulses", "400:2000"), "within 500:2500 us"),
         ("maker", ("--set-middle",), "only Feetech STS servos"),

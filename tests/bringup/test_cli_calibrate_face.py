@@ -1,6 +1,8 @@
 """calibrate face as it is typed: keys, scripts, what is written and what is not."""
 
+import os
 import socket
+import time
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -9,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from command_line import Invoked, answers_in, invoked
-from commands_started import OnTerminal
+from commands_started import PATIENCE_S, OnTerminal
 from hypothesis import given
 from hypothesis import strategies as st
 from page_visitor import Visitor
@@ -17,12 +19,13 @@ from served_rigs import rig_files
 
 from gazerig.config.save import save_rig
 from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.features.bringup.cli.calibrate import face as cli_face
 from gazerig.features.bringup.cli.calibration_keys import BUTTONS, PageKeys, key_and_count, keys_of
 from gazerig.robot.app.run_observers import only_stops
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
+from gazerig.robot.remote.client import RequestRejected, RobotClient
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -315,3 +318,43 @@ def test_eyes_on_one_linkage_meet_a_part_by_their_mean_line_of_sight(tmp_path: P
     done = run(*words, *script(tmp_path, "", "end"))
     assert done.code == 0, done.err
     assert "N:" in rig.read_text()
+
+
+# --- gazerig stop
+
+
+def goes_on(running: RobotClient) -> None:
+    """Resume as soon as the stop has held as long as stops do."""
+    end_s = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            return running.resume()
+        except RequestRejected as refused:
+            assert "holds at least" in str(refused) and time.monotonic() < end_s, refused
+            time.sleep(1.2)  # who asks sooner is refused for that
+
+
+def test_a_head_that_is_steered_over_a_face_can_be_stopped_and_told_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = Path(rig_files(tmp_path)["desk"])
+    # Both processes look there; a path of its own keeps other rigs that run here out of it.
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    with sitting_at(rig, "--no-page") as sitting:
+        sitting.reads("1/8 the tip of your nose: 0 mm")
+        with RobotClient.connect() as running:
+            assert running.pid == sitting.pid
+            for order in (
+                lambda: running.look_at(1.0, 0.0, 0.3),
+                lambda: running.set("loop.rate_hz", 90.0),
+            ):
+                with pytest.raises((DriverError, ValueError), match="is being calibrated"):
+                    order()
+            running.stop("a finger")
+            assert running.status()["stopped"] == "a finger"
+            sitting.reads(f"stopped by process {os.getpid()}: a finger; torque off")
+            goes_on(running)
+            assert not running.status()["stopped"]
+        sitting.types(b"q")
+        assert sitting.ends() == 0, sitting.said
+    assert not list(tmp_path.glob("**/*.sock"))

@@ -14,7 +14,7 @@ from desk import GAZE_JOINTS
 from served_rigs import Served, rig_files, served
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.manual_session import holding, left_alone
+from gazerig.features.bringup.cli.manual_session import holding_text, unreleased_text
 from gazerig.features.bringup.manual_control import ManualControl
 
 pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
@@ -190,8 +190,8 @@ def test_look_at_of_a_maker_s_head_says_what_it_cannot_do() -> None:
 
 
 def test_what_servos_do_alone_is_said_for_the_kinds_that_there_are(rigs: dict[str, str]) -> None:
-    mixed = left_alone(load_rig(rigs["mixed"]))
+    mixed = unreleased_text(load_rig(rigs["mixed"]))
     assert "watchdog" in mixed and "Feetech" in mixed and "Maestro" in mixed
-    assert "own watchdog and hold" in left_alone(load_rig("desk"))
-    assert "watchdog" not in left_alone(load_rig("feetech"))
-    assert holding(load_rig("desk")) == "torque on: 9 servos hold where they are"
+    assert "own watchdog and hold" in unreleased_text(load_rig("desk"))
+    assert "watchdog" not in unreleased_text(load_rig("feetech"))
+    assert holding_text(load_rig("desk")) == "torque on: 9 servos hold where they are"

@@ -11,7 +11,7 @@ from gazerig.drivers.servo_bus.discovery import ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.doctor.diagnostics import worst
 from gazerig.features.bringup.doctor.families import CHECKS
-from gazerig.features.bringup.doctor.servo_rules import examine, take
+from gazerig.features.bringup.doctor.servo_rules import examine, read_state
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -27,7 +27,7 @@ def healthy(name):
         rig.set(1, shutdown=52)  # as from the factory it is worth a note
     found = ping(rig.port, kind.family, 1, BAUD)
     registers = Registers(rig.port, kind.family)
-    state = take(registers, CHECKS[kind.name], rig.setups[0], present(found), 0)
+    state = read_state(registers, CHECKS[kind.name], rig.setups[0], present(found), 0)
     assert None not in state.values.values() and worst(examine(state)) == "ok"
     return state
 
@@ -52,7 +52,7 @@ BOTH_RULES = [
     ({"torque_enable": 1}, "warn", "torque is on", "hold the joint"),
     ({"present_temperature": 60}, "warn", "60 degC, it switches off above 70", "cool"),
     ({"present_temperature": 70}, "error", "70 degC", "cool"),
-    ({"present_position": 1649}, "warn", "stands at step 1649, outside", "gazerig calibrate"),
+    ({"present_position": 1649}, "warn", "is at step 1649, outside", "gazerig calibrate"),
     ({"return_delay_time": 250}, "warn", "waits 500 us", "--fix"),
     ({"min_position_limit": 1700}, "warn", "1700..2446 cut the YAML's range 1650..2446", "--fix"),
     ({"max_position_limit": 4095}, "note", "1650..4095 are wider than the YAML's range", "--fix"),
@@ -78,7 +78,7 @@ DYNAMIXEL_RULES = [
         "does not switch off at overheating, electrical shock, overload",
         "set Shutdown (63) to 53",
     ),
-    ({"status_return_level": 1}, "warn", "does not confirm what it is told", "--fix"),
+    ({"status_return_level": 1}, "warn", "does not confirm commands", "--fix"),
     ({"protocol_type": 20}, "warn", "Protocol Type 20", "Wizard"),
     ({"hardware_error_status": 0x20}, "error", "latched: overload", "gazerig reboot 1"),
     ({"hardware_error_status": 0x04}, "error", "latched: overheating", "cool"),
@@ -229,7 +229,7 @@ def test_a_servo_that_does_not_tell(kind):
     rig.command("lose 1")
     checks = CHECKS[kind.name]
     (only,) = examine(
-        take(Registers(rig.port, kind.family), checks, rig.setups[0], present(found), 0)
+        read_state(Registers(rig.port, kind.family), checks, rig.setups[0], present(found), 0)
     )
     says = "no good answer about its registers" if kind is FEETECH else "answers pings and nothing"
     assert only.level == "error" and says in only.what

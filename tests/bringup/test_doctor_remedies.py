@@ -12,13 +12,13 @@ from gazerig.features.bringup.cli.scan import remarks
 from gazerig.features.bringup.doctor.diagnostics import (
     Diagnostic,
     Fix,
-    grouped,
-    summed_up,
-    together,
+    group_findings,
+    join_places,
+    summarize,
     worst,
 )
 from gazerig.features.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
-from gazerig.features.bringup.doctor.run import fix_latency, look
+from gazerig.features.bringup.doctor.run import find_servos, fix_latency
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
 
 # --- fixes
@@ -168,7 +168,7 @@ def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
     assert not rig.port.is_open
     rig.port.setBaudRate = lambda baud: False  # type: ignore[assignment, method-assign]
     with pytest.raises(PortError, match="cannot run at 1000000"):
-        look(rig.port, DYNAMIXEL, rig.setups, BAUD, lambda _: None)
+        find_servos(rig.port, DYNAMIXEL, rig.setups, BAUD, lambda _: None)
 
 
 # --- words
@@ -179,15 +179,15 @@ def test_findings_in_words():
     assert str(finding) == "warn: neck_yaw (servo 7): hot: let it cool"
     assert worst([]) == "ok"
     same = [Diagnostic("note", "n", f"j{i} (servo {i})") for i in (1, 2, 4)]
-    worst_first = grouped([*same, finding])
+    worst_first = group_findings([*same, finding])
     assert [row[0] for row in worst_first] == ["warn", "note"]
     assert worst_first[1] == ("note", "j1, j2, j4 (servos 1-2, 4)", "n", "")
-    assert together(["/dev/ttyUSB0", "j1 (servo 1)"]) == "/dev/ttyUSB0, j1 (servo 1)"
+    assert join_places(["/dev/ttyUSB0", "j1 (servo 1)"]) == "/dev/ttyUSB0, j1 (servo 1)"
     fixable = Diagnostic("warn", "w", "x", fixes=(Fix(1, "return_delay_time", 0, 250),))
-    assert summed_up([finding, fixable], "desk", False) == (
+    assert summarize([finding, fixable], "desk", False) == (
         "desk: 2 warn; gazerig doctor --fix mends 1 of them"
     )
-    assert "--fix" not in summed_up([fixable], "desk", True)
+    assert "--fix" not in summarize([fixable], "desk", True)
 
 
 def test_remarks_of_a_scan():
@@ -204,7 +204,7 @@ def test_remarks_of_a_scan():
     lines = list(remarks(rounds, "/dev/x"))
     assert any("only pieces came" in line for line in lines)
     assert any("Protocol 1 as id 5" in line for line in lines)
-    assert "asked dynamixel at 9600, 57600 bit/s" in lines[0] and "supply" in lines[-1]
+    assert "searched dynamixel at 9600, 57600 bit/s" in lines[0] and "supply" in lines[-1]
     # Feetech servos answer the old protocol's ping: that is no riddle where they were found.
     sts = SearchRound("feetech", 57_600, True, two[:1])
     assert not any("Protocol 1" in line for line in remarks([*rounds, sts], "/dev/x"))

@@ -14,11 +14,11 @@ from gazerig.features.bringup.calibration.face_calibration import (
     STEPS_MM,
     FaceCalibration,
     Key,
-    begun,
+    apply_key,
     changes,
+    initial_calibration,
     place_in_face_mm,
     point_world_m,
-    pressed,
 )
 from gazerig.gaze.angles import add, compose, rotate, rotation
 from gazerig.gaze.types import PARTS, Angles3, Vec3
@@ -31,9 +31,9 @@ KEYS = st.lists(st.sampled_from(get_args(Key)), max_size=60)
 
 
 def after(*keys: Key, own: dict[str, Vec3] | None = None) -> FaceCalibration:
-    state = begun(own or {})
+    state = initial_calibration(own or {})
     for key in keys:
-        state = pressed(state, key)
+        state = apply_key(state, key)
     return state
 
 
@@ -41,10 +41,10 @@ def after(*keys: Key, own: dict[str, Vec3] | None = None) -> FaceCalibration:
 def test_what_was_chosen_on_one_face_is_there_on_the_face_at_any_other_pose(
     keys: list[Key], p_then: Vec3, turn_then: Angles3, p_now: Vec3, turn_now: Angles3
 ) -> None:
-    state = begun({})
+    state = initial_calibration({})
     for key in keys:
         part, place = state.part, state.place_mm(state.part or "N")
-        state = pressed(state, key)
+        state = apply_key(state, key)
         if key != "enter" or part is None:
             continue
         # Where the gaze met the face as it was then, carried along with the face to now.
@@ -58,9 +58,9 @@ def test_what_was_chosen_on_one_face_is_there_on_the_face_at_any_other_pose(
 
 @given(KEYS)
 def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]) -> None:
-    state = begun({})
+    state = initial_calibration({})
     for key in keys:
-        state = pressed(state, key)
+        state = apply_key(state, key)
     for part in ORDER:
         x, y, z = state.place_mm(part)
         assert x == pytest.approx(PARTS_FACE_M[part][0] * 1e3)
@@ -74,7 +74,7 @@ def test_every_part_is_asked_for_once_and_named() -> None:
 
 
 def test_left_is_the_owners_left_and_up_is_up_whatever_the_face_does() -> None:
-    state = pressed(pressed(begun({}), "left"), "up")
+    state = apply_key(apply_key(initial_calibration({}), "left"), "up")
     assert state.moved_mm("N") == (5.0, 5.0)
     # A face that looks back at the robot has its left at the world's -y.
     facing = rotation((radians(180.0), 0.0, 0.0))
@@ -92,7 +92,7 @@ def test_only_parts_with_an_enter_are_written() -> None:
         "face_parts_mm.N": (0.0, 5.0, 0.0),
         "face_parts_mm.RE": (-33.0, -30.9, 30.0),
     }
-    assert state.part is None and pressed(state, "left") is state
+    assert state.part is None and apply_key(state, "left") is state
 
 
 def test_back_and_skip_take_a_choice_back() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.calibration.face_calibration import begun, point_world_m
+from gazerig.features.bringup.calibration.face_calibration import initial_calibration, point_world_m
 from gazerig.features.bringup.calibration.face_steering import (
     AIMED_DEG,
     STALE_S,
@@ -34,7 +34,7 @@ def face(number: int, x: float, y: float = 0.0, yaw: float = 3.1) -> Face:
 
 
 def steering() -> FaceSteering:
-    return FaceSteering(begun({}), TOP_DOWN, REST)
+    return FaceSteering(initial_calibration({}), TOP_DOWN, REST)
 
 
 def chosen(made: FaceSteering, t_s: float, *faces: Face, captured_s: float | None = None) -> Target:
@@ -86,7 +86,7 @@ def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
     chosen(made, 1.0, face(1, 1.0))
     assert chosen(made, 2.0, face(1, 1.0), captured_s=1.9 - STALE_S).kind == "rest"
     assert "no face is seen" in (made.press("left", 2.0) or "")
-    assert made.state == begun({}) and not made.aimed
+    assert made.state == initial_calibration({}) and not made.aimed
     assert made.press("end", 2.0) is None and made.state.part is None
 
 
@@ -95,7 +95,7 @@ def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
 
 @pytest.fixture
 def steered() -> FaceSteering:
-    return FaceSteering(begun({}), TopDown(RIG.gaze.top_down), REST)
+    return FaceSteering(initial_calibration({}), TopDown(RIG.gaze.top_down), REST)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import GAZE_JOINTS, LIDS
+from camera_bench import BOARD, KINEMATICS, RANGES, seen_board
 
 from gazerig.features.bringup.calibration.camera_calibration import CameraCalibrationRefused
 from gazerig.features.bringup.calibration.camera_procedure import neck_angles
@@ -19,16 +19,8 @@ from gazerig.features.bringup.calibration.hand_eye import (
     turns_deg,
 )
 from gazerig.gaze.types import Angles3
-from gazerig.robot.model.charuco_board import CharucoBoard, SeenBoard
 from gazerig.robot.model.frames import CameraParams
-from gazerig.robot.model.intrinsics import project
-from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
-
-BOARD = CharucoBoard()
-KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), GAZE_JOINTS, LIDS)
-# The desk rig's neck.
-RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
 
 
 def scene_of(seed: int) -> BoardScene:
@@ -51,11 +43,7 @@ def some_views(
     rng = np.random.default_rng(seed)
     views = []
     for truly in angles or planned(scene):
-        R, p = scene.seen_pose(truly)
-        px = project(BOARD.corners_m @ np.array(R).T + p, scene.lens)
-        inside = ((px > 0.0) & (px < (639.0, 399.0))).all(axis=1)
-        px += rng.normal(0.0, noise_px, px.shape)
-        seen = SeenBoard(np.flatnonzero(inside), px[inside], BOARD.corners_m[inside])
+        seen = seen_board(*scene.seen_pose(truly), scene.lens, noise_px, rng)
         yaw, pitch, roll = (np.array(truly) + rng.normal(0.0, radians(joint_deg), 3)).tolist()
         views.append(NeckView(*KINEMATICS.head_pose((yaw, pitch, roll)), seen))
     return views

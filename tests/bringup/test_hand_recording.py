@@ -111,7 +111,7 @@ def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off() -> None:
 def test_hobby_servos_and_a_closed_input_are_refused_before_anything_moves(tmp_path: Path) -> None:
     run = CliRunner()
     hobby = run.invoke(app, ["maker", "mine", "--mock", "--yes"])
-    assert hobby.exit_code != 0 and "hobby servos do not tell where they are" in hobby.stderr
+    assert hobby.exit_code != 0 and "hobby servos do not report their position" in hobby.stderr
     unsaid = run.invoke(app, ["desk", "mine", "--mock", "--folder", str(tmp_path)])
     assert unsaid.exit_code != 0 and "goes off and stays off" in unsaid.stderr
     assert "hold it and say --yes" in unsaid.stderr

@@ -11,7 +11,7 @@ from served_rigs import rig_files
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
-from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
+from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
 from gazerig.features.bringup.cli.prompts import Lines
 
 
@@ -34,8 +34,8 @@ class Servo:
         return "here"
 
 
-def person(tmp_path: Path, *lines: str) -> SteeringPerson:
-    return SteeringPerson(Lines(Path(answers_in(tmp_path, *lines))), lambda: None, False)
+def person(tmp_path: Path, *lines: str) -> TerminalJogger:
+    return TerminalJogger(Lines(Path(answers_in(tmp_path, *lines))), lambda: None, False)
 
 
 def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -54,11 +54,12 @@ def test_a_number_is_said_or_agreed_to(tmp_path: Path, capsys: pytest.CaptureFix
     assert "how far? [12.5]" in said and "'much' is no number" in said
 
 
-def test_q_and_the_end_of_the_answers_end_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("word", ["q", "quit"])
+def test_q_and_the_end_of_the_answers_end_it(word: str, tmp_path: Path) -> None:
     with pytest.raises(CalibrationStopped, match="q"):
-        person(tmp_path, "q").steer("move it", Servo())
-    with pytest.raises(CalibrationStopped, match="q"):
-        person(tmp_path, "quit").number("how far?", 1.0, str)
+        person(tmp_path, word).steer("move it", Servo())
+    with pytest.raises(CalibrationStopped):
+        person(tmp_path, word).number("how far?", 1.0, str)
     with pytest.raises(SetupError, match=r"no answer left to: how far\? \[1\]"):
         person(tmp_path).number("how far?", 1.0, str)
 

@@ -22,14 +22,14 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
     Marks,
-    Unwrapped,
-    applied,
+    PositionUnwrapper,
     calibration,
+    centre_zero,
     changes,
     ends_of,
     is_lid,
     lid_keys,
-    middle,
+    with_calibration,
 )
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY
@@ -49,7 +49,7 @@ TURN = 4096
 def test_a_position_is_followed_over_the_seam_however_it_is_reported(
     start: int, moves: list[int], wraps: bool
 ) -> None:
-    track, true = Unwrapped(), start
+    track, true = PositionUnwrapper(), start
     assert track.see(start, 0.0) == start
     for i, move in enumerate(moves, 1):
         true += move
@@ -59,12 +59,12 @@ def test_a_position_is_followed_over_the_seam_however_it_is_reported(
 
 
 def test_a_servo_that_went_on_counting_before_is_taken_into_its_turn() -> None:
-    assert Unwrapped().see(TURN + 100, 0.0) == 100
-    assert Unwrapped().see(-100, 0.0) == TURN - 100
+    assert PositionUnwrapper().see(TURN + 100, 0.0) == 100
+    assert PositionUnwrapper().see(-100, 0.0) == TURN - 100
 
 
 def test_turning_unseen_is_refused_when_its_way_is_unknown() -> None:
-    track = Unwrapped()
+    track = PositionUnwrapper()
     track.see(1000, 0.0)
     assert track.see(1400, 2.0) == 1400
     with pytest.raises(CalibrationRefused, match=r"turned by 97 deg .* for 1.0 s"):
@@ -102,7 +102,7 @@ def test_what_is_found_is_what_is_there_or_it_is_refused(
         return
     assert inside
     assert found.zero_step == zero and found.sign == sign
-    made = applied(joint, found)
+    made = with_calibration(joint, found)
     for angle, end in ((found.max_deg, ends[0]), (found.min_deg, ends[1])):
         short_steps = (end - made.steps(radians(angle))) * (1 if angle > 0 else -1) * sign
         assert margin <= short_steps / (ratio * STEPS_PER_DEG) + 0.1 / ratio
@@ -127,9 +127,9 @@ def test_a_travel_with_the_seam_in_it_is_always_refused_with_the_cure(
 @pytest.mark.parametrize(
     ("marks", "says"),
     [
-        (Marks(2070, 2030, 2050), "only 3.5 deg lie between the two ends"),
-        (Marks(2300, 1800, 2400), "does not lie between the ends"),
-        (Marks(2300, 1800, 2290), "lies within 2 deg of an end"),
+        (Marks(2070, 2030, 2050), "only 3.5 deg are between the two ends"),
+        (Marks(2300, 1800, 2400), "is not between the ends"),
+        (Marks(2300, 1800, 2290), "is within 2 deg of an end"),
         (Marks(2085, 2011, 2048), "with 2 deg of margin at each end only"),
         (Marks(2000 + 5000, 2000, 4000), "counts only one turn"),
     ],
@@ -191,7 +191,7 @@ def test_lids_and_parking_follow_the_new_range() -> None:
 
 
 def test_the_middle_is_half_way() -> None:
-    assert middle(Marks(3000, 1000, 0)).zero == 2000
+    assert centre_zero(Marks(3000, 1000, 0)).zero == 2000
 
 
 # --- finding a stop
@@ -284,5 +284,5 @@ def test_a_jaw_may_rest_at_its_stop_and_an_eye_may_not() -> None:
     made = calibration("jaw", Marks(2400, 2047, 2045), joint, 2.0)
     assert (made.zero_step, made.min_deg, made.sign) == (2047, 0.0, 1)
     assert made.max_deg == pytest.approx(29.0, abs=0.05)
-    with pytest.raises(CalibrationRefused, match=r"straight ahead .* does not lie between"):
+    with pytest.raises(CalibrationRefused, match=r"straight ahead .* is not between"):
         calibration("neck_yaw", Marks(2400, 2047, 2045), joint, 2.0)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.look_at import LookedAt, ends_reached, look_at, met
+from gazerig.features.bringup.look_at import GazeResult, ends_reached, gaze_text, look_at
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, duration_s
 from gazerig.features.bringup.move_result import Step
 from gazerig.gaze.types import Vec3
@@ -65,7 +65,7 @@ class Bench(EmulatedRig):
     def torque(self) -> list[bool]:
         return [servo.torque for servo in cast(Any, self.devices[""]).servos]
 
-    def look(self, point: Vec3, seconds: float) -> LookedAt:
+    def look(self, point: Vec3, seconds: float) -> GazeResult:
         kinematics, oculomotor = gaze_parts(self.rig, 0)
         return look_at(self.control, kinematics, oculomotor, point, seconds)
 
@@ -285,7 +285,7 @@ def test_eyes_on_one_linkage_are_judged_by_their_mean_line_of_sight(
     # Each eye by itself is beside the point by half the vergence that it needs.
     worst = max(looked.left_error, looked.right_error)
     assert worst == pytest.approx(looked.desired_vergence / 2.0, abs=1.0)
-    words = "\n".join(met(looked))
+    words = "\n".join(gaze_text(looked))
     assert "estimated, not measured" in words and "vergence: none, as one servo" in words
 
 
@@ -302,7 +302,7 @@ def test_eyes_that_cannot_turn_so_far_are_said_to_be_at_their_end(other: Bench) 
 def test_separate_eyes_converge_and_are_measured(other: Bench) -> None:
     looked = other.look((0.5, 0.0, 0.14), 3.0)
     assert looked.converges and looked.error == max(looked.left_error, looked.right_error) < 2.0
-    assert "estimated" not in "\n".join(met(looked))
+    assert "estimated" not in "\n".join(gaze_text(looked))
 
 
 @on("mixed")
@@ -311,4 +311,4 @@ def test_a_mixed_head_looks_with_a_neck_that_is_measured_and_eyes_that_are_not(
 ) -> None:
     looked = other.look((1.0, 0.5, 0.1), 3.0)
     assert not looked.converges and looked.error < 2.0 and looked.head[0] > 3.0
-    assert "estimated" in met(looked)[0]
+    assert "estimated" in gaze_text(looked)[0]

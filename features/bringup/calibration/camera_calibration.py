@@ -80,7 +80,7 @@ class LensCalibration:
         return degrees(atan2(right, 1.0) - atan2(left, 1.0))
 
     def params(self) -> LensParams:
-        """Return it as it is written down."""
+        """Return the lens as the rig's file holds it."""
         return lens_params(self.intrinsics, self.width_px, self.height_px)
 
 
@@ -92,7 +92,7 @@ def lens_params(lens: Intrinsics, width_px: int, height_px: int) -> LensParams:
 
 
 class _Fit(NamedTuple):
-    """What OpenCV found for a set of views."""
+    """OpenCV's calibration for a set of views."""
 
     lens: Intrinsics
     rms_px: float
@@ -158,14 +158,14 @@ def _usable(
 
 def _fit(views: Sequence[SeenBoard], kept: Sequence[int], width: int, height: int) -> _Fit:
     """Fit a lens; with the third radial coefficient if the views prove it."""
-    plain = _calibrated([views[k] for k in kept], width, height, cv2.CALIB_FIX_K3)
-    full = _calibrated([views[k] for k in kept], width, height, 0)
+    plain = _run_opencv([views[k] for k in kept], width, height, cv2.CALIB_FIX_K3)
+    full = _run_opencv([views[k] for k in kept], width, height, 0)
     k3, spread = full.lens.distortion[4], float(full.std[8])
     proven = abs(k3) > _PROVEN * spread and full.rms_px < 0.98 * plain.rms_px
     return full if proven and not _folds(full.lens, width, height) else plain
 
 
-def _calibrated(views: Sequence[SeenBoard], width: int, height: int, flags: int) -> _Fit:
+def _run_opencv(views: Sequence[SeenBoard], width: int, height: int, flags: int) -> _Fit:
     """Run OpenCV's calibration."""
     points = [view.corners_board_m.astype(np.float32)[:, None] for view in views]
     corners = [view.corners_px.astype(np.float32)[:, None] for view in views]
@@ -197,7 +197,7 @@ def outlier(view_rms_px: Floats, ratio: float, good_px: float) -> int | None:
 
 
 def _judge(fit: _Fit, width: int, height: int, params: LensCalibrationParams) -> None:
-    """Refuse what does not fit or is not sure."""
+    """Refuse a fit with too large errors or standard deviations."""
     most_px = params.most_error_px * width / _WIDTH_PX
     if not fit.rms_px <= most_px:
         raise CameraCalibrationRefused(

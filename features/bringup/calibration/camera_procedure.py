@@ -1,4 +1,4 @@
-"""Calibrating a camera, step by step: frames in, what to do next and the result out.
+"""Calibration of a camera, step by step: frames in, the next instruction and the result out.
 
 Nothing is printed and nothing waits on its own: who runs the steps shows them, brings the
 frames and moves the head.
@@ -98,7 +98,7 @@ class LensSteps:
         corners = 0 if seen is None else len(seen.ids)
         return LensStep(shot.number, corners, not why, why, self._collector.coverage)
 
-    def tried(self) -> tuple[LensCalibration | None, str]:
+    def try_result(self) -> tuple[LensCalibration | None, str]:
         """Return the lens, or None and why more views are needed.
 
         Raises:
@@ -204,14 +204,14 @@ def neck_steps(
     par = params if params is not None else NeckStepParams()
     for number, asked in enumerate(angles_rad, 1):
         neck.turn(asked)
-        seen, angles, why = _seen_at_rest(neck, look, now_s, board, par)
+        seen, angles, why = _average_view(neck, look, now_s, board, par)
         corners = 0 if seen is None else len(seen.ids)
         view = None if seen is None else NeckView(*geometry.head_pose(angles), seen)
         yield NeckStep(number, len(angles_rad), asked, corners, view, why)
     neck.turn((0.0, 0.0, 0.0))
 
 
-def _seen_at_rest(
+def _average_view(
     neck: Neck,
     look: Look,
     now_s: Callable[[], float],
@@ -250,7 +250,7 @@ def _seen_at_rest(
 
 
 def _mean(sights: Sequence[SeenBoard]) -> SeenBoard | None:
-    """Average the corners that are in every frame, None where they are too few."""
+    """Average the corners that are in every frame, None if they are too few."""
     common = set.intersection(*(set(seen.ids.tolist()) for seen in sights))
     kept = [np.isin(seen.ids, sorted(common)) for seen in sights]
     if len(common) < LEAST_CORNERS:

@@ -72,7 +72,7 @@ class ViewParams:
     # fmt: on
 
 
-class Held(NamedTuple):
+class BoardView(NamedTuple):
     """Position and tilt of the board in one view.
 
     left, right, top, bottom: of its corners in the image, 0..1
@@ -86,7 +86,7 @@ class Held(NamedTuple):
     tilt_right_deg: float
     tilt_down_deg: float
 
-    def differs(self, other: "Held", params: ViewParams) -> bool:
+    def differs(self, other: "BoardView", params: ViewParams) -> bool:
         """Return whether it shows something that the other does not."""
         moved = max(abs(a - b) for a, b in zip(self[:4], other[:4], strict=True))
         tilted = hypot(
@@ -110,8 +110,8 @@ class Coverage(NamedTuple):
         return not self.missing
 
 
-def held(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> Held | None:
-    """Return how the board is held, None where its pose cannot be found.
+def view_of(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> BoardView | None:
+    """Return position and tilt of the board, None if its pose cannot be found.
 
     guess: a lens that is about right; the field of view of the data sheet will do
     """
@@ -121,10 +121,10 @@ def held(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> H
     share = (seen.corners_px + 0.5) / (width_px, height_px)
     (left, top), (right, bottom) = share.min(axis=0).tolist(), share.max(axis=0).tolist()
     into_x, into_y, _ = np.clip(poses[0].R_camera_board[:, 2], -1.0, 1.0).tolist()
-    return Held(left, right, top, bottom, degrees(asin(into_x)), degrees(asin(into_y)))
+    return BoardView(left, right, top, bottom, degrees(asin(into_x)), degrees(asin(into_y)))
 
 
-def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
+def coverage(views: Sequence[BoardView], params: ViewParams) -> Coverage:
     """Return what is missing."""
     edge, tilt = params.edge_share, params.least_tilt_deg
     goals = {
@@ -155,7 +155,7 @@ class ViewCollector:
     ) -> None:
         self.params = params if params is not None else ViewParams()
         self._guess, self._size = guess, (width_px, height_px)
-        self._held: list[Held] = []
+        self._held: list[BoardView] = []
         self.views: list[SeenBoard] = []
 
     @property
@@ -167,9 +167,9 @@ class ViewCollector:
         """Keep a view if it is new; return the reason if it was not kept, else ""."""
         if seen is None:
             return "no board seen"
-        how = held(seen, self._guess, *self._size)
+        how = view_of(seen, self._guess, *self._size)
         if how is None:
-            return "the board's pose cannot be told"
+            return "the board's pose cannot be found"
         if not all(how.differs(other, self.params) for other in self._held):
             return "too much like a view before"
         if len(self.views) >= self.params.most_views:

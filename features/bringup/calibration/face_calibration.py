@@ -21,7 +21,7 @@ from gazerig.robot.model.face_geometry import PARTS_FACE_M
 Key = Literal["left", "right", "up", "down", "larger", "smaller", "enter", "skip", "back", "end"]
 
 ORDER = ("N", "LE", "RE", "M", "DN", "UP", "FL", "FR")
-"""The parts as they are asked for: from the middle outwards."""
+"""The parts in the order of the calibration, from the middle outwards."""
 
 PART_NAMES_TEXT = {
     "N": "the tip of your nose",
@@ -87,7 +87,7 @@ class FaceCalibration:
         return y - y0, z - z0
 
 
-def begun(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
+def initial_calibration(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
     """Return the start: a rig's own places, or those of an adult's face for parts without one.
 
     own_mm: part -> place in the face frame, as under ``face_parts_mm`` of a rig file
@@ -96,8 +96,8 @@ def begun(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
     return FaceCalibration(starts, starts)
 
 
-def pressed(state: FaceCalibration, key: Key) -> FaceCalibration:
-    """Return what a key makes of it; after the end, keys do nothing."""
+def apply_key(state: FaceCalibration, key: Key) -> FaceCalibration:
+    """Return the state after a key; after the end, keys do nothing."""
     part = state.part
     if part is None:
         return state

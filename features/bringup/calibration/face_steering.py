@@ -1,4 +1,4 @@
-"""A gaze that a person steers over their own face: chooses the target in attention's place.
+"""Gaze that a person steers over their own face: chooses the target instead of attention.
 
 The target is one part of the nearest face, placed again with the face's full pose at every
 tick, so the person may move while judging. Everything after it is as always: oculomotor
@@ -10,8 +10,8 @@ from math import degrees, inf
 from gazerig.features.bringup.calibration.face_calibration import (
     FaceCalibration,
     Key,
+    apply_key,
     point_world_m,
-    pressed,
 )
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.attention.top_down import TopDown
@@ -75,7 +75,7 @@ class FaceSteering:
 
     @property
     def aimed(self) -> bool:
-        """Return whether both eyes are on the part and nothing waits to be done."""
+        """Return whether both eyes are on the part and no key is waiting."""
         return self.face is not None and self._entered_s is None and self.error_deg <= AIMED_DEG
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
@@ -105,7 +105,7 @@ class FaceSteering:
             self._entered_s = t_s
             return None
         self._entered_s = None
-        self.state = pressed(self.state, key)
+        self.state = apply_key(self.state, key)
         self.error_deg = inf
         return None
 
@@ -118,7 +118,7 @@ class FaceSteering:
             return None
         if self.error_deg <= AIMED_DEG:
             self._entered_s = None
-            self.state = pressed(self.state, "enter")
+            self.state = apply_key(self.state, "enter")
             self.error_deg = inf
         elif tick.t_s - self._entered_s > WAIT_S:
             self._entered_s = None
@@ -134,7 +134,7 @@ class FaceSteering:
         return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
 
     def _nearest(self, percept: Percept | None, p_head: Vec3, t_s: float) -> Face | None:
-        """Return the face looked at for as long as it is seen, else the nearest."""
+        """Return the present face while it is seen, else the nearest."""
         if percept is None or not percept.faces or percept.age_s(t_s) > STALE_S:
             return None
         followed = self.face.id if self.face is not None else None

@@ -25,7 +25,7 @@ _MOST_MOVED = 0.15
 _LEAST_DEG, _MOST_DEG = 20.0, 140.0
 
 
-class FieldByFace(NamedTuple):
+class FaceFieldOfView(NamedTuple):
     """A field of view as found.
 
     horizontal_deg: the best value; low_deg, high_deg: those of a face 8 % larger and smaller
@@ -41,7 +41,7 @@ class FieldByFace(NamedTuple):
 
 def field_by_face(
     landmarks_px: Sequence[Pixels], width_px: int, height_px: int, distance_m: float
-) -> FieldByFace:
+) -> FaceFieldOfView:
     """Return the field of view by a face that is seen at a known distance.
 
     Args:
@@ -80,4 +80,4 @@ def field_by_face(
         raise CameraCalibrationRefused(
             f"a field of view of {fields[0]:.0f} deg: no such lens; is the face {distance_m:g} m away?"
         )
-    return FieldByFace(fields[0], fields[1], fields[2], len(far_m), moved)
+    return FaceFieldOfView(fields[0], fields[1], fields[2], len(far_m), moved)

@@ -23,7 +23,13 @@ from gazerig.features.bringup.calibration.camera_calibration import (
     outlier,
 )
 from gazerig.features.bringup.calibration.charuco_views import board_poses
-from gazerig.features.bringup.calibration.hand_eye_solver import Fit, Pose, Sights, refined, start
+from gazerig.features.bringup.calibration.hand_eye_solver import (
+    Fit,
+    Observations,
+    Pose,
+    first_estimate,
+    refine,
+)
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.charuco_board import SeenBoard
@@ -198,7 +204,7 @@ def _refuse_parallel(R_world_head: Sequence[Mat3], params: HandEyeParams) -> Non
 
 
 def _judge(fit: Fit, params: HandEyeParams, width_px: int) -> None:
-    """Refuse what does not fit or is not sure."""
+    """Refuse a fit with too large errors or standard deviations."""
     most_px = params.most_error_px * width_px / _WIDTH_PX
     if not fit.rms_px <= most_px:
         raise CameraCalibrationRefused(
@@ -220,7 +226,7 @@ def _judge(fit: Fit, params: HandEyeParams, width_px: int) -> None:
 def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: HandEyeParams) -> Fit:
     """Refine the start that explains the frames best."""
     centre_px = params.centre_error_px * width_px / _WIDTH_PX
-    sights = Sights.of(
+    sights = Observations.of(
         [(v.R_world_head, v.p_world_head_m, v.seen) for v in views],
         lens,
         np.array((params.lens_error_percent / 100.0, centre_px, centre_px)),
@@ -232,13 +238,13 @@ def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: Han
             "the images of the board do not agree with any place of the camera: see that "
             "board, lens and joints are the ones calibrated"
         )
-    best = refined(sights, start(sights, *starts[0]))
+    best = refine(sights, first_estimate(sights, *starts[0]))
     if not best.corner_px < _DOUBTFUL_PX:
-        others = [refined(sights, start(sights, *other)) for other in starts[1:]]
+        others = [refine(sights, first_estimate(sights, *other)) for other in starts[1:]]
         best = min((best, *others), key=lambda fit: fit.cost)
     # Joints that proved better than usual are trusted more.
     proven = min(max(best.joint_error_deg, _BEST_JOINT_DEG), params.joint_error_deg)
-    return refined(sights._replace(joint_error_rad=radians(proven)), best.guess)
+    return refine(sights._replace(joint_error_rad=radians(proven)), best.guess)
 
 
 def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pose]]:
@@ -264,9 +270,9 @@ def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pos
     return found
 
 
-def _off(sights: Sights, camera: Pose, board: Pose) -> float:
+def _off(sights: Observations, camera: Pose, board: Pose) -> float:
     """Return the usual reprojection error of a start, by which starts are compared."""
-    errors = np.abs(sights.errors(start(sights, camera, board)))
+    errors = np.abs(sights.errors(first_estimate(sights, camera, board)))
     return float(np.median(np.where(np.isfinite(errors), errors, inf)))
 
 

@@ -55,7 +55,7 @@ class Pose(NamedTuple):
         return Pose(self.R @ np.asarray(cv2.Rodrigues(step[:3])[0]), self.p + step[3:])
 
 
-class Guess(NamedTuple):
+class Estimate(NamedTuple):
     """Unknowns of the fit.
 
     camera: in the head; board: in the world
@@ -69,9 +69,9 @@ class Guess(NamedTuple):
     lens_off: Floats
     turns_rad: Floats
 
-    def moved(self, step: Floats) -> "Guess":
-        """Move it by (15 + 3 views,) numbers."""
-        return Guess(
+    def moved(self, step: Floats) -> "Estimate":
+        """Return the estimate moved by (15 + 3 views,) numbers."""
+        return Estimate(
             self.camera.moved(step[:6]),
             self.board.moved(step[6:12]),
             self.lens_off + step[12:_SHARED],
@@ -79,7 +79,7 @@ class Guess(NamedTuple):
         )
 
     def lens(self, calibrated: Intrinsics) -> Intrinsics:
-        """Return the lens as it seems from here."""
+        """Return the lens of this estimate."""
         zoom, right, down = self.lens_off.tolist()
         return Intrinsics(
             calibrated.fx_px * (1.0 + zoom),
@@ -90,7 +90,7 @@ class Guess(NamedTuple):
         )
 
 
-class Sights(NamedTuple):
+class Observations(NamedTuple):
     """All corners of all views: n corners.
 
     R_world_head: (n, 3, 3); p_world_head_m, corners_board_m: (n, 3); corners_px: (n, 2)
@@ -115,10 +115,10 @@ class Sights(NamedTuple):
         lens: Intrinsics,
         lens_error: Floats,
         joint_error_rad: float,
-    ) -> "Sights":
-        """Line up the corners of views."""
+    ) -> "Observations":
+        """Return the observations of all views."""
         counts = [len(seen.ids) for _, _, seen in views]
-        return Sights(
+        return Observations(
             np.repeat(np.array([R for R, _, _ in views]), counts, axis=0),
             np.repeat(np.array([p for _, p, _ in views]), counts, axis=0),
             np.concatenate([seen.corners_board_m for _, _, seen in views]),
@@ -130,7 +130,7 @@ class Sights(NamedTuple):
             joint_error_rad,
         )
 
-    def errors(self, guess: Guess) -> Floats:
+    def errors(self, guess: Estimate) -> Floats:
         """Return by how much each corner is seen off: (2 n,) pixels, nan behind the camera."""
         world = self.corners_board_m @ guess.board.R.T + guess.board.p
         head = np.einsum("nji,nj->ni", self.R_world_head, world - self.p_world_head_m)
@@ -139,7 +139,7 @@ class Sights(NamedTuple):
         shown = project((head - guess.camera.p) @ guess.camera.R, guess.lens(self.lens))
         return np.asarray((shown - self.corners_px).ravel(), dtype=np.float64)
 
-    def slopes(self, guess: Guess) -> tuple[Floats, Floats]:
+    def slopes(self, guess: Estimate) -> tuple[Floats, Floats]:
         """Return the slopes of errors by shared numbers (2 n, 15) and head turns (2 n, 3)."""
         columns = []
         for k in range(_SHARED + 3):
@@ -149,7 +149,7 @@ class Sights(NamedTuple):
             columns.append((more - less) / (2.0 * _SMALL))
         return np.stack(columns[:_SHARED], axis=1), np.stack(columns[_SHARED:], axis=1)
 
-    def residuals(self, guess: Guess) -> Floats:
+    def residuals(self, guess: Estimate) -> Floats:
         """Return the errors over a corner's usual one, then lens and turns over theirs."""
         usual = np.concatenate(
             (self.lens_error, np.full(guess.turns_rad.size, self.joint_error_rad))
@@ -157,7 +157,7 @@ class Sights(NamedTuple):
         off = np.concatenate((guess.lens_off, guess.turns_rad.ravel())) / usual
         return np.concatenate((self.errors(guess) / _CORNER_PX, off))
 
-    def jacobian(self, guess: Guess) -> Floats:
+    def jacobian(self, guess: Estimate) -> Floats:
         """Return the slopes of ``residuals``: (2 n + 3 + 3 views, 15 + 3 views)."""
         shared, own = self.slopes(guess)
         rows, columns = len(shared), _SHARED + 3 * self.views
@@ -181,8 +181,8 @@ class Fit:
     joint_error_deg: root mean square of those turns, a joint
     """
 
-    sights: Sights
-    guess: Guess
+    sights: Observations
+    guess: Estimate
     cost: float
     rms_px: float
     view_rms_px: Floats
@@ -218,12 +218,12 @@ class Fit:
         return found
 
 
-def start(sights: Sights, camera: Pose, board: Pose) -> Guess:
+def first_estimate(sights: Observations, camera: Pose, board: Pose) -> Estimate:
     """Return an estimate with the lens as calibrated and the measured joint angles."""
-    return Guess(camera, board, np.zeros(3), np.zeros((sights.views, 3)))
+    return Estimate(camera, board, np.zeros(3), np.zeros((sights.views, 3)))
 
 
-def refined(sights: Sights, guess: Guess) -> Fit:
+def refine(sights: Observations, guess: Estimate) -> Fit:
     """Move camera and board until the corners fit best."""
     from scipy.optimize import least_squares  # takes a moment to load
 

@@ -79,7 +79,7 @@ Value = int | float | tuple[tuple[float, float], ...]
 """What a calibration writes."""
 
 
-class Unwrapped:
+class PositionUnwrapper:
     """Follows a position register over the seam.
 
     Some firmware goes on counting past 4095, some starts again at 0: a change is taken as
@@ -151,7 +151,7 @@ def lid_keys(joint_name: str) -> tuple[str, str]:
     return f"{lid}_shut_deg", f"{lid}_open_deg"
 
 
-def middle(marks: Marks) -> Marks:
+def centre_zero(marks: Marks) -> Marks:
     """Set the zero in the middle between the ends."""
     return marks._replace(zero=(marks.positive_end + marks.negative_end) // 2)
 
@@ -172,14 +172,14 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
     travel_deg = (high - low) / steps_per_deg
     if travel_deg <= SMALLEST_RANGE_DEG:
         raise CalibrationRefused(
-            f"{name}: only {travel_deg:.1f} deg lie between the two ends, more than "
+            f"{name}: only {travel_deg:.1f} deg are between the two ends, more than "
             f"{SMALLEST_RANGE_DEG:g} are needed: is this the joint that was turned, "
             "and is its horn screwed on?"
         )
     _refuse_seam(name, low, high, steps_per_deg, kind_of(joint.model).set_middle is not None)
     if not (low < marks.zero < high or (at_end and low <= marks.zero <= high)):
         raise CalibrationRefused(
-            f"{name}: {zero_of(name)} (step {marks.zero % STEPS_PER_TURN}) does not lie between "
+            f"{name}: {zero_of(name)} (step {marks.zero % STEPS_PER_TURN}) is not between "
             f"the ends (steps {low % STEPS_PER_TURN} and {high % STEPS_PER_TURN}): "
             "mark the three places again"
         )
@@ -188,13 +188,15 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
     least = abs(marks.negative_end - marks.zero) / steps_per_deg - margin_deg
     if at_end:
         most, least = max(0.0, most), max(0.0, least)
-    made = Calibration(marks.zero % STEPS_PER_TURN, sign, 0.0 - inwards(least), inwards(most))
+    made = Calibration(
+        marks.zero % STEPS_PER_TURN, sign, 0.0 - round_inwards(least), round_inwards(most)
+    )
     _refuse_unfit(name, made, joint, margin_deg)
     return made
 
 
-def inwards(angle_deg: float) -> float:
-    """Round down to tenths, so that never a hair beyond what was measured is allowed."""
+def round_inwards(angle_deg: float) -> float:
+    """Round down to tenths, so that the range is never larger than measured."""
     return floor(angle_deg * 10.0 + 1e-6) / 10.0
 
 
@@ -230,10 +232,10 @@ def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable:
 
 
 def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: float) -> None:
-    """Refuse what the rig file's own rules would."""
+    """Refuse values that the rig file's own rules would refuse."""
     if name in GAZE_JOINTS and not made.min_deg < 0.0 < made.max_deg:
         raise CalibrationRefused(
-            f"{name}: straight ahead lies within {margin_deg:g} deg of an end (range "
+            f"{name}: straight ahead is within {margin_deg:g} deg of an end (range "
             f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in again, or lessen the margin"
         )
     if made.max_deg - made.min_deg <= SMALLEST_RANGE_DEG:
@@ -248,12 +250,12 @@ def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: 
             "(-180..180): check its ratio"
         )
     try:
-        applied(joint, made)
+        with_calibration(joint, made)
     except ValueError as error:
         raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
 
 
-def applied(joint: JointParams, made: Calibration) -> JointParams:
+def with_calibration(joint: JointParams, made: Calibration) -> JointParams:
     """Return the joint as calibrated.
 
     Raises:
@@ -268,7 +270,7 @@ def changes(
     made: Calibration | LinkageFit,
     park_deg: Mapping[str, float],
 ) -> dict[str, Value]:
-    """Return dotted keys of the rig file and their new values, those alone that differ.
+    """Return dotted keys of the rig file and their new values, only those that differ.
 
     Values that stood on the old range follow: a lid's shut and open angle go to its ends,
     a parking angle outside the new range to its nearer end.

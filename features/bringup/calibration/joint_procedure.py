@@ -12,16 +12,16 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
     Marks,
-    Unwrapped,
+    PositionUnwrapper,
     calibration,
+    centre_zero,
     ends_of,
     is_lid,
-    middle,
     zero_of,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint
 
-ZeroBy = Literal["middle", "person"]
+ZeroReference = Literal["middle", "person"]
 
 
 class Operator(Protocol):
@@ -44,12 +44,12 @@ class Operator(Protocol):
         ...
 
 
-class Watched:
+class PositionTracker:
     """A joint's position followed over the seam, with a line that shows it."""
 
     def __init__(self, single: SingleJoint) -> None:
         self._single = single
-        self._track = Unwrapped()
+        self._track = PositionUnwrapper()
         self._first: int | None = None
 
     def live(self) -> str:
@@ -68,7 +68,7 @@ class Watched:
         return self._track.see(*self._single.position())
 
 
-def by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibration:
+def calibrate_by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibration:
     """Let the user turn the joint, with torque off, to its ends and straight ahead.
 
     Raises:
@@ -78,7 +78,7 @@ def by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibra
         CalibrationStopped: the person wants it to end.
     """
     single.servo.disable_torque()
-    watched = Watched(single)
+    watched = PositionTracker(single)
     positive, negative = ends_of(single.name)
     person.tell(f"{single.who}: torque off, it can be turned by hand")
 
@@ -89,17 +89,19 @@ def by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibra
     first = mark(f"to its {positive} end")
     marks = Marks(first, mark(f"to its {negative} end"), 0)
     marks = (
-        middle(marks) if is_lid(single.name) else marks._replace(zero=mark(zero_of(single.name)))
+        centre_zero(marks)
+        if is_lid(single.name)
+        else marks._replace(zero=mark(zero_of(single.name)))
     )
     return calibration(single.name, marks, single.joint, margin_deg)
 
 
-def by_motion(
+def calibrate_by_motion(
     single: SingleJoint,
     person: Operator,
     margin_deg: float,
     params: StopSearchParams,
-    zero_by: ZeroBy,
+    zero_by: ZeroReference,
 ) -> Calibration:
     """Drive the joint slowly and weakly to both stops; the zero is in the middle, or a person's.
 
@@ -115,11 +117,11 @@ def by_motion(
         single.servo.restore()
     person.tell(f"{single.who}: torque off")
     if zero_by == "person" and not is_lid(single.name):
-        watched = Watched(single)
+        watched = PositionTracker(single)
         person.wait(f"turn {single.name} {zero_of(single.name)}, then press Enter", watched.live)
         marks = marks._replace(zero=watched.steps())
     else:
-        marks = middle(marks)
+        marks = centre_zero(marks)
     return calibration(single.name, marks, single.joint, margin_deg)
 
 
@@ -134,22 +136,22 @@ def _find_stops(single: SingleJoint, person: Operator, params: StopSearchParams)
     )
     if single.alone:
         person.tell(f"{single.who}: {single.alone}")
-    first = _stop(single, person, params, way)
+    first = _find_stop(single, person, params, way)
     asked = f"did {single.name} just go to its {positive} end?"
-    sign = way if person.agrees(asked, Watched(single).live) else -way
-    second = _stop(single, person, params, -way)
+    sign = way if person.agrees(asked, PositionTracker(single).live) else -way
+    second = _find_stop(single, person, params, -way)
     single.go(params, (first + second) // 2)
     return Marks(first, second, 0) if sign == way else Marks(second, first, 0)
 
 
-def _stop(single: SingleJoint, person: Operator, params: StopSearchParams, way: int) -> int:
+def _find_stop(single: SingleJoint, person: Operator, params: StopSearchParams, way: int) -> int:
     """Find one stop; return its position."""
     stop: EndStop = single.find_stop(params, way)
     if stop.kind == "limit":
         raise CalibrationRefused(
             f"{single.name}: it came to the end of the servo's turn "
             f"(step {stop.position_steps}) before a stop: build the horn in so that the middle "
-            "of its travel reads about 2048 (--by hand says by how much)"
+            "of its travel reads about 2048 (--by hand reports by how much)"
         )
     person.tell(
         f"{single.who}: stop at step {stop.position_steps}, pushed for "

@@ -9,17 +9,17 @@ from dataclasses import replace
 from math import degrees
 from typing import Protocol
 
-from gazerig.features.bringup.calibration.hobby_access import OneHobby
+from gazerig.features.bringup.calibration.hobby_access import HobbyServoHandle
 from gazerig.features.bringup.calibration.joint_calibration import (
     SMALLEST_RANGE_DEG,
     CalibrationRefused,
     LinkageFit,
     ends_of,
-    inwards,
     is_lid,
+    round_inwards,
     zero_of,
 )
-from gazerig.features.bringup.calibration.joint_procedure import Operator, Watched
+from gazerig.features.bringup.calibration.joint_procedure import Operator, PositionTracker
 from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
@@ -33,7 +33,7 @@ def angle_now(joint: JointParams, position: float) -> float:
     return round(degrees(joint.angle_rad(position * joint.facts.unit_steps)), 1) + 0.0
 
 
-def between(one: float, other: float, count: int) -> list[float]:
+def spread_between(one: float, other: float, count: int) -> list[float]:
     """Return ``count`` positions spread evenly between two, in whole units."""
     return [float(round(one + (other - one) * i / (count + 1))) for i in range(1, count + 1)]
 
@@ -49,7 +49,9 @@ def likely_angle(joint: JointParams, position: float, one: Place, other: Place) 
     return round(low + share * (high - low), 1) + 0.0
 
 
-def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: float) -> LinkageFit:
+def fit_linkage(
+    name: str, marked: Sequence[Place], joint: JointParams, margin_deg: float
+) -> LinkageFit:
     """Return linkage and range of a joint; a lid's range ends at its marked positions.
 
     Args:
@@ -64,12 +66,12 @@ def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: f
     """
     linkage = tuple(sorted((round(angle, 1) + 0.0, position) for angle, position in marked))
     kept = 0.0 if is_lid(name) else margin_deg
-    low, high = -inwards(-(linkage[0][0] + kept)), inwards(linkage[-1][0] - kept)
+    low, high = -round_inwards(-(linkage[0][0] + kept)), round_inwards(linkage[-1][0] - kept)
     if name not in GAZE_JOINTS and linkage[0][0] <= 0.0 <= linkage[-1][0]:
         low, high = min(low, 0.0), max(high, 0.0)  # a jaw rests shut, at one end
     if not low <= 0.0 <= high:
         raise CalibrationRefused(
-            f"{name}: 0 deg must lie within its range, which is {low:g}..{high:g} deg: "
+            f"{name}: 0 deg must be within its range, which is {low:g}..{high:g} deg: "
             + (
                 "call half open 0"
                 if is_lid(name)
@@ -99,7 +101,7 @@ LEAD_US = 50.0
 """A quarter of a second at its slow speed: so soon it stands when a key is let go."""
 
 
-class Steered(Protocol):
+class JoggableJoint(Protocol):
     """A servo as a person moves it; pulse widths in us."""
 
     def by(self, us: float) -> None:
@@ -119,10 +121,10 @@ class Steered(Protocol):
         ...
 
 
-class Steerer(Operator, Protocol):
+class Jogger(Operator, Protocol):
     """A person who moves a servo by small steps, and reads angles off."""
 
-    def steer(self, question: str, servo: Steered) -> None:
+    def steer(self, question: str, servo: JoggableJoint) -> None:
         """Return when the servo has the desired position.
 
         Raises:
@@ -135,7 +137,7 @@ class Steerer(Operator, Protocol):
         ...
 
 
-class Placer(Protocol):
+class Marker(Protocol):
     """Brings a joint to places, and measures them in the unit of its servo's model."""
 
     name: str
@@ -162,10 +164,10 @@ class Placer(Protocol):
         ...
 
 
-class HobbyPlacer:
-    """Moves a hobby servo as a person steers it; implements Placer."""
+class HobbyMarker:
+    """Moves a hobby servo as a person steers it; implements Marker."""
 
-    def __init__(self, hobby: OneHobby, person: Steerer) -> None:
+    def __init__(self, hobby: HobbyServoHandle, person: Jogger) -> None:
         self.name, self.joint = hobby.name, hobby.joint
         self._hobby, self._person = hobby, person
 
@@ -233,13 +235,13 @@ class HobbyPlacer:
             self._person.tell(line)
 
 
-class HandPlacer:
-    """Lets a person turn a servo without torque that reports its position; implements Placer."""
+class HandMarker:
+    """Lets a person turn a servo without torque that reports its position; implements Marker."""
 
     def __init__(self, single: SingleJoint, person: Operator) -> None:
         self.name, self.joint = single.name, single.joint
         self._single, self._person = single, person
-        self._watched = Watched(single)
+        self._watched = PositionTracker(single)
 
     def begin(self) -> None:
         """Switch the torque off."""
@@ -263,7 +265,7 @@ class HandPlacer:
         return self._watched.live()
 
 
-def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> LinkageFit:
+def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: int) -> LinkageFit:
     """Mark the places of a joint and ask for their angles.
 
     more: places between each two that are marked; margin_deg: kept from the ends, but for lids
@@ -288,17 +290,17 @@ def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> 
     marked.sort()
     all_places = list(marked)
     for one, other in zip(marked, marked[1:], strict=False):
-        for place in between(one[1], other[1], more):
+        for place in spread_between(one[1], other[1], more):
             at = placer.bring(place)
             likely = likely_angle(placer.joint, at, one, other)
             all_places.append((_angle(placer, person, at, likely), at))
-    made = places(placer.name, all_places, placer.joint, margin_deg)
+    made = fit_linkage(placer.name, all_places, placer.joint, margin_deg)
     # A lid stays shut, so that the other one can be brought to meet it.
     placer.leave(marked[0][1] if is_lid(placer.name) else dict(marked)[0.0])
     return made
 
 
-def _angle(placer: Placer, person: Steerer, at: float, proposed: float) -> float:
+def _angle(placer: Marker, person: Jogger, at: float, proposed: float) -> float:
     """Ask for the angle of the joint's present position."""
     towards = f" ({ends_of(placer.name)[0]} is +)"
     asked = f"{placer.name} at {at:g} {placer.joint.facts.unit}: how many degrees{towards}?"

@@ -212,7 +212,9 @@ class SingleServo:
         put("torque_enable", 1)
         now = self.position()
         if not value("torque_enable"):
-            raise ServoFault(f"{self.who}: the torque does not come on: gazerig doctor says why")
+            raise ServoFault(
+                f"{self.who}: the torque does not come on: gazerig doctor names the cause"
+            )
         if abs(now - before) > self._family.steps_per_turn // 4:
             raise ServoFault(f"{self.who}: its position jumped from {before} to {now}")
         unit_s = self._family.watchdog_unit_s
@@ -347,7 +349,7 @@ class SingleJoint:
         stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
         if not self.servo.torque_is_on():
             raise ServoFault(
-                f"{self.who} let go on the way: it protected itself or restarted; "
+                f"{self.who} let go during the search: it protected itself or restarted; "
                 "check its supply and start again"
             )
         return stop

@@ -86,7 +86,7 @@ class TerminalKeys(TerminalInput):
 
 
 class LineKeys:
-    """Keys from lines of a file or a pipe, each when the eyes have done what went before."""
+    """Keys from lines of a file or a pipe, each after the eyes have finished the one before."""
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines

@@ -1,4 +1,4 @@
-"""The command ``gazerig doctor``: every bus of a rig examined, and what is safe mended."""
+"""The command ``gazerig doctor``: examines every bus of a rig, and applies safe fixes."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -19,12 +19,12 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     bus_label,
+    clear_progress,
     console,
     progress,
     refuse_packages,
     rig_ports,
     setups_on,
-    wipe,
 )
 from gazerig.features.bringup.doctor import run as checkup
 from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro, visit_pca9685
@@ -33,9 +33,9 @@ from gazerig.features.bringup.doctor.diagnostics import (
     BOARD,
     Diagnostic,
     Fix,
-    as_plain,
-    grouped,
-    summed_up,
+    finding_json,
+    group_findings,
+    summarize,
     worst,
 )
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
@@ -70,14 +70,14 @@ def doctor(
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         refuse_packages(model, "doctor")
-        tell: Tell = (lambda _: None) if as_json else _tell
+        tell: Tell = (lambda _: None) if as_json else _print_line
         with rig_ports(model, mock, port) as wired:
             lines = wired.opened_by()
-            findings = _examined(model, lines, tell)
+            findings = _examine_buses(model, lines, tell)
             if fix:
-                _fix(model, lines, findings, tell)
+                _apply_fixes(model, lines, findings, tell)
                 tell("after that:")
-                findings = _examined(model, lines, tell)
+                findings = _examine_buses(model, lines, tell)
         eyes = [examine_detector(model.detector)]
         if camera is not None:
             from gazerig.drivers.camera.webcam import Webcam
@@ -87,12 +87,12 @@ def doctor(
             eyes += examine_camera(source, model.camera, model.detector, RealClock().now_s)
         show_findings(eyes, tell)
         if as_json:
-            rows = [as_plain(one, bus) for bus, some in findings.items() for one in some]
-            rows += [as_plain(one, "") for one in eyes]
+            rows = [finding_json(one, bus) for bus, some in findings.items() for one in some]
+            rows += [finding_json(one, "") for one in eyes]
             rows = [row | {"cure": completed(str(row["cure"]))} for row in rows]
             print(json.dumps(rows))
         whole = [*(one for some in findings.values() for one in some), *eyes]
-        tell(summed_up(whole, rig, fix))
+        tell(summarize(whole, rig, fix))
     if worst(whole) == "error":
         raise typer.Exit(FAULT)
 
@@ -103,7 +103,9 @@ def examine_detector(params: FaceDetectorParams) -> Diagnostic:
     return Diagnostic("note" if cure else "ok", text, "detector", cure)
 
 
-def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:
+def _examine_buses(
+    rig: Rig, lines: Mapping[str, BusPort], tell: Tell
+) -> dict[str, list[Diagnostic]]:
     """Examine every bus, and print the findings; return them by bus."""
     findings = {}
     for bus, line in lines.items():
@@ -116,7 +118,7 @@ def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, l
         findings[bus] = checkup.check_all(line, bench.host, examine)
         if can_be_released(rig, bus):
             findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
-        wipe()
+        clear_progress()
         if len(lines) > 1:
             tell(f"{bus_label(rig, bus)} ({config.kind}, {line.port_name}):")
         show_findings(findings[bus], tell)
@@ -132,7 +134,7 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[
 """What examines boards, by the kind of bus."""
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     """Print a line of the doctor's; all lines go to one stream, so that their order stays."""
     level, space, rest = completed(line).partition(" ")
     out = console()
@@ -143,7 +145,7 @@ def _tell(line: str) -> None:
         out.print(completed(line), markup=False)
 
 
-def _fix(
+def _apply_fixes(
     rig: Rig,
     lines: Mapping[str, BusPort],
     findings: Mapping[str, Sequence[Diagnostic]],
@@ -174,7 +176,7 @@ def _fix(
 
 def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:
     """Print findings, the worst first, the same one at several servos once."""
-    for level, where, what, cure in grouped(findings):
+    for level, where, what, cure in group_findings(findings):
         tell(f"{level} {where}: {what}")
         if cure:
             tell(f"      -> {cure}")

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from math import isfinite
 
-from gazerig.features.bringup.calibration.linkage_calibration import Steered
+from gazerig.features.bringup.calibration.linkage_calibration import JoggableJoint
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import TerminalKeys
 from gazerig.features.bringup.cli.prompts import LOOK_S, TerminalPerson
@@ -21,14 +21,14 @@ KEYS_HELP = (
 LINES_HELP = "+20 or -20 moves it by so many us, 1480 to that width, Enter: it is there, q ends"
 
 
-class SteeringPerson(TerminalPerson):
-    """Asks on the terminal; implements Steerer.
+class TerminalJogger(TerminalPerson):
+    """Asks on the terminal; implements Jogger.
 
     Keys of a terminal act as they are pressed, lines of a file or a pipe one by one.
     """
 
-    def steer(self, question: str, servo: Steered) -> None:
-        """Return when the servo has the desired position; see Steerer."""
+    def steer(self, question: str, servo: JoggableJoint) -> None:
+        """Return when the servo has the desired position; see Jogger."""
         say(question)
         if self._lines.scripted or not sys.stdin.isatty():
             self._by_lines(question, servo)
@@ -36,7 +36,7 @@ class SteeringPerson(TerminalPerson):
             self._by_keys(servo)
 
     def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Return the typed number, Enter is the proposed one; see Steerer."""
+        """Return the typed number, Enter is the proposed one; see Jogger."""
         asked = f"{question} [{proposed:g}]"
         say(asked)
         while True:
@@ -49,7 +49,7 @@ class SteeringPerson(TerminalPerson):
                 return number
             say(f"{line!r} is no number: a number, or Enter for {proposed:g}; q ends")
 
-    def _by_lines(self, question: str, servo: Steered) -> None:
+    def _by_lines(self, question: str, servo: JoggableJoint) -> None:
         while line := self._line(question, servo.live):
             try:
                 us = float(line)
@@ -62,7 +62,7 @@ class SteeringPerson(TerminalPerson):
             else:
                 servo.to(us)
 
-    def _by_keys(self, servo: Steered) -> None:
+    def _by_keys(self, servo: JoggableJoint) -> None:
         step = FIRST_STEP
         say(KEYS_HELP)
         with TerminalKeys() as keys:

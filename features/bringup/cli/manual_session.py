@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 import typer
 
 from gazerig.config.rig import Rig
-from gazerig.features.bringup.manual_control import JogParams, ManualControl, parked
+from gazerig.features.bringup.manual_control import JogParams, ManualControl, park_slowly
 from gazerig.features.bringup.move_result import Step
 from gazerig.features.bringup.servo_families import KINDS
 from gazerig.robot.app.bus_wiring import (
@@ -59,12 +59,12 @@ def holding_rig(
     guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / params.rate_hz)
     control = ManualControl(body, guard, RealClock(), params, stopped, watch)
     with PowerDown(
-        (lambda again: parked(control, rig.park_deg, again)) if park else None,
+        (lambda again: park_slowly(control, rig.park_deg, again)) if park else None,
         control.stop,
         say,
         interrupts,
         "torque off on all servos",
-        f": {left_alone(rig)}",
+        f": {unreleased_text(rig)}",
     ) as way_out:
         way_out.switch_on(control.start)
         yield control
@@ -72,13 +72,13 @@ def holding_rig(
         raise typer.Exit(FAULT)
 
 
-def holding(rig: Rig) -> str:
-    """Return what the servos do once the torque is on."""
+def holding_text(rig: Rig) -> str:
+    """Return the behaviour of the servos once the torque is on."""
     measured_joints = [name for name in rig.names if rig.joints[name].facts.measured]
     without_feedback = len(rig.names) - len(measured_joints)
     if not without_feedback:
         return f"torque on: {len(measured_joints)} servos hold where they are"
-    pulses = f"{without_feedback} hobby servos hold where their pulses are (estimated: they tell nothing)"
+    pulses = f"{without_feedback} hobby servos hold where their pulses are (estimated: they report nothing)"
     return (
         f"torque on: {len(measured_joints)} servos hold where they are, {pulses}"
         if measured_joints
@@ -86,12 +86,12 @@ def holding(rig: Rig) -> str:
     )
 
 
-def left_alone(rig: Rig) -> str:
-    """Return what the servos do whose torque could not be switched off."""
-    return "; ".join(dict.fromkeys(_left_alone(rig, bus) for bus in bus_names(rig)))
+def unreleased_text(rig: Rig) -> str:
+    """Return the behaviour of servos whose torque could not be switched off."""
+    return "; ".join(dict.fromkeys(_unreleased_text(rig, bus) for bus in bus_names(rig)))
 
 
-def _left_alone(rig: Rig, bus: str) -> str:
+def _unreleased_text(rig: Rig, bus: str) -> str:
     kind = rig.bus_named(bus).kind
     until = "until the servo power is cut, or the guardian, which tries for 10 s, reaches the port"
     if kind in BOARDS:

@@ -18,7 +18,7 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     RigPorts,
-    opened,
+    open_port,
     refuse_packages,
     rig_ports,
     setups_on,
@@ -43,7 +43,7 @@ from gazerig.robot.model.joint import JointParams
 app = typer.Typer()
 
 ESTIMATED = (
-    "~ is estimated from the pulse (us); hobby servos tell nothing. The board's errors are not "
+    "~ is estimated from the pulse (us); hobby servos report nothing. The board's errors are not "
     "asked for: reporting clears them"
 )
 _COLUMNS = 7
@@ -97,7 +97,7 @@ def _readers(rig: Rig, wire: RigPorts) -> Iterator[dict[str, TelemetryReader]]:
     with contextlib.ExitStack() as ports:
         readers = {}
         for name in bus_names(rig):
-            port, config = ports.enter_context(opened(rig, wire, name)), rig.bus_named(name)
+            port, config = ports.enter_context(open_port(rig, wire, name)), rig.bus_named(name)
             kind = None if config.kind in BOARDS else kind_of(setups_on(rig, name)[0].model)
             readers[name] = (
                 BOARDS[config.kind](port, config)

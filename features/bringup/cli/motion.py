@@ -11,9 +11,15 @@ import typer
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
-from gazerig.features.bringup.cli.manual_session import holding, holding_rig
+from gazerig.features.bringup.cli.manual_session import holding_rig, holding_text
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
-from gazerig.features.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
+from gazerig.features.bringup.look_at import (
+    GazeResult,
+    ends_reached,
+    gaze_text,
+    look_at,
+    refuse_not_finite,
+)
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, refuse_beyond
 from gazerig.features.bringup.move_result import PASSING, MoveResult, Step
 from gazerig.robot.app.rig_limits import lid_ends, limits
@@ -58,10 +64,10 @@ def jog(
     with clear_errors(rig, port, mock):
         loaded = load_rig(rig)
         refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
-    with _commanded(loaded, rig, mock, port, yes, speed, hold, not no_park) as control:
+    with _manual_control(loaded, rig, mock, port, yes, speed, hold, not no_park) as control:
         moved = control.jog(joint, deg)
         _report(moved, (joint,))
-        _stay(control, seconds, hold)
+        _hold(control, seconds, hold)
     _exit_unless(moved.arrived)
 
 
@@ -79,10 +85,10 @@ def home(
         loaded = load_rig(rig)
     centre = dict.fromkeys(loaded.names, 0.0)
     centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
-    with _commanded(loaded, rig, mock, port, yes, speed, hold, False) as control:
+    with _manual_control(loaded, rig, mock, port, yes, speed, hold, False) as control:
         moved = control.pose(centre)
         _report(moved, loaded.names)
-        _stay(control, 0.0, hold)
+        _hold(control, 0.0, hold)
     _exit_unless(moved.arrived)
 
 
@@ -101,7 +107,7 @@ def look_at_command(
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Turn eyes and head to a point and tell how well they meet it: X Y Z in metres."""
+    """Turn eyes and head to a point and report the gaze error: X Y Z in metres."""
     with clear_errors(rig, port, mock):
         refuse_not_finite((x, y, z))
         loaded = load_rig(rig)
@@ -110,15 +116,15 @@ def look_at_command(
         from gazerig.robot.app.gaze_models import gaze_parts
 
         kinematics, oculomotor = gaze_parts(loaded, seed)
-    with _commanded(loaded, rig, mock, port, yes, 20.0, hold, not no_park) as control:
+    with _manual_control(loaded, rig, mock, port, yes, 20.0, hold, not no_park) as control:
         looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
         good = _report_look(looked, loaded)
-        _stay(control, 0.0, hold)
+        _hold(control, 0.0, hold)
     _exit_unless(good)
 
 
 @contextlib.contextmanager
-def _commanded(
+def _manual_control(
     rig: Rig,
     name: str,
     mock: bool,
@@ -155,8 +161,8 @@ def _commanded(
         by_key = hold and sys.stdin.isatty()
         end = lambda: stopped() or (enter_pressed() if by_key else None)  # noqa: E731
         with holding_rig(rig, wire.paths, params, end, stopped, park, watch) as control:
-            _tell(control.body.bus.events())
-            say(f"{holding(rig)}; Ctrl-C switches it off")
+            _print_events(control.body.bus.events())
+            say(f"{holding_text(rig)}; Ctrl-C switches it off")
             yield control
 
 
@@ -184,23 +190,23 @@ def enter_pressed() -> str | None:
         return "a terminal that is gone"
 
 
-def _stay(control: ManualControl, seconds: float, hold: bool) -> None:
+def _hold(control: ManualControl, seconds: float, hold: bool) -> None:
     if hold:
         say("holding: Enter or Ctrl-C ends it")
     if hold or seconds > 0.0:
-        _tell(control.hold(inf if hold else seconds).events)
+        _print_events(control.hold(inf if hold else seconds).events)
 
 
 def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
     """Print what was applied, for the joints commanded and those that were limited or failed."""
-    _tell(moved.events)
+    _print_events(moved.events)
     for applied in moved.joints:
         if applied.joint in asked or applied.reasons:
             say(str(applied))
     say(f"{moved} after {moved.seconds:.1f} s")
 
 
-def _report_look(looked: LookedAt, rig: Rig) -> bool:
+def _report_look(looked: GazeResult, rig: Rig) -> bool:
     """Print how close the eyes come to the point; return whether within 2 deg."""
     good = looked.error <= 2.0
     ranges = rig.ranges
@@ -211,11 +217,11 @@ def _report_look(looked: LookedAt, rig: Rig) -> bool:
         "eyes_tilt": ranges.eye_pitch_deg,
         "neck_yaw": ranges.neck_yaw_deg,
     }
-    _tell(looked.moved.events)
+    _print_events(looked.moved.events)
     if any(name.startswith("neck") for name in rig.names):
         yaw, pitch, roll = looked.head
         say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
-    for line in met(looked):
+    for line in gaze_text(looked):
         say(line)
     for applied in looked.moved.remarkable():
         say(f"limited: {applied}")
@@ -224,7 +230,7 @@ def _report_look(looked: LookedAt, rig: Rig) -> bool:
     return good
 
 
-def _tell(events: Iterable[str]) -> None:
+def _print_events(events: Iterable[str]) -> None:
     """Print what was done to which servo."""
     for line in drawn_together(events):
         say(line)

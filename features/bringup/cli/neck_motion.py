@@ -35,19 +35,21 @@ class JoggedNeck:
 
     def turn(self, head_rad: Angles3) -> None:
         """Move gently; if the guard holds it back, the measured angles count."""
-        go_on(self._stopped)
+        refuse_stop(self._stopped)
         there = self._control.body.names
         axes = zip(NECK, head_rad, strict=True)
         goal = {name: degrees(a) for name, a in axes if name in there}
         moved = self._control.pose(goal)
         if moved.ended == "torque_off":
-            raise SetupError("the torque went off on the way: see gazerig doctor, then start again")
+            raise SetupError(
+                "the torque went off during the move: see gazerig doctor, then start again"
+            )
         self.rest(_SETTLE_S)
 
     def rest(self, seconds: float) -> None:
         """Hold still, and measure the head."""
         moved = self._control.hold(seconds)
-        go_on(self._stopped)
+        refuse_stop(self._stopped)
         at = dict(zip(self._control.body.names, moved.last.joints.position_rad, strict=True))
         self._angles = (at.get(NECK[0], 0.0), at.get(NECK[1], 0.0), at.get(NECK[2], 0.0))
         if self._mock is not None:
@@ -71,14 +73,14 @@ def moving_neck(
     """
     if any(name not in rig.joints for name in NECK[:2]):
         raise CameraCalibrationRefused(
-            "where the camera sits is found by turning the neck left, right, up and down, and "
+            "the camera's place is found by turning the neck left, right, up and down, and "
             "this rig's does not: measure its place and write it into camera.position_mm"
         )
     say("hang the board upright, 0.5 to 1 m before the head, where it cannot move; the head")
     say("will look at it from several sides: keep your fingers away; Ctrl-C stops it")
     if mock is not None:
         mock.hang()
-    elif not agrees(stopped, yes, "does the board hang, and is the head free to move?"):
+    elif not confirm(stopped, yes, "does the board hang, and is the head free to move?"):
         raise CameraCalibrationRefused("left out as you asked: nothing was written")
     params = JogParams(speed_deg_s=_GENTLE_DEG_S)
     with (
@@ -90,7 +92,7 @@ def moving_neck(
         yield neck
 
 
-def go_on(stopped: StopReason) -> None:
+def refuse_stop(stopped: StopReason) -> None:
     """Refuse to continue if there is a reason to stop.
 
     Raises:
@@ -101,6 +103,6 @@ def go_on(stopped: StopReason) -> None:
         raise CameraCalibrationRefused(f"stopped by {why}: nothing was written")
 
 
-def agrees(stopped: StopReason, yes: bool, question: str) -> bool:
+def confirm(stopped: StopReason, yes: bool, question: str) -> bool:
     """Ask on the terminal; yes: the reply is known."""
     return TerminalPerson(Lines(None), stopped, yes).agrees(question)

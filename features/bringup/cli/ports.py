@@ -41,7 +41,7 @@ def usb_id(path: str) -> str:
 
 
 @contextlib.contextmanager
-def to_open(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BusPort]:
+def unopened_port(path: str, on_traffic: Callable[[], None] | None = None) -> Iterator[BusPort]:
     """Return a port that is not opened yet, closed again at the end.
 
     on_traffic: called whenever bytes are sent or waited for
@@ -64,7 +64,7 @@ def progress(line: str) -> None:
         status(line)
 
 
-def wipe() -> None:
+def clear_progress() -> None:
     """Remove the progress line."""
     if sys.stderr.isatty():
         status("")
@@ -144,7 +144,7 @@ def setups_on(rig: Rig, name: str) -> tuple[ServoConfig, ...]:
 
 
 @contextlib.contextmanager
-def opened(
+def open_port(
     rig: Rig, ports: RigPorts, bus: str, guardian: Guardian | None = None
 ) -> Iterator[BusPort]:
     """Open the port of the bus of this name at its speed; nothing is sent.
@@ -155,7 +155,7 @@ def opened(
         PortError: it is absent, busy, not permitted, or has no such speed.
     """
     baud = rig.bus_named(bus).baud
-    with to_open(ports.paths[bus], guardian.beat if guardian is not None else None) as port:
+    with unopened_port(ports.paths[bus], guardian.beat if guardian is not None else None) as port:
         if not port.setBaudRate(baud):
             raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose another")
         yield port

@@ -13,7 +13,7 @@ from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.serial.port import BusPort
 from gazerig.features.bringup import servo_reboot
-from gazerig.features.bringup.channel_test import sent_home
+from gazerig.features.bringup.channel_test import send_home
 from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
@@ -22,7 +22,7 @@ from gazerig.features.bringup.cli.ports import (
     refuse_packages,
     rig_ports,
     setups_on,
-    to_open,
+    unopened_port,
 )
 from gazerig.features.bringup.servo_families import KINDS, ServoKind, kind_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
@@ -60,7 +60,7 @@ def reboot(
         with rig_ports(model, mock, port) as wired:
             for bus, ids in wanted.items():
                 config = model.bus_named(bus)
-                with to_open(wired.paths[bus]) as line:
+                with unopened_port(wired.paths[bus]) as line:
                     line.setBaudRate(config.baud)
                     if config.kind in BOARDS:
                         BOARDS[config.kind](model, bus, line, yes)
@@ -100,8 +100,8 @@ def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, y
     names = [joint for joint in joints_on(rig, bus) if rig.joints[joint].id == servo_id]
     name = f"{names[0]} (servo {servo_id})" if names else f"servo {servo_id}"
     baud = rig.bus_named(bus).baud
-    servo_reboot.present(line, kind, servo_id, baud)
-    before = servo_reboot.standing(line, kind, servo_id)
+    servo_reboot.find_servo(line, kind, servo_id, baud)
+    before = servo_reboot.read_snapshot(line, kind, servo_id)
     say(f"{name}: {before}")
     question = f"{name}: torque goes off: hold what it carries. Restart it?"
     if before.torque and not yes and not typer.confirm(question, err=True):
@@ -125,7 +125,7 @@ def _maestro(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
     if not yes and not typer.confirm("Keep fingers away. Do that?", err=True):
         say(f"{label}: left as it is")
         return
-    held = sent_home(MaestroLink(line, rig.bus_named(bus).maestro))
+    held = send_home(MaestroLink(line, rig.bus_named(bus).maestro))
     say(f"{label}: home; errors it held, cleared now: {', '.join(held) or 'none'}")
 
 

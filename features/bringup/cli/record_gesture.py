@@ -17,7 +17,7 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     confirm_safe,
-    opened,
+    open_port,
     rig_ports,
 )
 from gazerig.features.bringup.hand_recording import LONGEST_S, HandRecording, record, switch_off
@@ -62,7 +62,7 @@ def record_gesture(
         measured = [one for one in loaded.names if loaded.joints[one].facts.measured]
         if not measured:
             raise SetupError(
-                f"{rig}: hobby servos do not tell where they are: none can be recorded"
+                f"{rig}: hobby servos do not report their position: none can be recorded"
             )
         gesture_name(f"{name}.yaml")
         refuse_existing(folder / f"{name}.yaml", force=force)
@@ -72,7 +72,7 @@ def record_gesture(
             "Is the head held, and no finger between its parts?",
             yes,
         )
-        recorded = _recorded(loaded, measured, seconds, mock, port)
+        recorded = _record(loaded, measured, seconds, mock, port)
         if recorded is None:
             say("ended by Ctrl-C: the torque is off, nothing is written")
             raise typer.Exit(INTERRUPTED)
@@ -82,7 +82,7 @@ def record_gesture(
         say_written(loaded.name, *write_gesture(loaded, name, text, folder, force))
 
 
-def _recorded(
+def _record(
     rig: Rig, joints: list[str], seconds: float, mock: bool, port: str | None
 ) -> HandRecording | None:
     """Switch the torque off and record; None if a signal ended it."""
@@ -90,7 +90,7 @@ def _recorded(
     with signals() as stopped, rig_ports(rig, mock, port) as wire, ExitStack() as ports:
         readers = {}
         for bus in dict.fromkeys(joint.bus for joint in there.values()):
-            line = ports.enter_context(opened(rig, wire, bus))
+            line = ports.enter_context(open_port(rig, wire, bus))
             own = {name: joint for name, joint in there.items() if joint.bus == bus}
             switch_off(own, line)
             readers[bus] = SmartServoTelemetry(line, kind_of(next(iter(own.values())).model))

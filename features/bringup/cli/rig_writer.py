@@ -24,7 +24,7 @@ AllYesOption = Annotated[bool, typer.Option("--yes", help="Answer every yes or n
 
 
 def refuse_unwritable(rig: str, out: Path | None) -> None:
-    """Find out before anything is calibrated that nothing could be written.
+    """Refuse before a calibration if its result could not be written.
 
     Raises:
         gazerig.config.load.ConfigError, SetupError: why, and what to do.
@@ -37,7 +37,7 @@ def refuse_unwritable(rig: str, out: Path | None) -> None:
         raise SetupError(f"--out copies a shipped rig; {rig} is a file of yours: leave --out away")
 
 
-def write_found(
+def write_values(
     rig: str, values: Mapping[str, Any], out: Path | None, person: TerminalPerson
 ) -> None:
     """Write values after a yes, and print the path of the old file.

@@ -25,8 +25,8 @@ from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
 from gazerig.features.bringup.bus_search import (
     RATES,
     SearchRound,
-    found_of,
-    known_kinds,
+    found_servos,
+    parse_kinds,
     plan,
     search,
 )
@@ -114,7 +114,7 @@ def _boards(path: str, as_json: bool) -> bool:
 
     A serial port is searched only if the user named it: to a Maestro such bytes are commands.
     """
-    with bench.to_open(path) as line:
+    with bench.unopened_port(path) as line:
         found = [f"{address:#x}" for address in probe(line, Pca9685Params())]
     if as_json:
         boards = [{"kind": "pca9685", "address": address} for address in found]
@@ -134,7 +134,7 @@ def _boards(path: str, as_json: bool) -> bool:
 
 def _parse_kind(text: str) -> tuple[BusKind, ...]:
     try:
-        return known_kinds(text)
+        return parse_kinds(text)
     except ValueError as error:
         raise SetupError(f"--kind {error}") from None
 
@@ -217,7 +217,7 @@ def _search(
         task = bar.add_task("asking", total=len(asked))
         for one in search(line, usb, asked, thorough, to_the_end):
             rounds.append(one)
-            bar.update(task, advance=1, description=f"asked {one.kind} at {one.baud} bit/s")
+            bar.update(task, advance=1, description=f"searched {one.kind} at {one.baud} bit/s")
     return rounds
 
 
@@ -233,7 +233,7 @@ def _show(
     rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind], as_json: bool
 ) -> None:
     boards = [one for one in rounds if one.board is not None]
-    found = found_of(rounds)
+    found = found_servos(rounds)
     if as_json:
         answer: dict[str, object] = {
             "port": where,
@@ -292,7 +292,7 @@ def remarks(
 
     requested: kinds to search, unless one before them answered
     """
-    found = found_of(rounds)
+    found = found_servos(rounds)
     boards = sum(1 for one in rounds if one.board is not None)
     if not boards or found:
         count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
@@ -300,13 +300,13 @@ def remarks(
         for one in rounds:
             if one.possible:
                 rates.setdefault(one.kind, []).append(str(one.baud))
-        named = (f"asked {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
+        named = (f"searched {kind} at {', '.join(some)} bit/s" for kind, some in rates.items())
         yield f"{count} on {where}; {'; '.join(named)}"
     unasked = [kind for kind in requested if kind not in {one.kind for one in rounds}]
     if unasked and boards:
         yield "nothing else was sent: packets for servos would move what hangs on the board"
     elif unasked and found:
-        yield f"{' and '.join(unasked)} was not asked, as others answered: --kind all asks it too"
+        yield f"{' and '.join(unasked)} was not searched, as others answered: --kind all searches it too"
     for one in rounds:
         yield from _odd(one, {rate.baud for rate in rounds if rate.answered})
     if not found and not boards:

@@ -16,12 +16,12 @@ from gazerig.features.bringup.cli.ports import (
     MockOption,
     PortOption,
     YesOption,
+    clear_progress,
     progress,
     refuse_packages,
     rig_ports,
     setups_on,
-    to_open,
-    wipe,
+    unopened_port,
 )
 from gazerig.features.bringup.cli.setup_boards import (
     SetupTask,
@@ -109,7 +109,7 @@ def _set_up_joint(task: SetupTask, one: ServoConfig) -> bool:
         try:
             with (
                 rig_ports(task.rig, task.mock, task.port, fresh) as wired,
-                to_open(wired.paths[task.bus]) as line,
+                unopened_port(wired.paths[task.bus]) as line,
             ):
                 return _set_up(line, kind, one, task.config.baud, task.yes)
         except DriverError as error:
@@ -121,7 +121,7 @@ def _set_up_joint(task: SetupTask, one: ServoConfig) -> bool:
 def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes: bool) -> bool:
     """Give the connected servo its id and baud rate; return False if the user skips it."""
     found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
-    wipe()
+    clear_progress()
     firmware = kind.family.version(found.firmware)
     say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
@@ -129,7 +129,7 @@ def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes:
     if not yes and not typer.confirm(question, default=True, err=True):
         return False
     result = servo_setup.assign(line, kind, found, wanted, baud, progress)
-    wipe()
+    clear_progress()
     done = "; ".join(result.done) or "nothing to change"
     say(
         f"   {servo_label(wanted)}: {done}; answers as id {result.now.id} at "

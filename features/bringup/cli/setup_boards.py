@@ -35,9 +35,9 @@ from gazerig.drivers.pca9685.registers import CHANNELS, COUNTS, PulseClock
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.channel_test import FINE_STEPS, ChannelPosition, given, walk
+from gazerig.features.bringup.channel_test import FINE_STEPS, ChannelPosition, give_pulses, walk
 from gazerig.features.bringup.cli import ports as bench
-from gazerig.features.bringup.maestro_settings import clipped, instructions, settings_file
+from gazerig.features.bringup.maestro_settings import clipping_text, instructions, settings_file
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.cli.terminal import say, signals
 from gazerig.robot.model.clock import RealClock
@@ -108,12 +108,12 @@ def _try_channels(board: Board, task: SetupTask, explain: Explain) -> list[str]:
     left = []
     for n, setup in enumerate(task.setups, 1):
         say(f"{n} of {len(task.setups)}: {servo_label(setup)}")
-        if not _channel(board, setup, task.rig.joints[setup.name], task.yes, explain):
+        if not _try_channel(board, setup, task.rig.joints[setup.name], task.yes, explain):
             left.append(setup.name)
     return left
 
 
-def _walked(
+def _walk_channel(
     board: Board, setup: ServoConfig, places: Sequence[int], *speed_steps_s: float
 ) -> tuple[ChannelPosition, ...]:
     """Move a channel over places; a request to end is obeyed with pulses off.
@@ -139,7 +139,7 @@ def _rest_steps(setup: ServoConfig) -> int:
     return min(max(rest, setup.min_steps), setup.max_steps)
 
 
-def _channel(
+def _try_channel(
     board: Board, setup: ServoConfig, joint: JointParams, yes: bool, explain: Explain
 ) -> bool:
     """Move one channel's servo until the person recognises it, or skips it."""
@@ -155,7 +155,7 @@ def _channel(
         if not yes and not typer.confirm(f"   move it? {at}", default=False, err=True):
             return False
         try:
-            gone = _walked(board, setup, (rest, low, high, rest))
+            gone = _walk_channel(board, setup, (rest, low, high, rest))
         except ServoFault:
             raise
         except DriverError as error:
@@ -192,7 +192,7 @@ def set_up_maestro(task: SetupTask) -> list[str]:
     say(f"{task.title}: a Pololu Maestro; {len(setups)} of its channels to try.")
     with (
         bench.rig_ports(task.rig, task.mock, task.port) as wired,
-        bench.to_open(wired.paths[task.bus]) as line,
+        bench.unopened_port(wired.paths[task.bus]) as line,
     ):
         path, usb = line.port_name, bench.usb_id(line.port_name)
         # Its own USB port, and not one of an adaptor at its serial pins.
@@ -203,7 +203,7 @@ def set_up_maestro(task: SetupTask) -> list[str]:
             text = settings_file(params, bench.setups_on(task.rig, task.bus), on_usb)
             write_file(task.settings, text, force=True)
             say(
-                f"   all that is to be set is in {task.settings}: in Pololu's Maestro Control "
+                f"   all settings are in {task.settings}: in Pololu's Maestro Control "
                 "Center File, Open"
             )
             say(
@@ -232,7 +232,7 @@ def set_up_maestro(task: SetupTask) -> list[str]:
 
 
 def _explain_maestro(setup: ServoConfig, place: ChannelPosition) -> str:
-    return clipped(setup, place.asked, place.got)
+    return clipping_text(setup, place.asked, place.got)
 
 
 def _test_ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) -> None:
@@ -251,7 +251,7 @@ def _test_ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) 
     for setup in setups:
         rest = _rest_steps(setup)
         places = (rest, setup.min_steps, setup.max_steps, rest)
-        for one in _walked(board, setup, places, QUICK_STEPS_S):
+        for one in _walk_channel(board, setup, places, QUICK_STEPS_S):
             if abs(one.asked - one.got) > FINE_STEPS:
                 cut[_explain_maestro(setup, one)] = None
     for text in cut:
@@ -277,7 +277,7 @@ def set_up_pca9685(task: SetupTask) -> list[str]:
     say(f"{task.title}: PCA9685; {len(setups)} of its channels to try.")
     with (
         bench.rig_ports(task.rig, task.mock, task.port) as wired,
-        bench.to_open(wired.paths[task.bus]) as line,
+        bench.unopened_port(wired.paths[task.bus]) as line,
     ):
         line.setBaudRate(params.baud)
         for address in params.addresses:
@@ -320,12 +320,12 @@ def _measure_clocks(line: BusPort, params: Pca9685Params, task: SetupTask) -> Pc
         pulse = ServoConfig(
             free[-1], "hobby", PULSE_STEPS, PULSE_STEPS, 1.0, "no joint", rest_steps=PULSE_STEPS
         )
-        with given(Pca9685Board(line, params), pulse):
-            found[n] = _measured_hz(params, address, free[-1] % CHANNELS, found[n])
+        with give_pulses(Pca9685Board(line, params), pulse):
+            found[n] = _ask_oscillator_hz(params, address, free[-1] % CHANNELS, found[n])
     return replace(params, oscillator_hz=found[0], further_oscillators_hz=tuple(found[1:]))
 
 
-def _measured_hz(params: Pca9685Params, address: int, channel: int, known_hz: float) -> float:
+def _ask_oscillator_hz(params: Pca9685Params, address: int, channel: int, known_hz: float) -> float:
     """Ask for the meter's reading until it is plausible; Enter keeps the known value."""
     question = (
         f"   board {address:#x}: channel {channel}, where no joint is, gives 1500 us at "

@@ -58,14 +58,14 @@ _ON_USB = (
 # fmt: off
 ADVICE = {
     "no feedback": Advice("note",
-        "hobby servos tell nothing: position, load, temperature and supply cannot be examined"),
+        "hobby servos report nothing: position, load, temperature and supply cannot be examined"),
     "beyond": Advice("error", "the board has channels 0..{last} only",
         "correct its id in the YAML"),
     "not read": Advice("note",
-        "was not asked: others give pulses, and were it not there, the board would send them home",
+        "was not read: others give pulses, and if it did not exist, the board would send them home",
         "stop the pulses of all servos and look again"),
     "silent": Advice("error", "the board does not answer about this channel",
-        "has it so many channels? correct its id, or bus.maestro.channels"),
+        "does the board have this channel? correct its id, or bus.maestro.channels"),
     "input": Advice("error", "is an input", "set its channel to Servo in Pololu's program"),
     "left on": Advice("warn", "gets pulses of {us:g} us though no program runs it", "{remedy}"),
     "outside": Advice("error", "gets pulses of {us:g} us though no program runs it, outside its "
@@ -205,8 +205,8 @@ def visit_maestro(
     if found is None:
         return [ADVICE["mute" if size is None else "mute on USB"].at(WHERE, baud=params.baud)]
     channels = size or params.channels
-    line = MaestroLink(port, _spoken(params, found))
-    pulses = _pulses(line, setups, channels, found, size is not None)
+    line = MaestroLink(port, _board_params(params, found))
+    pulses = _read_pulses(line, setups, channels, found, size is not None)
     crc = "on" if found.crc else "off"
     named = f"{channels} channels{'' if size else ' assumed'}"
     well = f"answers in the {' and the '.join(found.forms)} form, CRC {crc}, {named}, no script"
@@ -226,7 +226,7 @@ def visit_maestro(
     return [*findings[:-1], *wide, findings[-1]]
 
 
-def _pulses(
+def _read_pulses(
     line: MaestroLink,
     setups: Sequence[ServoConfig],
     channels: int,
@@ -253,7 +253,7 @@ def _pulses(
     return pulses
 
 
-def _spoken(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
+def _board_params(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
     """Return the protocol of a board that was found; the rig file may differ."""
     form = params.protocol if params.protocol in found.forms else found.forms[0]
     return replace(params, protocol=form, crc=found.crc)
@@ -289,7 +289,7 @@ def stop_script(port: BusPort, params: MaestroParams) -> str:
     found = probe(port, params)
     if found is None:
         raise PortError(f"{port.port_name}: no Maestro answers: gazerig doctor names the cure")
-    line = MaestroLink(port, _spoken(params, found))
+    line = MaestroLink(port, _board_params(params, found))
     line.send(line.speech.stop_script())
     return "" if line.ask(line.speech.script_status(), 1) == b"\1" else "it runs on"
 

@@ -75,16 +75,16 @@ def worst(findings: Iterable[Diagnostic]) -> Level:
     return max((finding.level for finding in findings), key=LEVELS.index, default="ok")
 
 
-def grouped(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str, str]]:
+def group_findings(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str, str]]:
     """Return level, places, what and remedy, the worst first; equal findings are one row."""
     groups: dict[tuple[Level, str, str], list[str]] = {}
     for finding in findings:
         groups.setdefault((finding.level, finding.what, finding.remedy), []).append(finding.where)
-    rows = [(level, together(at), what, cure) for (level, what, cure), at in groups.items()]
+    rows = [(level, join_places(at), what, cure) for (level, what, cure), at in groups.items()]
     return sorted(rows, key=lambda row: -LEVELS.index(row[0]))
 
 
-def together(places: Sequence[str]) -> str:
+def join_places(places: Sequence[str]) -> str:
     """Name several places; joints first, then their servos: "a, b, c (servos 1-3)"."""
     found = [match for place in places if (match := _JOINT.fullmatch(place))]
     nouns = {match[2] for match in found}
@@ -94,7 +94,7 @@ def together(places: Sequence[str]) -> str:
     return f"{names} ({nouns.pop()}s {runs([int(match[3]) for match in found])})"
 
 
-def as_plain(finding: Diagnostic, bus: str) -> dict[str, object]:
+def finding_json(finding: Diagnostic, bus: str) -> dict[str, object]:
     """Return a finding as JSON can hold it; bus: the name of its bus, "" for the main one."""
     return {
         "bus": bus,
@@ -106,7 +106,7 @@ def as_plain(finding: Diagnostic, bus: str) -> dict[str, object]:
     }
 
 
-def summed_up(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:
+def summarize(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:
     """Count findings by level, and offer what --fix may do."""
     counts = [(level, sum(f.level == level for f in findings)) for level in reversed(LEVELS)]
     text = ", ".join(f"{count} {level}" for level, count in counts if count)

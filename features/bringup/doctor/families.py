@@ -108,7 +108,7 @@ def _common(kind: ServoKind, position: int, others: Mapping[int, str]) -> tuple[
         ),
         WantedSetting(
             "status_return_level", level, "warn",
-            lambda v: f"does not confirm what it is told (Status Return Level {v}, should be "
+            lambda v: f"does not confirm commands (Status Return Level {v}, should be "
             f"{level})",
         ),
         WantedSetting(
@@ -248,7 +248,7 @@ _FEETECH = ServoChecks(
         WantedSetting(
             "max_torque", feetech.TORQUE_FULL, "note",
             lambda v: f"gives {v / feetech.TORQUE_FULL:.0%} of its torque at most (Max Torque {v})",
-            f"where that was not on purpose set Max Torque (16) to 1000 with {FD}",
+            f"if that was not on purpose, set Max Torque (16) to 1000 with {FD}",
             least=feetech.TORQUE_FULL,
         ),
     ),

@@ -1,4 +1,4 @@
-"""A whole bus of a rig examined: who is there, at which baud rate, and how each servo is.
+"""Examination of a whole bus of a rig: its servos, their baud rates and their faults.
 
 Reads only; ``apply_fixes`` writes what the findings offer, to servos whose torque is off, and
 moves nothing.
@@ -43,7 +43,7 @@ ADVICE = {
     "pieces": Advice("error", "answers in pieces only: two servos share its id, or a plug is loose",
         "connect it alone and look with gazerig scan"),
     "silent": Advice("error", "does not answer",
-        "check its two plugs; is its id set? gazerig setup, with it connected alone, tells"),
+        "check its two plugs; is its id set? gazerig setup, with it connected alone, reports it"),
     "new": Advice("warn",
         "servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the missing",
         "a new one? connect it alone and run gazerig setup"),
@@ -69,7 +69,7 @@ class Presence(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AppliedFix:
-    """One thing that ``apply_fixes`` did, or why it could not."""
+    """One applied fix, or the reason why it was not applied."""
 
     where: str
     what: str
@@ -113,7 +113,7 @@ def check(
         PortError: the port cannot be opened.
         BusLost: it has gone away.
     """
-    presence = look(port, kind, setups, baud, tell)
+    presence = find_servos(port, kind, setups, baud, tell)
     findings = list(judge_presence(presence, kind, baud))
     for setup in setups:
         if setup.id in presence.there:
@@ -125,10 +125,10 @@ def check(
     return findings
 
 
-def look(
+def find_servos(
     port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
 ) -> Presence:
-    """Find out who is on the bus; the port is left open at the rig's baud rate.
+    """Find the servos on the bus; the port is left open at the rig's baud rate.
 
     Raises:
         PortError: the port cannot be opened.

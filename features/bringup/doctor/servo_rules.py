@@ -138,10 +138,10 @@ def visit(
         BusLost: the port is gone.
     """
     checks = CHECKS[kind.family.name]
-    return examine(take(Registers(port, kind.family), checks, setup, found, corrupt))
+    return examine(read_state(Registers(port, kind.family), checks, setup, found, corrupt))
 
 
-def take(
+def read_state(
     registers: Registers, checks: ServoChecks, setup: ServoConfig, found: FoundServo, corrupt: int
 ) -> ServoState:
     """Read all registers of one servo that the rules need.
@@ -338,7 +338,7 @@ RULES: tuple[Rule, ...] = (
     RegisterRule(("present_position",),
         lambda s, at: not s.setup.min_steps <= at <= s.setup.max_steps,
         Advice("warn",
-            "stands at step {present_position}, outside its range {setup.min_steps}..{setup.max_steps}",
+            "is at step {present_position}, outside its range {setup.min_steps}..{setup.max_steps}",
             "turn it inside by hand (torque off); if it is inside already, gazerig calibrate --joint "
             "{setup.name}")),
     _firmware,

@@ -35,14 +35,14 @@ from gazerig.features.bringup.calibration.charuco_page import RULER_MM, write_pa
 from gazerig.features.bringup.calibration.field_of_view import SIZE_SPREAD, field_by_face
 from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
 from gazerig.features.bringup.cli.calibrate.oak import (
-    as_seen,
     calibration_of_file,
     lens_keys,
     oak_changes,
-    say_calibration,
+    print_calibration,
     upright_calibration,
+    with_frame_lens,
 )
-from gazerig.features.bringup.cli.neck_motion import go_on, moving_neck
+from gazerig.features.bringup.cli.neck_motion import moving_neck, refuse_stop
 from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
 from gazerig.features.bringup.cli.rig_writer import (
     AllYesOption,
@@ -50,7 +50,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     OutOption,
     difference_table,
     refuse_unwritable,
-    write_found,
+    write_values,
 )
 from gazerig.robot.app.camera_factory import orientation_of
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
@@ -70,7 +70,7 @@ class Paper(StrEnum):
     letter = "letter"
 
 
-class What(StrEnum):
+class CalibrationTarget(StrEnum):
     """Part of the camera to calibrate."""
 
     all = "all"
@@ -104,8 +104,8 @@ def calibrate_board(
 def calibrate_camera(
     rig: RigArgument = "desk",
     what: Annotated[
-        What, typer.Option(help="The lens, its mount on the head, or all of it.")
-    ] = What.all,
+        CalibrationTarget, typer.Option(help="The lens, its mount on the head, or all of it.")
+    ] = CalibrationTarget.all,
     camera: Annotated[int | None, typer.Option(min=0, help="Webcam N (default: 0).")] = None,
     oak: Annotated[
         bool, typer.Option("--oak", help="An OAK camera: the lens is read from its memory.")
@@ -143,14 +143,14 @@ def calibrate_camera(
         _refuse_contradictions(what, camera, oak, oak_calibration, mock, face_at)
         loaded = load_rig(rig)
         if face_at is not None:
-            changes = _field_changes(loaded, Webcam(camera or 0, loaded.webcam), face_at, stopped)
+            changes = _measure_field(loaded, Webcam(camera or 0, loaded.webcam), face_at, stopped)
             _write(rig, loaded, changes, out, dry_run, stopped, yes)
             return
         board = CharucoBoard(_board(columns, rows, square, ruler))
-        if loaded.camera.mount != "head" and what is not What.lens:
+        if loaded.camera.mount != "head" and what is not CalibrationTarget.lens:
             raise SetupError(
                 "camera.mount is base: the camera does not turn with the head, so looking from "
-                "several neck angles tells nothing; use --what lens"
+                "several neck angles shows nothing; use --what lens"
             )
         if not dry_run:
             refuse_unwritable(rig, out)
@@ -158,15 +158,15 @@ def calibrate_camera(
             loaded, board, stopped, Kinematics(loaded.geometry, loaded.joints, lid_ends(loaded))
         )
         if oak_calibration is not None:
-            changes = _oak_lens(job, calibration_of_file(oak_calibration, loaded.oak)).changes
+            changes = _read_oak_lens(job, calibration_of_file(oak_calibration, loaded.oak)).changes
         else:
             source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
-            with _eye(job, None if mock else source, seed) as eye:
-                lens = _known_lens(job, eye, source, what)
+            with _open_camera(job, None if mock else source, seed) as eye:
+                lens = _find_lens(job, eye, source, what)
                 changes = lens.changes
-                if what is not What.lens:
+                if what is not CalibrationTarget.lens:
                     with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
-                        found = _mount(job, eye, neck, lens.camera, lens.good)
+                        found = _measure_mount(job, eye, neck, lens.camera, lens.good)
                         changes |= mount_changes(found, lens.camera)
         _write(rig, loaded, changes, out, dry_run, stopped, yes)
 
@@ -183,16 +183,16 @@ def _write(
     """Show new and old values, and write them after a yes."""
     Console().print(difference_table(rig, loaded, changes))
     if not dry_run:
-        write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
+        write_values(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
 
 
-def _field_changes(
+def _measure_field(
     rig: Rig, source: FrameSource, face_at_m: float, stopped: Callable[[], str | None]
 ) -> dict[str, Any]:
     """Return the field of view by a face that is looked at for some seconds."""
     if rig.camera.lens is not None:
         raise SetupError(
-            "camera.lens is measured and tells the field of view: measure it again with the board "
+            "camera.lens is measured and contains the field of view: measure it again with the board "
             "(--what lens), or take it out of the rig file"
         )
     clock = RealClock()
@@ -207,7 +207,7 @@ def _field_changes(
         seen: list[Pixels] = []
         number, seen_s, size_px = 0, clock.now_s(), (0, 0)
         while len(seen) < _FACE_FRAMES:
-            go_on(stopped)
+            refuse_stop(stopped)
             found = thread.latest(clock.now_s())
             if found is None or found.number == number:
                 if clock.now_s() - seen_s > _NO_FACE_S:
@@ -251,8 +251,8 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
     }
 
 
-def sure_as(lens: LensCalibration) -> HandEyeParams:
-    """Return what hand-eye calibration may assume of a lens that was just measured."""
+def accuracy_of(lens: LensCalibration) -> HandEyeParams:
+    """Return the parameters of hand-eye calibration for a lens that was just measured."""
     focal = max(lens.focal_std_px) / lens.intrinsics.fx_px * 100.0
     centre = max(lens.centre_std_px) * 640.0 / lens.width_px
     return HandEyeParams(lens_error_percent=max(focal, 0.02), centre_error_px=max(centre, 0.1))
@@ -278,7 +278,7 @@ class _KnownLens(NamedTuple):
     good: HandEyeParams
 
 
-class _Eye(NamedTuple):
+class _CameraView(NamedTuple):
     """Source of frames, and the simulated camera behind it, if any."""
 
     look: Callable[[], Shot | None]
@@ -287,7 +287,7 @@ class _Eye(NamedTuple):
     mock: BoardScene | None
 
 
-class _NoFaces:
+class _NullDetector:
     """Stands where faces are looked for: a board has none."""
 
     def find(self, _: ImageArray) -> tuple[DetectedFace, ...]:
@@ -296,16 +296,18 @@ class _NoFaces:
 
 
 @contextlib.contextmanager
-def _eye(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_Eye]:
+def _open_camera(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_CameraView]:
     """Open the camera, or a simulated one."""
     clock = RealClock()
     if source is None:
         rng = np.random.default_rng(seed)
         simulated = BoardScene(job.rig.camera, job.board, job.kinematics, rng)
-        yield _Eye(lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated)
+        yield _CameraView(
+            lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated
+        )
         return
     turned = UprightSource(source, orientation_of(job.rig.camera))
-    thread = CameraThread(turned, _NoFaces(), clock.now_s)
+    thread = CameraThread(turned, _NullDetector(), clock.now_s)
 
     def look() -> Shot | None:
         found = thread.latest(clock.now_s())
@@ -315,21 +317,23 @@ def _eye(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_Eye]:
 
     thread.open()
     try:
-        yield _Eye(look, clock.now_s, lambda s: clock.sleep_until(clock.now_s() + s), None)
+        yield _CameraView(look, clock.now_s, lambda s: clock.sleep_until(clock.now_s() + s), None)
     finally:
         thread.close()
 
 
 def _refuse_contradictions(
-    what: What,
+    what: CalibrationTarget,
     camera: int | None,
     oak: bool,
     oak_calibration: Path | None,
     mock: bool,
     face_at: float | None,
 ) -> None:
-    """Refuse options that cannot be together."""
-    if face_at is not None and (oak or oak_calibration is not None or mock or what is not What.all):
+    """Refuse options that exclude each other."""
+    if face_at is not None and (
+        oak or oak_calibration is not None or mock or what is not CalibrationTarget.all
+    ):
         raise SetupError(
             "--face-at measures a webcam's field of view alone: leave --what, --oak and --mock away "
             "(an OAK camera knows its lens)"
@@ -338,36 +342,38 @@ def _refuse_contradictions(
         raise SetupError("--oak and --camera name two cameras: leave one away")
     if mock and (oak or oak_calibration is not None):
         raise SetupError("--mock simulates a camera without a memory: leave --oak away")
-    if oak_calibration is not None and what is not What.lens:
-        raise SetupError("--oak-calibration tells of the lens alone: add --what lens")
+    if oak_calibration is not None and what is not CalibrationTarget.lens:
+        raise SetupError("--oak-calibration has the lens only: add --what lens")
 
 
-def _known_lens(job: _Job, eye: _Eye, source: FrameSource, what: What) -> _KnownLens:
+def _find_lens(
+    job: _Job, eye: _CameraView, source: FrameSource, what: CalibrationTarget
+) -> _KnownLens:
     """Return the lens as the rig has it, as an OAK camera has it in memory, or measure it."""
-    if what is What.mount:
+    if what is CalibrationTarget.mount:
         return _KnownLens(job.rig.camera, {}, HandEyeParams())
     if isinstance(source, OakSource):
-        return _oak_lens(job, source.calibration(), _first(job, eye))
-    lens = _lens(job, eye)
+        return _read_oak_lens(job, source.calibration(), _first_frame(job, eye))
+    lens = _measure_lens(job, eye)
     camera = replace(job.rig.camera, lens=lens.params())
-    return _KnownLens(camera, lens_changes(lens), sure_as(lens))
+    return _KnownLens(camera, lens_changes(lens), accuracy_of(lens))
 
 
-def _oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
+def _read_oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
     """Return the lens of an OAK camera for upright frames, and print its memory."""
     found = upright_calibration(delivered, orientation_of(job.rig.camera))
-    found = as_seen(found, shot.lens if shot is not None else None)
-    say_calibration(found, job.rig.oak)
+    found = with_frame_lens(found, shot.lens if shot is not None else None)
+    print_calibration(found, job.rig.oak)
     camera = replace(job.rig.camera, lens=lens_params(found.lens, found.width_px, found.height_px))
     return _KnownLens(camera, oak_changes(found), HandEyeParams())
 
 
-def _lens(job: _Job, eye: _Eye) -> LensCalibration:
+def _measure_lens(job: _Job, eye: _CameraView) -> LensCalibration:
     """Have the user show the board until the lens is known."""
     steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
     say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
     while True:
-        go_on(job.stopped)
+        refuse_stop(job.stopped)
         shot = eye.look()
         if shot is None or shot.number == number:
             eye.rest(0.01)
@@ -376,7 +382,7 @@ def _lens(job: _Job, eye: _Eye) -> LensCalibration:
         step = steps.take(shot)
         lens, desired = None, step.coverage.missing[0] if step.coverage.missing else "enough"
         if step.coverage.enough and step.kept:
-            lens, why = steps.tried()
+            lens, why = steps.try_result()
             desired = why or desired
         note = "kept" if step.kept else step.why
         status(f"{step.coverage.views} views, {step.corners} corners ({note}): {desired}")
@@ -398,11 +404,13 @@ def _lens(job: _Job, eye: _Eye) -> LensCalibration:
     return lens
 
 
-def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEyeParams) -> HandEye:
+def _measure_mount(
+    job: _Job, eye: _CameraView, neck: Neck, camera: CameraParams, good: HandEyeParams
+) -> HandEye:
     """View the hanging board from several neck angles."""
     if camera.lens is None:
         raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
-    shot = _first(job, eye)
+    shot = _first_frame(job, eye)
     height, width = shot.image.shape[:2]
     if (camera.lens.width_px, camera.lens.height_px) != (width, height):
         raise SetupError(
@@ -437,11 +445,11 @@ def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEye
     return found
 
 
-def _first(job: _Job, eye: _Eye) -> Shot:
+def _first_frame(job: _Job, eye: _CameraView) -> Shot:
     """Wait for a frame."""
     give_up_s = eye.now_s() + 5.0
     while eye.now_s() < give_up_s:
-        go_on(job.stopped)
+        refuse_stop(job.stopped)
         shot = eye.look()
         if shot is not None:
             return shot

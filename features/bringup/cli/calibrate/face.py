@@ -17,8 +17,8 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.face_calibration import (
     PART_NAMES_TEXT,
     FaceCalibration,
-    begun,
     changes,
+    initial_calibration,
 )
 from gazerig.features.bringup.calibration.face_steering import FaceSteering
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
@@ -36,7 +36,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     AllYesOption,
     OutOption,
     refuse_unwritable,
-    write_found,
+    write_values,
 )
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Vec3
@@ -115,19 +115,19 @@ def calibrate_face(
             no_page=no_page or answers is not None,
         ).checked()
         try:
-            found = _steered(options, loaded, lines, answers is not None, stopped)
+            found = _calibrate(options, loaded, lines, answers is not None, stopped)
             values = changes(found)
             if not values:
                 say("no part was chosen: nothing to write")
                 return
             Console().print(_table(rig, loaded, found))
-            write_found(rig, values, out, TerminalPerson(lines, stopped, yes))
+            write_values(rig, values, out, TerminalPerson(lines, stopped, yes))
         except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None
 
 
-def _steered(
+def _calibrate(
     options: RunOptions,
     rig: Rig,
     lines: Lines,
@@ -142,13 +142,13 @@ def _steered(
     """
     idle = rig.gaze.idle
     rest_m = (idle.rest_distance_m, 0.0, idle.rest_height_m)
-    begin = begun(rig.face_parts_mm)
+    begin = initial_calibration(rig.face_parts_mm)
     steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
     made = assemble(rig, options, Substitutes(chooser=lambda own: steering))
     # Input from a pipe is a script, too: no user can end it.
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
-    steer = SteeringButtons(BUTTONS, keys.press, lambda: shown(steering))
+    steer = SteeringButtons(BUTTONS, keys.press, lambda: status_text(steering))
     observers = RunObservers(made, options, say, steer=steer)
     door = StopOnlyServer(
         made.robot.command,
@@ -156,7 +156,9 @@ def _steered(
         {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
         say,
     )
-    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, observers, door)
+    sitting = _CalibrationSession(
+        steering, keys, made.clock.now_s, stopped, scripted, observers, door
+    )
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
@@ -170,7 +172,7 @@ def _steered(
 
 def _run(
     made: Assembly,
-    sitting: "_Sitting",
+    sitting: "_CalibrationSession",
     keys: Keys,
     observers: RunObservers,
     door: StopOnlyServer,
@@ -189,11 +191,11 @@ def _run(
         with keys:
             count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
         leaving.cause = count.stopped_by
-        observers.tell("over: the head parks; whether to write it is asked at the terminal")
+        observers.tell("over: the head parks; the terminal asks whether to write it")
     return count
 
 
-class _Sitting:
+class _CalibrationSession:
     """Keys in, words out on the terminal and the page, between the ticks."""
 
     def __init__(
@@ -236,7 +238,7 @@ class _Sitting:
         self._say_what_is_due(tick.t_s)
         if self._live_line and tick.t_s - self._shown_s >= _SHOW_S:
             self._shown_s = tick.t_s
-            status(shown(self._steering))
+            status(status_text(self._steering))
 
     def _say_what_is_due(self, t_s: float) -> None:
         """Name the part once, and report if no face has been seen for a while."""
@@ -267,7 +269,7 @@ class _Sitting:
             self._observers.tell(what)
 
 
-def shown(steering: FaceSteering) -> str:
+def status_text(steering: FaceSteering) -> str:
     """Return the status line: part, distance moved, step."""
     state = steering.state
     if state.part is None or steering.face is None:

@@ -12,7 +12,7 @@ from gazerig.features.bringup.cli.calibrate.joints import calibrate_joints
 _HELP = ("--help", "-h")
 
 
-class JointsUnlessNamed(TyperGroup):
+class DefaultCommandGroup(TyperGroup):
     """Passes arguments that name none of its commands to the default command.
 
     So ``gazerig calibrate my_rig.yaml`` stays what it was before there was anything else to
@@ -30,7 +30,7 @@ class JointsUnlessNamed(TyperGroup):
 
 app = typer.Typer(
     name="calibrate",
-    cls=JointsUnlessNamed,
+    cls=DefaultCommandGroup,
     help="Find out and write into the rig's YAML: joints (the default), camera, face.",
     subcommand_metavar="[joints|camera|board|face] [RIG] ...",
 )

@@ -9,21 +9,24 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
-from gazerig.features.bringup.calibration.hobby_access import OneHobby
+from gazerig.features.bringup.calibration.hobby_access import HobbyServoHandle
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
     LinkageFit,
 )
-from gazerig.features.bringup.calibration.joint_procedure import by_hand, by_motion
+from gazerig.features.bringup.calibration.joint_procedure import (
+    calibrate_by_hand,
+    calibrate_by_motion,
+)
 from gazerig.features.bringup.calibration.linkage_calibration import (
-    HandPlacer,
-    HobbyPlacer,
-    by_places,
+    HandMarker,
+    HobbyMarker,
+    calibrate_by_marks,
 )
 from gazerig.features.bringup.calibration.smart_servo_access import SingleJoint, SingleServo
-from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
-from gazerig.features.bringup.cli.ports import RigPorts, opened
+from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
+from gazerig.features.bringup.cli.ports import RigPorts, open_port
 from gazerig.features.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
 from gazerig.robot.cli.terminal import say
@@ -32,17 +35,17 @@ from gazerig.robot.control.power_down import PowerDown
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.model.clock import RealClock
 
-Made = Calibration | LinkageFit
+JointResult = Calibration | LinkageFit
 
 
-class By(StrEnum):
+class ActuationMode(StrEnum):
     """Source of the motion of a joint."""
 
     hand = "hand"
     motion = "motion"
 
 
-class ZeroBy(StrEnum):
+class ZeroReference(StrEnum):
     """Source of the zero after the stops were found by motion."""
 
     middle = "middle"
@@ -56,9 +59,9 @@ class CalibrationOptions(NamedTuple):
     more: places of a linkage between each two that are marked
     """
 
-    by: By
+    by: ActuationMode
     margin_deg: float
-    zero: ZeroBy
+    zero: ZeroReference
     search: StopSearchParams
     clear_offset: bool
     set_middle: bool
@@ -72,23 +75,25 @@ class CalibrationJob(NamedTuple):
     rig: Rig
     wire: RigPorts
     how: CalibrationOptions
-    person: SteeringPerson
+    person: TerminalJogger
     stopped: Callable[[], str | None]
 
 
-def measure(bench: CalibrationJob, names: Sequence[str]) -> tuple[dict[str, Made], tuple[str, ...]]:
+def measure(
+    bench: CalibrationJob, names: Sequence[str]
+) -> tuple[dict[str, JointResult], tuple[str, ...]]:
     """Calibrate one joint after the other, bus by bus; return results and refused joints.
 
     Raises:
         SetupError: a port cannot be opened, or there are no answers left.
         CalibrationStopped: the user or the system requested the end.
     """
-    found: dict[str, Made] = {}
+    found: dict[str, JointResult] = {}
     refused: list[str] = []
     for bus in bus_names(bench.rig):
         for name in (name for name in joints_on(bench.rig, bus) if name in names):
             try:
-                found[name] = _one(bench, name, bus)
+                found[name] = _calibrate_joint(bench, name, bus)
             except (CalibrationRefused, ServoMissing, ServoFault) as error:
                 refused.append(name)
                 say(f"refused: {error}")
@@ -103,9 +108,9 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
         SetupError: names the joints, and what can be done.
     """
     without_feedback = [name for name in names if not rig.joints[name].facts.measured]
-    if how.by is By.motion and len(without_feedback) == len(names):
+    if how.by is ActuationMode.motion and len(without_feedback) == len(names):
         raise SetupError(
-            f"--by motion: hobby servos do not tell where they are ({', '.join(without_feedback)}), so no "
+            f"--by motion: hobby servos do not report their position ({', '.join(without_feedback)}), so no "
             "stop can be found: leave --by away and steer them yourself"
         )
     able = [kind for kind in KINDS.values() if kind.set_middle is not None]
@@ -117,7 +122,7 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
     if how.set_middle and other:
         titles = " and ".join(kind.title for kind in able)
         raise SetupError(
-            f"--set-middle: only {titles} servos can be told so, not that of {', '.join(other)}: "
+            f"--set-middle: only {titles} servos can be set so, not that of {', '.join(other)}: "
             "choose joints with --joint"
         )
     if how.clear_offset and len(without_feedback) == len(names):
@@ -128,11 +133,11 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
         raise SetupError(f"--pulses {low:g}:{high:g}: must ascend within {least:g}:{most:g} us")
 
 
-def _one(bench: CalibrationJob, name: str, bus: str) -> Made:
+def _calibrate_joint(bench: CalibrationJob, name: str, bus: str) -> JointResult:
     if not bench.rig.joints[name].facts.measured:
-        return _hobby(bench, name, bus)
+        return _calibrate_hobby_servo(bench, name, bus)
     guardian = _guardian(bench, name, bus)
-    with opened(bench.rig, bench.wire, bus, guardian) as port:
+    with open_port(bench.rig, bench.wire, bus, guardian) as port:
         joint = bench.rig.joints[name]
         servo = SingleServo(name, joint.id, joint.model, port, guardian)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
@@ -143,8 +148,8 @@ def _one(bench: CalibrationJob, name: str, bus: str) -> Made:
                 buses.command(f"turn {joint.id} {steps}", bus)
 
             bench.person.hand = turn
-        with _off_after(single.who, servo.disable_torque, bench.stopped):
-            return _smart(bench, single)
+        with _torque_off_after(single.who, servo.disable_torque, bench.stopped):
+            return _calibrate_smart_servo(bench, single)
 
 
 def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
@@ -153,7 +158,7 @@ def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
 
 
-def _smart(bench: CalibrationJob, single: SingleJoint) -> Made:
+def _calibrate_smart_servo(bench: CalibrationJob, single: SingleJoint) -> JointResult:
     how, person = bench.how, bench.person
     if how.clear_offset:
         was = single.servo.clear_offset()
@@ -168,41 +173,43 @@ def _smart(bench: CalibrationJob, single: SingleJoint) -> Made:
         )
         say(f"{single.who}: its place is 2048 now (offset {single.servo.set_middle()}); {_VOID}")
     if single.joint.transmission_points:
-        if how.by is By.motion:
+        if how.by is ActuationMode.motion:
             raise CalibrationRefused(
                 f"{single.name}: its push rod has measured places (transmission_points), which motion cannot "
                 "find: --by hand"
             )
-        return by_places(HandPlacer(single, person), person, how.margin_deg, how.more)
-    if how.by is By.hand:
-        return by_hand(single, person, how.margin_deg)
+        return calibrate_by_marks(HandMarker(single, person), person, how.margin_deg, how.more)
+    if how.by is ActuationMode.hand:
+        return calibrate_by_hand(single, person, how.margin_deg)
     # A heavy head must not move on its own without a confirmation.
     asked = (
-        f"{single.name} will move by itself, and sink when the torque goes off: hold the head. "
+        f"{single.name} will move on its own, and sink when the torque goes off: hold the head. "
         "Go on?"
     )
     if "neck" in single.name.split("_") and not person.agrees(asked):
         raise CalibrationRefused(f"{single.name}: left out as you asked")
-    return by_motion(single, person, how.margin_deg, how.search, how.zero.value)
+    return calibrate_by_motion(single, person, how.margin_deg, how.search, how.zero.value)
 
 
 _VOID = "until this calibration is written the rig file's zero is wrong by that"
 
 
-def _hobby(bench: CalibrationJob, name: str, bus: str) -> Made:
+def _calibrate_hobby_servo(bench: CalibrationJob, name: str, bus: str) -> JointResult:
     config = bench.rig.bus_named(bus)
     guardian = _guardian(bench, name, bus)
     port = port_of(bench.wire.paths[bus], on_traffic=guardian.beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
     params = config.maestro if config.kind == "maestro" else config.pca9685
-    hobby = OneHobby(name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian)
+    hobby = HobbyServoHandle(
+        name, joint, port, params, RealClock(), bench.stopped, how.pulses_us, guardian
+    )
     person.hand = None
-    with _off_after(hobby.who, hobby.disable, bench.stopped):
-        return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)
+    with _torque_off_after(hobby.who, hobby.disable, bench.stopped):
+        return calibrate_by_marks(HobbyMarker(hobby, person), person, how.margin_deg, how.more)
 
 
 @contextlib.contextmanager
-def _off_after(
+def _torque_off_after(
     who: str, torque_off: Callable[[], None], stopped: Callable[[], str | None]
 ) -> Iterator[None]:
     """Switch the torque off however the block ends; nothing is printed if that works."""

@@ -12,14 +12,14 @@ from gazerig.features.bringup.calibration.joint_calibration import Value, change
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibrate import options as options
 from gazerig.features.bringup.cli.calibrate.joint import (
-    By,
+    ActuationMode,
     CalibrationJob,
     CalibrationOptions,
-    ZeroBy,
+    ZeroReference,
     measure,
     refuse_impossible,
 )
-from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
+from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, refuse_packages, rig_ports
 from gazerig.features.bringup.cli.prompts import Lines
 from gazerig.features.bringup.cli.rig_writer import (
@@ -28,7 +28,7 @@ from gazerig.features.bringup.cli.rig_writer import (
     OutOption,
     difference_table,
     refuse_unwritable,
-    write_found,
+    write_values,
 )
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
 from gazerig.robot.model.coupling_params import pairs_of, partners
@@ -37,9 +37,9 @@ from gazerig.robot.model.coupling_params import pairs_of, partners
 def calibrate_joints(
     rig: RigArgument = "desk",
     joint: options.Joint = None,
-    by: options.TurnedBy = By.hand,
+    by: options.TurnedBy = ActuationMode.hand,
     margin: options.Margin = 2.0,
-    zero: options.Zero = ZeroBy.middle,
+    zero: options.Zero = ZeroReference.middle,
     strength: options.Strength = 0.3,
     clear_offset: options.ClearOffset = False,
     set_middle: options.SetMiddle = False,
@@ -71,7 +71,7 @@ def calibrate_joints(
             if out is None:
                 _refuse_long_lists(rig, loaded, names)
         refuse_impossible(loaded, names, how)
-        person = SteeringPerson(Lines(answers), stopped, yes)
+        person = TerminalJogger(Lines(answers), stopped, yes)
         try:
             with rig_ports(loaded, mock, port) as wire:
                 found, refused = measure(CalibrationJob(loaded, wire, how, person, stopped), names)
@@ -81,7 +81,7 @@ def calibrate_joints(
                     wanted |= changes(name, loaded.joints[name], made, loaded.park_deg)
                 Console().print(difference_table(rig, loaded, wanted))
                 if not dry_run:
-                    write_found(rig, wanted, out, person)
+                    write_values(rig, wanted, out, person)
         except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None

@@ -45,7 +45,7 @@ def upright_calibration(found: OakCalibration, orientation: FrameOrientation) ->
     return found._replace(lens=lens, width_px=width, height_px=height)
 
 
-def as_seen(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibration:
+def with_frame_lens(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibration:
     """Return the calibration with the lens of a frame; a difference is printed."""
     if frame_lens is None:
         return found
@@ -65,7 +65,7 @@ def as_seen(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibrat
     return found._replace(lens=replace(b, distortion=a.distortion))
 
 
-def say_calibration(found: OakCalibration, params: OakParams) -> None:
+def print_calibration(found: OakCalibration, params: OakParams) -> None:
     """Print what the memory holds, also what is not for the rig's file."""
     i = found.lens
     say(
@@ -90,7 +90,9 @@ def say_calibration(found: OakCalibration, params: OakParams) -> None:
     else:
         say("no stereo cameras: it measures no distances")
     if found.imu_rotation_deg is None:
-        say("it does not say how its gyro sits: the gyro cannot be used (oak.imu_rotation_deg)")
+        say(
+            "its memory does not contain the place of its gyro: the gyro cannot be used (oak.imu_rotation_deg)"
+        )
     if found.focus is not None and params.focus != found.focus:
         say(
             f"all this holds with the lens at position {found.focus}: oak.focus: {found.focus} "

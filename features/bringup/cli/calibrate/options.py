@@ -5,17 +5,19 @@ from typing import Annotated
 
 import typer
 
-from gazerig.features.bringup.cli.calibrate.joint import By, ZeroBy
+from gazerig.features.bringup.cli.calibrate.joint import ActuationMode, ZeroReference
 
 Joint = Annotated[
     list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")
 ]
-TurnedBy = Annotated[By, typer.Option(help="Turned by hand, torque off, or gently by itself.")]
+TurnedBy = Annotated[
+    ActuationMode, typer.Option(help="Turned by hand, torque off, or gently by itself.")
+]
 Margin = Annotated[
     float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Kept from each end.")
 ]
 Zero = Annotated[
-    ZeroBy, typer.Option(help="With --by motion: zero half-way, or where a person puts it.")
+    ZeroReference, typer.Option(help="With --by motion: zero half-way, or where a person puts it.")
 ]
 Strength = Annotated[
     float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")

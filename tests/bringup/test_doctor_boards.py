@@ -1,20 +1,32 @@
-"""Findings about a Maestro and its channels, what is mended, and what is only said."""
+"""Findings about boards of hobby servos and their channels, fixes, and settings of a Maestro."""
 
 from xml.etree.ElementTree import fromstring
 
 import pytest
+from doctor_rig import one
 from present import present
 
 from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.i2c import bridge
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.registers import (
+    AWAKE,
+    LED0,
+    MODE1,
+    PRESCALE,
+    SLEEP,
+    prescale_of,
+    pulse,
+)
 from gazerig.drivers.types import ServoConfig
-from gazerig.features.bringup.channel_test import sent_home
-from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro
+from gazerig.features.bringup.channel_test import send_home
+from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro, visit_pca9685
 from gazerig.features.bringup.doctor.diagnostics import worst
 from gazerig.features.bringup.doctor.run import apply_fixes
 from gazerig.features.bringup.maestro_settings import (
-    clipped,
+    clipping_text,
     instructions,
     range_us,
     settings_file,
@@ -23,6 +35,7 @@ from gazerig.features.bringup.maestro_settings import (
 )
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.pca9685.bridge import build_bridge
 
 PAN = ServoConfig(0, "hobby", 4400, 7600, 9000.0, "eyes_pan", rest_steps=6000)
 LID = ServoConfig(2, "hobby", 3600, 7200, 9000.0, "left_upper_lid", rest_steps=5000)
@@ -52,19 +65,12 @@ class Rig:
         return self.board.faults.board()["errors"]
 
 
-def one(findings, level, where, words):
-    """Return the finding of this level at this place that says these words."""
-    named = [f for f in findings if f.level == level and f.where == where and words in f.what]
-    assert len(named) == 1, [str(f) for f in findings]
-    return named[0]
-
-
 def test_a_good_board_and_what_no_board_tells():
     rig = Rig(usb=MINI)
     findings = rig.check()
     assert {f.level for f in findings} == {"ok", "note"}
     assert "12 channels" in one(findings, "ok", "the board", "compact and the pololu form").what
-    assert one(findings, "note", "the servos", "hobby servos tell nothing")
+    assert one(findings, "note", "the servos", "hobby servos report nothing")
     reported = one(findings, "note", "the board", "serial timeout cannot be read")
     assert "Pololu's program" in reported.remedy and "gazerig setup" in reported.remedy
     wide = one(findings, "note", "left_upper_lid (channel 2)", "goes to 900..1800 us")
@@ -124,7 +130,7 @@ def test_a_channel_that_may_not_be_there_is_not_asked_for_while_servos_have_puls
     far = PAN._replace(id=8, name="eyes_tilt")
     rig = Rig(6, setups=(PAN, far))
     rig.do("84 00 70 2E")
-    assert one(rig.check(), "note", "eyes_tilt (channel 8)", "was not asked")
+    assert one(rig.check(), "note", "eyes_tilt (channel 8)", "was not read")
     assert bytes.fromhex("9008") not in rig.sent
     assert rig.board.faults.reports()[0]["position"] == 6000
     known = Rig(12, setups=(PAN, far), usb=MINI)
@@ -177,11 +183,11 @@ def test_home():
     rig.do("55")
     rig.do("84 00 70 2E")
     rig.port.setBaudRate(115_200)
-    assert sent_home(MaestroLink(rig.port, rig.params)) == ("serial protocol error",)
+    assert send_home(MaestroLink(rig.port, rig.params)) == ("serial protocol error",)
     assert [c["position"] for c in rig.board.faults.reports()] == [0] * 12
     rig.board.choose("mode", "mute")
     with pytest.raises(ServoMissing, match="no Maestro answers"):
-        sent_home(MaestroLink(rig.port, rig.params))
+        send_home(MaestroLink(rig.port, rig.params))
 
 
 # --- what to set in Pololu's program
@@ -226,8 +232,70 @@ def test_a_speed_is_given_as_the_board_keeps_it(steps_s, units):
 
 
 def test_a_place_that_is_cut():
-    assert clipped(LID, 3600, 3968) == (
+    assert clipping_text(LID, 3600, 3968) == (
         "left_upper_lid (channel 2) is sent to 900 us and the board stays at 992 us: set its Min "
         "to 896 and its Max to 1808 in Pololu's program"
     )
-    assert "gives no pulses" in clipped(LID, 3600, 0)
+    assert "gives no pulses" in clipping_text(LID, 3600, 0)
+
+
+# --- PCA9685
+
+CHANNELS = (
+    ServoConfig(0, "hobby", 4400, 7600, 12_000.0, "eyes_pan"),
+    ServoConfig(1, "hobby", 4400, 7600, 12_000.0, "eyes_tilt"),
+)
+PCA9685 = Pca9685Params()
+
+
+class Pca9685Rig:
+    """One emulated board, and what a program before may have left in it."""
+
+    def __init__(self) -> None:
+        self.now_s = 1.0
+        self.chain = build_bridge((0x40,), lambda: self.now_s)
+        self.port = InProcessPort(self.chain)
+
+    def leave_pulse(self, channel: int, counts: int) -> None:
+        self.port.setBaudRate(PCA9685.baud)
+        prescale = prescale_of(PCA9685.frequency_hz, PCA9685.oscillator_hz)
+        for register, data in (
+            (MODE1, bytes((SLEEP,))),
+            (PRESCALE, bytes((prescale,))),
+            (MODE1, bytes((AWAKE,))),
+            (LED0 + 4 * channel, pulse(counts)),
+        ):
+            self.port.write(bridge.write(0x40, register, data))
+            self.now_s += 0.01
+
+
+def test_a_good_pca9685_is_well_and_what_it_cannot_tell_is_said() -> None:
+    findings = visit_pca9685(Pca9685Rig().port, PCA9685, CHANNELS)
+    assert worst(findings) == "note"
+    assert findings[0].what == "answers at 0x40; pulses on 0 of 2 channels"
+    assert any("no watchdog" in one.what for one in findings)
+
+
+def test_a_board_that_is_not_there_is_one_finding_with_its_remedy() -> None:
+    (only,) = visit_pca9685(Pca9685Rig().port, Pca9685Params(address=0x41), CHANNELS)
+    assert only.level == "error" and only.what == "no PCA9685 answers at 0x41"
+    assert "VCC" in only.remedy and "jumpers" in only.remedy
+
+
+def test_a_channel_that_no_board_has() -> None:
+    wrong = CHANNELS[1]._replace(id=16)
+    findings = visit_pca9685(Pca9685Rig().port, PCA9685, (CHANNELS[0], wrong))
+    assert findings[0].level == "error" and "channels 0 to 15" in findings[0].what
+    assert "eyes_tilt" in findings[0].where
+
+
+@pytest.mark.parametrize(
+    ("counts", "level", "remedy"),
+    [(307, "warn", "gazerig home"), (500, "error", "reboot eyes_pan")],
+)
+def test_pulses_of_a_pca9685_that_were_left_on(counts: int, level: str, remedy: str) -> None:
+    rig = Pca9685Rig()
+    rig.leave_pulse(0, counts)
+    found = visit_pca9685(rig.port, PCA9685, CHANNELS)[0]
+    assert found.level == level and "though no program runs it" in found.what
+    assert remedy in found.remedy
