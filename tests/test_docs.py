@@ -34,7 +34,6 @@ design = pytest.importorskip("gazerig.features.study.design")
 questionnaire = pytest.importorskip("gazerig.features.study.questionnaire")
 HOME = pytest.importorskip("gazerig.features.study.shipped").HOME
 script = pytest.importorskip("gazerig.features.world.script")
-camera_params = pytest.importorskip("gazerig.features.world.script")
 WORLDS = pytest.importorskip("gazerig.features.world").HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
@@ -274,7 +273,7 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper in (EMULATOR, PARAMETERS):
         return  # their tables are compared with the emulator and the declarations
     words = {*keys(), *defined(), *SERVOS, *scenes(), *all_examples(), *_modes()}
-    words |= {field.name for field in fields(camera_params.WorldCameraParams)}
+    words |= {field.name for field in fields(script.WorldCameraParams)}
     words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
         *DYNAMIXEL.registers,
         *FEETECH.registers,

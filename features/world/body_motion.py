@@ -166,7 +166,9 @@ class BodyMotion:
         for side in (1.0, -1.0):
             self._arm(found, side, hand_acts, at)
             self._leg(found, side)
-        return [_row(*found[name]) for name in SEGMENTS]
+        return [
+            np.concatenate((p, quaternions(R)), axis=1) for p, R in map(found.__getitem__, SEGMENTS)
+        ]
 
     def _at(self, one: TimedAct, eyes: Mapping[str, Floats]) -> Floats:
         """Return the target point of an act at all times."""
@@ -200,7 +202,8 @@ class BodyMotion:
     def _head(self, found: dict[str, Pose], eyes: Mapping[str, Floats]) -> None:
         body = self.body
         waist, R_torso = found["torso"]
-        base_m = waist + rotate(R_torso, np.array((-0.012, 0.0, self._neck_base())))
+        neck_base = 0.838 * body.stature_m - body.hip_m - body.waist_m
+        base_m = waist + rotate(R_torso, np.array((-0.012, 0.0, neck_base)))
         eyes_about = base_m + 0.08 * self.ahead + (0.0, 0.0, body.neck_m + 0.05)
         rows = (len(self.t_s), 3)
         targets = {HEAD: np.broadcast_to(np.array(HEAD_M), rows), **eyes}
@@ -225,9 +228,6 @@ class BodyMotion:
         R_head = yaw_pitch_roll(yaw, pitch)
         found["neck"], found["head"] = (base_m, R_neck), (skull, R_head)
         self._face(found, skull, R_head, look)
-
-    def _neck_base(self) -> float:
-        return 0.838 * self.body.stature_m - self.body.hip_m - self.body.waist_m
 
     def _face(
         self, found: dict[str, Pose], skull: Floats, R_head: Floats, look: faces.Looks
@@ -325,7 +325,3 @@ class BodyMotion:
         shank = np.cross(unit(knee - ankle), plane)
         found[f"{name}_shank"] = (knee, axes_along(knee - ankle, shank))
         found[f"{name}_foot"] = (ankle, yaw_pitch_roll(yaw, -self.heel(foot)))
-
-
-def _row(p_m: Floats, R: Floats) -> Floats:
-    return np.concatenate((p_m, quaternions(R)), axis=1)

@@ -76,10 +76,11 @@ def body_segments(body: Measures, look: PersonLook, gloves: bool) -> Mapping[str
     fore = _limb(((0.0, 0.040), (0.25, 0.041), (0.7, 0.034), (0.96, 0.031)), k, body.forearm_m)
     thigh = _limb(((0.0, 0.086), (0.3, 0.082), (0.7, 0.067), (1.0, 0.058)), k, body.thigh_m)
     shank = _limb(((0.0, 0.058), (0.3, 0.060), (0.7, 0.048), (1.0, 0.044)), k, body.shank_m)
+    pelvis = loft([(z * k, x * k, a * k, b * k) for z, x, a, b in _PELVIS])
     found = {
-        "pelvis": painted(loft(_scaled(_PELVIS, k)), look.trousers),
+        "pelvis": painted(pelvis, look.trousers),
         "torso": _shirt(look, k),
-        "neck": painted(_neck(body.neck_m, k), _shaded(look.skin)),
+        "neck": painted(_neck(body.neck_m, k), _mixed(look.skin, (120, 60, 44), 0.18)),
     }
     right = boxing_glove(k) if gloves else _hand(look, k)
     for side in ("left", "right"):
@@ -119,10 +120,6 @@ _TORSO: tuple[Row, ...] = (
 _LEANS_M, _LEAN = 0.27, 0.52
 """Height from which the sections of a torso lean forward, and slope of the collar: the neck leaves
 the body lower in front than behind."""
-
-
-def _scaled(rows: Sequence[Row], k: float) -> list[Row]:
-    return [(z * k, x * k, a * k, b * k) for z, x, a, b in rows]
 
 
 def _fine(rows: Sequence[Row], each: int) -> list[Row]:
@@ -233,7 +230,3 @@ def ball() -> Painted:
 def _mixed(colour: Colour, other: Colour, share: float) -> Colour:
     r, g, b = (round(a + share * (o - a)) for a, o in zip(colour, other, strict=True))
     return r, g, b
-
-
-def _shaded(skin: Colour) -> Colour:
-    return _mixed(skin, (120, 60, 44), 0.18)

@@ -61,12 +61,3 @@ COMMANDS = CommandTable(
     "a body of the rig",
 )
 """Fault commands of a world."""
-
-
-def obey(world: World, text: str) -> str:
-    """Carry out one line; return what was done.
-
-    Raises:
-        ValueError: names the word that is wrong and what would be right.
-    """
-    return COMMANDS.obey(world, text)

@@ -8,7 +8,6 @@ import numpy as np
 from gazerig.features.world.body_shape import ball, body_segments, cup
 from gazerig.features.world.figure import SEGMENTS, Figures
 from gazerig.features.world.measures import Measures
-from gazerig.features.world.script import PersonScript
 from gazerig.gaze.types import Vec3
 from gazerig.robot.description.paint import Painted, moved
 from gazerig.robot.description.person_shape import WORLD_LOOKS, HeadSegments, head_segments
@@ -43,7 +42,9 @@ def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Pai
     """
     found: dict[str, Painted] = {}
     for name, person in figures.script.people.items():
-        parts = _person_shapes(person, figures.measures[name], fineness)
+        look, body = WORLD_LOOKS[person.look], figures.measures[name]
+        parts = _head_parts(head_segments(look, fineness), body)
+        parts |= body_segments(body, look, person.gloves)
         found |= {f"{name}/{segment}": parts[segment] for segment in SEGMENTS}
     for name, thing in figures.script.things.items():
         found[f"thing/{name}"] = cup() if thing.kind == "cup" else ball()
@@ -99,14 +100,6 @@ def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
         conaffinity=0,
         group=1,
     )
-
-
-def _person_shapes(person: PersonScript, body: Measures, fineness: float) -> dict[str, Painted]:
-    look = WORLD_LOOKS[person.look]
-    return {
-        **_head_parts(head_segments(look, fineness), body),
-        **body_segments(body, look, person.gloves),
-    }
 
 
 def _head_parts(head: HeadSegments, body: Measures) -> dict[str, Painted]:

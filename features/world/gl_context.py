@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from types import ModuleType
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Literal, TypeVar
 
 from gazerig.drivers.errors import SetupError
 
@@ -27,24 +27,12 @@ _chosen: Backend | None = None  # the first that worked: a process loads OpenGL 
 Made = TypeVar("Made")
 
 
-class Context(Protocol):
-    """An OpenGL context as MuJoCo's Python package has them."""
-
-    def as_current(self) -> Any:
-        """Return a context manager in which it is this thread's."""
-        ...
-
-    def free(self) -> None:
-        """Free it."""
-        ...
-
-
 class NoRenderer(SetupError):
     """No library can render here; the message lists what was tried and why each failed."""
 
 
-def open_context(make: Callable[[], Made]) -> tuple[Backend, Context, Made]:
-    """Return the first context in which something can be made while the context is current.
+def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
+    """Return the first library, its context, and what was made while the context was current.
 
     If the user has set MUJOCO_GL, only that library is tried.
 
@@ -134,11 +122,11 @@ def _candidates() -> tuple[Backend, ...]:
     return (_chosen,) if _chosen is not None else ("egl", "osmesa", "glfw")
 
 
-def _context(backend: Backend) -> Context:
+def _context(backend: Backend) -> Any:
+    """Return an OpenGL context of MuJoCo's Python package."""
     if backend == "glfw" and not any(os.environ.get(x) for x in ("DISPLAY", "WAYLAND_DISPLAY")):
         raise RuntimeError("there is no display")
-    context: Context = import_module(f"mujoco.{backend}").GLContext(64, 64)
-    return context
+    return import_module(f"mujoco.{backend}").GLContext(64, 64)
 
 
 def _forget_opengl() -> None:
@@ -163,8 +151,6 @@ def _line(error: Exception) -> str:
 
 def _message(why: dict[Backend, str]) -> str:
     tried = "; ".join(f"{backend}: {reason}" for backend, reason in why.items())
-    cures = " or ".join(_PACKAGES[backend] for backend in why if backend != "glfw")
-    if not cures:
-        cures = _PACKAGES["glfw"]
-        return f"no pictures of a world: nothing here can render ({tried}); cure: {cures}"
-    return f"no pictures of a world: nothing here can render ({tried}); cure: apt install {cures}"
+    packages = " or ".join(_PACKAGES[backend] for backend in why if backend != "glfw")
+    cure = f"apt install {packages}" if packages else _PACKAGES["glfw"]
+    return f"no pictures of a world: nothing here can render ({tried}); cure: {cure}"

@@ -46,15 +46,13 @@ def holders(script: WorldScript, timelines: Timelines, thing: str) -> list[Holde
 def receiving_acts(timelines: Timelines, name: str) -> list[TimedAct]:
     """Return the acts of a person that take things from others, with the hand on the same side."""
     return [
-        TimedAct(Act(one.act.at_s, "pass", giver, side=_taking(one.act)), one.start_s, one.end_s)
+        TimedAct(
+            Act(one.act.at_s, "pass", giver, side=_OTHER[one.act.side]), one.start_s, one.end_s
+        )
         for giver, acts in timelines.items()
         for one in acts
         if one.act.do == "pass" and one.act.to == name
     ]
-
-
-def _taking(act: Act) -> Side:
-    return _OTHER[act.side]
 
 
 def holding_share(t_s: Floats, found: Sequence[Holder], person: str, side: str) -> Floats:
@@ -108,7 +106,7 @@ def handover_faults(script: WorldScript, timelines: Timelines) -> Iterator[Fault
                 yield f"{key}.thing", f"{holder} holds {thing} then; let {holder} pass it"
             elif act.side != side:
                 yield f"{key}.side", f"{name} has {thing} in the {side} hand; write side: {side}"
-            holder, side = act.to, _taking(act)
+            holder, side = act.to, _OTHER[act.side]
         if (holder, side) != (first.held_by, first.side):
             yield (
                 f"things.{thing}.held_by",

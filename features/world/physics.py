@@ -1,7 +1,7 @@
 """The world in time: MuJoCo in steps of a millisecond, moved by the servos of its rigs."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -13,7 +13,7 @@ from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.hobby_shaft import WorldHobbyServo
 from gazerig.features.world.ideal_bus import IdealShaft
 from gazerig.features.world.model import WorldModel
-from gazerig.features.world.shaft import Effort, ShaftAxis, WorldShaft
+from gazerig.features.world.shaft import ShaftAxis, WorldShaft
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
@@ -61,24 +61,6 @@ class _Push(NamedTuple):
     until_ms: int
 
 
-class MovingShaft(Protocol):
-    """A shaft that the world moves."""
-
-    axis: ShaftAxis
-
-    def command(self) -> Effort:
-        """Return the effort of its motor in the next millisecond."""
-        ...
-
-    def sense(self, x: float, v: float) -> None:
-        """Set position (steps) and speed (steps/ms) to the results of the world."""
-        ...
-
-
-def _no_log(text: str) -> None:
-    """Drop a warning of MuJoCo: the world reads their counts."""
-
-
 class World:
     """A world that is simulated up to a time on demand.
 
@@ -98,14 +80,14 @@ class World:
         self._ctrl, self._qpos, self._qvel = self._data.ctrl, self._data.qpos, self._data.qvel
         self._gain, self._range = model.mj.actuator_biasprm[:, 2], model.mj.actuator_forcerange
         self._warned = self._data.warning.number
-        # By default MuJoCo writes a file into the user's folder.
-        mujoco.set_mju_user_warning(_no_log)
+        # By default MuJoCo writes its warnings to a file in the user's folder.
+        mujoco.set_mju_user_warning(lambda text: None)
         self._clock_s = clock_s
         self._ms = whole_ms(clock_s())
         self._begun_ms = self._ms
         self._busy = False
         self._devices: list[Device] = []
-        self._shafts: list[MovingShaft] = []
+        self._shafts: list[WorldShaft | IdealShaft] = []
         self._actuators: slice | NDArray[np.intp] = slice(0, 0)
         self._pushes: list[_Push] = []
         figures = model.figures
@@ -186,10 +168,7 @@ class World:
         self._actuators = np.array(numbers, dtype=np.intp)
         if numbers == list(range(first, first + len(numbers))):  # a slice is quicker
             self._actuators = slice(first, first + len(numbers))
-        self._settle_constants()
-
-    def _settle_constants(self) -> None:
-        """Let MuJoCo update the constants that depend on inertias: shafts now have rotors."""
+        # Let MuJoCo update the constants that depend on inertias: shafts now have rotors.
         kept = np.array(self._data.qpos), np.array(self._data.qvel)
         mujoco.mj_setConst(self._mj, self._data)
         self._data.qpos[:], self._data.qvel[:] = kept

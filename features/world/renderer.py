@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.features.world.gl_context import Backend, Context, open_context
+from gazerig.features.world.gl_context import Backend, open_context
 from gazerig.gaze.types import Floats
 from gazerig.params import Bounds
 from gazerig.robot.model.scene_view import Rendered
@@ -216,7 +216,7 @@ def _metres(z: NDArray[np.float32]) -> NDArray[np.float32]:
     return out
 
 
-def _free(context: Context, mjr: Any) -> None:
+def _free(context: Any, mjr: Any) -> None:
     with context.as_current():
         mjr.free()
     context.free()

@@ -1,7 +1,7 @@
 """A rig in a world: its body as MJCF, and the transmission from its servos to its joints."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from gazerig.robot.model.coupling import Coupling, Unreachable
 from gazerig.robot.model.transmission import Line, Linkage
@@ -11,21 +11,8 @@ RELINEARISE_RAD = 0.003
 position is less than 1e-5 rad with any rods of a neck."""
 
 
-class Transmission(Protocol):
-    """The transmission from one servo to the joints that it helps to turn.
-
-    line: of a linear transmission to one joint; else None
-    """
-
-    line: Line | None
-
-    def at(self, joints_rad: Sequence[float]) -> tuple[float, tuple[float, ...]]:
-        """Return the servo's position in steps, and the steps per radian of each joint."""
-        ...
-
-
 class JointTransmission:
-    """A servo that turns one joint."""
+    """A servo that turns one joint; line: of a linear transmission, else None."""
 
     def __init__(self, linkage: Linkage) -> None:
         self._linkage = linkage
@@ -78,6 +65,10 @@ class PairTransmission:
         slope = 1.0 / self._linkage.rate_rad(self._steps)
         self._slopes = slope * rates[0], slope * rates[1]
         self._at_rad = joints_rad
+
+
+Transmission = JointTransmission | PairTransmission
+"""The transmission from one servo to the joints that it helps to turn."""
 
 
 class ServoInWorld(NamedTuple):

@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from gazerig.features.world.commands import COMMANDS, obey
+from gazerig.features.world.commands import COMMANDS
 from gazerig.features.world.physics import World
 from gazerig.features.world.state_file import StateWriter
 from gazerig.features.world.world_spec import WorldSpec
@@ -57,7 +57,7 @@ class ServedWorld:
     def obey(self, text: str) -> str:
         """Carry out a command of the world; return {"ok": ...} or {"error": ...} as JSON."""
         try:
-            return json.dumps({"ok": obey(self.world, text)})
+            return json.dumps({"ok": COMMANDS.obey(self.world, text)})
         except ValueError as error:
             return json.dumps({"error": str(error)})
 

@@ -33,7 +33,7 @@ from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.model import world_model
 from gazerig.features.world.physics import World
-from gazerig.features.world.run.rig import rig_in_world
+from gazerig.features.world.run.run_world import rig_in_world
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app import run_bus
 from gazerig.robot.app.assemble import assemble

@@ -12,13 +12,12 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 from gazerig.config.load import load, shipped, shipped_names
 from gazerig.config.text import params_text
 from gazerig.drivers.errors import SetupError
+from gazerig.features.world import HOME
 from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.run.head_group import compose_group
 from gazerig.features.world.run.recorded_world import recorded_shapes, world_info
 from gazerig.features.world.script import WorldScript
-from gazerig.features.world.shapes import SpecShapes
-from gazerig.features.world.shapes_from import ShapesFrom
-from gazerig.features.world.shipped import HOME
+from gazerig.features.world.shapes import ShapesFrom, SpecShapes
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import compose, run
 from gazerig.robot.dashboard.feed.live_feed import (
@@ -29,8 +28,7 @@ from gazerig.robot.dashboard.feed.live_feed import (
     state_message,
 )
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.run_info import as_text
-from gazerig.robot.recording.world_info import WorldInfo, read_world_info
+from gazerig.robot.recording.run_info import WorldInfo, as_text, read_world_info
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 

@@ -11,12 +11,11 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.features.world.camera_params import WorldCameraParams
 from gazerig.features.world.gl_context import NoRenderer
-from gazerig.features.world.run.camera import WorldCamera
 from gazerig.features.world.run.poses import RigInState, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld, world_of
-from gazerig.features.world.run.sight import RenderedWorld, served_pixels
+from gazerig.features.world.run.sight import RenderedWorld, WorldCamera, served_pixels
+from gazerig.features.world.script import WorldCameraParams
 from gazerig.features.world.served_world import PUBLISH_MS, ServedWorld
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of

@@ -13,9 +13,13 @@ pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.
 from command_line import invoked
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world.run.deadline_stats import overload_message
 from gazerig.features.world.run.first_world import missing_requirement
-from gazerig.features.world.run.head_group import LinkedInterrupts, compose_group, has_other_heads
+from gazerig.features.world.run.head_group import (
+    LinkedInterrupts,
+    compose_group,
+    has_other_heads,
+    overload_message,
+)
 from gazerig.features.world.run.lockstep import Lockstep
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.options import RunOptions
@@ -166,9 +170,9 @@ def test_the_report_refuses_a_head_that_was_alone_and_one_head_twice() -> None:
     report = pytest.importorskip("gazerig.features.lab.report.heads").mutual_gaze_report
     here, there = HeadPlace(IDENTITY, (0.0, 0.0, 0.0)), HeadPlace(IDENTITY, (1.0, 0.0, 0.0))
     assert HeadPlace.of(there.numbers) == there
-    with pytest.raises(SetupError, match="^b is of a head that was alone"):
+    with pytest.raises(SetupError, match="^b is from a run with one head"):
         report(((), ()), (here.numbers, ()), ("a", "b"))
-    with pytest.raises(SetupError, match="are of one head"):
+    with pytest.raises(SetupError, match="are from the same head"):
         report(((), ()), (here.numbers, here.numbers), ("a", "b"))
     with pytest.raises(SetupError, match="no time in common"):
         report(((), ()), (here.numbers, there.numbers), ("a", "b"))

@@ -8,7 +8,7 @@ mujoco_or_skip()
 from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
-from gazerig.features.world.run.rig import rig_in_world, world_ideal_bus  # noqa: E402
+from gazerig.features.world.run.run_world import rig_in_world, world_ideal_bus  # noqa: E402
 
 MOVE = 800
 """Quarter microseconds that a servo is sent away, 18 deg."""

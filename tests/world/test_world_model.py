@@ -11,7 +11,7 @@ from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.drivers.errors import SetupError  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
-from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
+from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
 
 RIGS = ("desk", "expressive", "feetech", "maker", "minimal", "nine_xl330", "six_hobby", "six_xl330")
 

@@ -9,10 +9,10 @@ from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run, write
 mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.commands import obey  # noqa: E402
+from gazerig.features.world.commands import COMMANDS  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
-from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
+from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
 from gazerig.features.world.world_spec import WorldSpec  # noqa: E402
 from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
 from gazerig.robot.control.tick import Tick  # noqa: E402
@@ -180,7 +180,9 @@ def test_a_push_can_be_typed() -> None:
     """With a direction as the rig stands; half a second where no time is given."""
     bench = _held()
     before = bench.world.joints_rad()["neck_yaw"]
-    assert obey(bench.world, "push head 10 left") == "head is pushed left with 10 N for 0.5 s"
+    assert (
+        COMMANDS.obey(bench.world, "push head 10 left") == "head is pushed left with 10 N for 0.5 s"
+    )
     bench.pass_ms(300)
     assert bench.world.joints_rad()["neck_yaw"] > before + 0.02
 
@@ -198,7 +200,7 @@ def test_a_push_can_be_typed() -> None:
 def test_a_push_that_cannot_be_is_refused_with_what_would_be_right(text: str, message: str) -> None:
     """The usage follows."""
     with pytest.raises(ValueError, match=message):
-        obey(_held().world, text)
+        COMMANDS.obey(_held().world, text)
 
 
 def test_two_heads_are_pushed_each_by_its_own_name_and_its_own_left() -> None:
@@ -211,7 +213,7 @@ def test_two_heads_are_pushed_each_by_its_own_name_and_its_own_left() -> None:
     now_s = [0.0]
     world = World(world_model(None, rigs), lambda: now_s[0])
     before = [world.joints_rad(0)["neck_yaw"], world.joints_rad(1)["neck_yaw"]]
-    obey(world, "push other_head 3 left 0.2")
+    COMMANDS.obey(world, "push other_head 3 left 0.2")
     world.advance(300)
     assert world.joints_rad(0)["neck_yaw"] == pytest.approx(before[0], abs=1e-6)
     assert world.joints_rad(1)["neck_yaw"] > before[1] + 0.02

@@ -18,7 +18,7 @@ from gazerig.config.schema import Rig, load_rig  # noqa: E402
 from gazerig.features.world.figure import Figures  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
-from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
+from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
 from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
 
 

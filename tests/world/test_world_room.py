@@ -16,7 +16,7 @@ from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.room import ROOMS  # noqa: E402
 from gazerig.features.world.room_model import add_room  # noqa: E402
 from gazerig.features.world.room_paint import PICTURES, texture  # noqa: E402
-from gazerig.features.world.run.rig import rig_in_world  # noqa: E402
+from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
 
 _BETWEEN_M = 0.03
 """Shapes that collide are a little larger than what is seen; hands may touch."""

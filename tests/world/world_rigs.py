@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.features.world.run.rig import rig_in_world
+from gazerig.features.world.run.run_world import rig_in_world
 from gazerig.robot.app import run_bus
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import bus_names

@@ -4,17 +4,15 @@ The end of one head ends all: each parks and releases its servos.
 """
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gazerig.features.world.heads_scene import HeadsScene, RigFrame
-from gazerig.features.world.run.deadline_stats import overload_message
 from gazerig.features.world.run.run_world import world_of, world_scene
 from gazerig.features.world.run.shared_world import (
-    FacePoseSource,
     RealTimeWorld,
     SharedWorld,
     SimulatedWorld,
@@ -25,8 +23,41 @@ from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.loop_timing import BUSY_SHARE
 from gazerig.robot.control.tick import Tick
-from gazerig.sim_mock.scenes.scene import Scene
+
+_SHORTEST_S = 3.0
+"""A shorter run gives no statistics."""
+_ENOUGH = 0.7
+"""With a smaller share of the pictures a head reacts visibly later."""
+
+
+def overload_message(
+    runs: Iterable[tuple[str, Mapping[str, Any] | None]], pictures_hz: float, rendered: bool
+) -> str:
+    """Return a line with the heads that could not keep up in real time, "" if all did.
+
+    Args:
+        runs: name of each head and the figures of its run, None if it did not begin.
+        pictures_hz: requested pictures a second.
+        rendered: whether pictures were rendered, so that the user can disable them.
+    """
+    slow = []
+    for name, figures in runs:
+        if figures is None or figures["seconds"] < _SHORTEST_S:
+            continue
+        late = figures["overruns"] / max(1, figures["ticks"] + figures["overruns"])
+        seen_hz = figures["pictures"] / figures["seconds"]
+        if late >= BUSY_SHARE or seen_hz < _ENOUGH * pictures_hz:
+            slow.append(
+                f"{name}: {late:.0%} of ticks late, {seen_hz:.0f} of {pictures_hz:.0f} pictures "
+                "a second"
+            )
+    if not slow:
+        return ""
+    less = "; --no-pictures reduces the load" if rendered else ""
+    return f"the computer is too busy for these heads ({'; '.join(slow)}){less}"
+
 
 FIRST = "first"
 
@@ -78,7 +109,9 @@ def compose_group(options: RunOptions) -> "HeadGroup":
         for number, ((name, rig), one) in enumerate(zip(rigs, each, strict=True)):
             frame = world.frames[number]
             faced = [face for n, face in enumerate(faces) if n != number]
-            room = world.room(number, rig, one, partial(_head_scene, frame, faced, number == 0))
+            room = world.room(
+                number, rig, one, partial(HeadsScene, frame=frame, faces=faced, first=number == 0)
+            )
             members.append(_Member(name, compose(one, room=room), frame))
     except BaseException:
         for member in members:
@@ -97,13 +130,6 @@ def _link(members: Sequence[_Member]) -> list[_Member]:
     # The process has one parameter store and one remote control: those of the first head.
     alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in others]
     return [first._replace(composed=first.composed._replace(made=made)), *alone]
-
-
-def _head_scene(
-    frame: RigFrame, faces: Sequence[FacePoseSource], first: bool, people: Scene
-) -> HeadsScene:
-    """Return the scene before a head: the people and the other heads, in the head's frame."""
-    return HeadsScene(people, frame, faces, first)
 
 
 def _other_options(options: RunOptions, name: str, number: int, rig: str) -> RunOptions:

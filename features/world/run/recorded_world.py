@@ -13,12 +13,11 @@ from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.run.run_world import mjcf_of, world_script
 from gazerig.features.world.script import WorldScript
 from gazerig.features.world.script_faults import CHECKS
-from gazerig.features.world.shapes import script_shapes
-from gazerig.features.world.shapes_from import ShapesFrom
+from gazerig.features.world.shapes import ShapesFrom, script_shapes
 from gazerig.robot.analysis.mutual_gaze import HeadPlace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.world_shapes import WorldShapes
-from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.robot.recording.run_info import WorldInfo
 
 
 def world_info(options: RunOptions, seed: int) -> WorldInfo | None:

@@ -12,8 +12,7 @@ from gazerig.drivers.types import Camera
 from gazerig.features.world.other_heads import HeadInState, OtherHeads
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
 from gazerig.features.world.run.recorded_world import world_info
-from gazerig.features.world.run.rig import world_ideal_bus
-from gazerig.features.world.run.run_world import RunWorld, ServedRig
+from gazerig.features.world.run.run_world import RunWorld, ServedRig, world_ideal_bus
 from gazerig.features.world.run.sight import RenderedWorld, world_camera
 from gazerig.features.world.shapes import shapes_of
 from gazerig.features.world.world_spec import state_file
@@ -28,7 +27,7 @@ from gazerig.robot.app.run_parts import RunBus, Sight
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraParams
-from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.robot.recording.run_info import WorldInfo
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 from gazerig.sim_mock.scenes.scene import Scene
 

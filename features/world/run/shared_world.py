@@ -8,7 +8,6 @@ control loop uses its own terminals, on the host's clock.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
@@ -19,7 +18,7 @@ from gazerig.features.world.run.rig_room import RigRoom, served_room, simulated_
 from gazerig.features.world.run.run_world import RunWorld, ServedRig
 from gazerig.features.world.world_spec import state_file
 from gazerig.gaze.angles import add, rotate, rotation
-from gazerig.gaze.types import Mat3, Vec3
+from gazerig.gaze.types import Vec3
 from gazerig.robot.analysis.mutual_gaze import HeadPlace
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
@@ -32,14 +31,6 @@ from gazerig.sim_mock.scenes.scene import Scene
 SceneOfHead = Callable[[Scene], Scene]
 
 
-class HeadPoseSource(Protocol):
-    """True pose of a head."""
-
-    def head(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Return current rotation and position of the head in the frame of its neck base."""
-        ...
-
-
 @dataclass(frozen=True)
 class FacePoseSource:
     """Source of the current pose of a face in the world; can be sent to another process.
@@ -50,7 +41,7 @@ class FacePoseSource:
         nose_m: tip of its nose in the head's own frame.
     """
 
-    poses: HeadPoseSource
+    poses: WorldPoses | SimulatedPoses
     frame: RigFrame
     nose_m: Vec3
 
@@ -60,46 +51,10 @@ class FacePoseSource:
         return HeadFace(R, add(p_m, rotate(R, self.nose_m)))
 
 
-class SharedWorld(Protocol):
-    """The world of a group of heads; the number of a head is the number of its rig in the world."""
-
-    frames: Sequence[RigFrame]
-    """Pose of the neck base of each head."""
-
-    def face(self, number: int, rig: Rig) -> FacePoseSource:
-        """Return a source of the current pose of a head's face."""
-        ...
-
-    def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
-        """Return the world from the view of one of the heads.
-
-        Args:
-            number: of the head.
-            rig: of the head.
-            options: of its run.
-            before: returns the scene before the head, given the world's people.
-        """
-        ...
-
-    def clock(self, number: int) -> Clock:
-        """Return a head's clock."""
-        ...
-
-    def enter(self, number: int) -> None:
-        """Wait until a head may begin, in its own thread."""
-        ...
-
-    def leave(self, number: int) -> None:
-        """Let the other heads continue without this one; safe to call twice."""
-        ...
-
-    def close(self) -> None:
-        """End the world after all heads have left; safe to call twice."""
-        ...
-
-
 class SimulatedWorld:
     """The world of several heads in this process, on one simulated clock.
+
+    The number of a head is the number of its rig in the world.
 
     Args:
         found: the world.
@@ -120,10 +75,17 @@ class SimulatedWorld:
         return FacePoseSource(poses, self.frames[number], _nose_m(rig))
 
     def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
-        """Return the world from the view of one of the heads."""
+        """Return the world from the view of one of the heads.
+
+        Args:
+            number: of the head.
+            rig: of the head.
+            options: of its run.
+            before: returns the scene before the head, given the world's people.
+        """
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands, clock = _pose_numbers(self.frames[number]), self.clock(number)
-        return simulated_room(rig, options, clock, world, self._world, stands)
+        stands = HeadPlace(*self.frames[number]).numbers
+        return simulated_room(rig, options, self.clock(number), world, self._world, stands)
 
     def clock(self, number: int) -> Clock:
         """Return a head's clock."""
@@ -174,10 +136,11 @@ class RealTimeWorld:
 
     def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
         """Return the world from the view of one of the heads."""
-        served = ServedRig(self._buses, self._paths[number], _keep_running)
+        # Other heads use the world until ``close`` ends it.
+        served = ServedRig(self._buses, self._paths[number], lambda: None)
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands, clock = _pose_numbers(self.frames[number]), self.clock(number)
-        return served_room(rig, options, clock, world, served, stands)
+        stands = HeadPlace(*self.frames[number]).numbers
+        return served_room(rig, options, self.clock(number), world, served, stands)
 
     def clock(self, number: int) -> Clock:
         """Return the host's clock."""
@@ -194,12 +157,8 @@ class RealTimeWorld:
         self._buses.stop()
 
 
-def _pose_numbers(frame: RigFrame) -> tuple[float, ...]:
-    return HeadPlace(frame.R, frame.p_m).numbers
-
-
-def _keep_running() -> None:
-    """Do nothing: other heads use the world until ``close`` ends it."""
+SharedWorld = SimulatedWorld | RealTimeWorld
+"""The world of a group of heads."""
 
 
 def _nose_m(rig: Rig) -> Vec3:

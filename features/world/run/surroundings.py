@@ -2,12 +2,12 @@
 
 from gazerig.config.rig import Rig
 from gazerig.config.shipped import shipped_names
-from gazerig.features.world.shipped import HOME
+from gazerig.features.world import HOME
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.surroundings import GroupRun, RunRoom, Surroundings
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.robot.recording.run_info import WorldInfo
 from gazerig.sim_mock.scenes.scene import Scene
 
 
