@@ -1,7 +1,7 @@
 """Bodies about a head that attends to them."""
 
 from math import radians
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gazerig.gaze.attention.idle import Idle, IdleParams
 from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gazerig.gaze.types import Bodies, GazeState, Percept
+from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Vec3
 
 IDENTITY = rotation((0.0, 0.0, 0.0))
 
@@ -49,6 +49,31 @@ def percept(t: float, *rows: tuple[int, str, tuple[float, ...], tuple[float, ...
             np.full(n, 0.1),
         ),
     )
+
+
+class Terms(NamedTuple):
+    """Salience of n bodies, term by term: (n,) arrays."""
+
+    translation: Floats
+    looming: Floats
+    rotation: Floats
+    onset: Floats
+    total: Floats
+
+
+def salience(
+    model: BottomUp,
+    seen: Bodies,
+    eye: Vec3,
+    t_s: float,
+    v_eye: Vec3 = (0.0, 0.0, 0.0),
+    gaze: Vec3 = (1.0, 0.0, 0.0),
+    in_view: bool = True,
+) -> Terms:
+    n = len(seen)
+    limits = [model.limit()] * n
+    rows = model.step(seen.rows(), eye, t_s, v_eye, gaze, [in_view] * n, limits, [1.0] * n)
+    return Terms(*np.array(rows).reshape(-1, 5).T)
 
 
 def attention(**params: Any) -> Attention:

@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 from itertools import groupby
-from math import cos, exp, radians, sin
+from math import cos, exp, inf, radians, sin
 from typing import Literal
 
 import numpy as np
 import pytest
-from attention_scene import FACE, UNBOUNDED, attention, body, looking, percept, waving
+from attention_scene import FACE, UNBOUNDED, attention, body, looking, percept, salience, waving
 
 from gazerig.gaze.attention.attention import Attention
-from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms
+from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms, saturate
 from gazerig.gaze.attention.idle import Idle, IdleParams
 from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
@@ -20,16 +20,22 @@ from gazerig.gaze.types import Bodies, Percept
 
 def test_e45_eq_1_does_not_depend_on_the_length_of_e() -> None:
     rng = np.random.default_rng(1)
-    v, w, e = rng.normal(size=(3, 40, 3))
-    once, fivefold = motion_terms(v, w, e), motion_terms(v, w, 5.0 * e)
-    for a, b in zip(once, fivefold, strict=True):
-        assert np.abs(a - b).max() <= 1e-9
+    for v, w, e in rng.normal(size=(40, 3, 3)):
+        assert motion_terms(v, w, 5.0 * e) == pytest.approx(motion_terms(v, w, e), abs=1e-9)
 
 
 def test_terms_of_eq_1_are_translation_looming_and_rotation() -> None:
-    v, w = np.array([[1.0, 2.0, 0.0]]), np.array([[3.0, 0.0, 4.0]])
-    translation, looming, rotation = motion_terms(v, w, np.array([2.0, 0.0, 0.0]))
-    assert (translation[0], looming[0], rotation[0]) == pytest.approx((2.0, 1.0, 3.0))
+    v, w, ahead = (1.0, 2.0, 0.0), (3.0, 0.0, 4.0), (2.0, 0.0, 0.0)
+    assert motion_terms(v, w, ahead) == pytest.approx((2.0, -1.0, 3.0))
+    assert motion_terms((-1.0, 2.0, 0.0), w, ahead) == pytest.approx((2.0, 1.0, 3.0))
+
+
+def test_motion_saturates_unless_it_comes_nearer_fast() -> None:
+    assert saturate(0.2, -0.3, 0.5, inf, 0.5) == pytest.approx(0.5)
+    bounded = 0.35 * (1.0 - exp(-1.0 / 0.35))
+    assert saturate(0.2, -0.3, 0.5, 0.35, 1.0) == pytest.approx(bounded)
+    assert saturate(0.0, 2.0, 0.0, 0.35, 0.5) == pytest.approx(0.5 * (1.0 + bounded))
+    assert saturate(0.0, 9.0, 0.0, 0.35, 1.0) == pytest.approx(2.0 + bounded)
 
 
 def test_far_motion_pulls_less_than_near_motion() -> None:
@@ -37,7 +43,7 @@ def test_far_motion_pulls_less_than_near_motion() -> None:
     seen = percept(
         0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)), body(2, "hand", (4, 0, 0), (0, 1, 0))
     )
-    total = model.step(seen.bodies, (0, 0, 0), 0.0).total
+    total = salience(model, seen.bodies, (0, 0, 0), 0.0).total
     assert total[0] == pytest.approx(4.0 * total[1]) and total[0] == pytest.approx(2.0)
 
 
@@ -47,7 +53,7 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
     spins = np.array([[0.0, 0, 0], [-6.0, 0, 0], [0, 6.0, 0]])
     turning = replace(things.bodies, w_world_rad_s=spins)
     params = replace(UNBOUNDED, onset_salience=0.0)
-    found = BottomUp(params).step(turning, (0, 0, 0), 0.0)
+    found = salience(BottomUp(params), turning, (0, 0, 0), 0.0)
     expected = 6.0 / params.rotation_reference_rad_s
     assert found.rotation == pytest.approx([0.0, expected, 0.0])
     assert found.total == pytest.approx([0.0, expected, 0.0])
@@ -74,7 +80,7 @@ def test_pulls_rise_with_the_time_constant() -> None:
     model = BottomUp(replace(UNBOUNDED, smoothing_s=0.1))
     seen = percept(0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(11):
-        total = model.step(seen.bodies, (0, 0, 0), k * 0.01).total
+        total = salience(model, seen.bodies, (0, 0, 0), k * 0.01).total
     assert total[0] == pytest.approx(2.0 * (1.0 - np.exp(-1.0)), rel=0.02)
 
 
@@ -249,19 +255,19 @@ def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
     seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))
     seen = replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
     for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
-        saliences = model.step(seen, (0, 0, 0), 0.0, (1.0, 1.0, 1.0), gaze)
+        saliences = salience(model, seen, (0, 0, 0), 0.0, (1.0, 1.0, 1.0), gaze)
         for term, value in zip(saliences, (2.0, 1.0, 3.0, 0.0, 6.0), strict=True):
             assert term.tolist() == [value, value]
-    aside = model.step(seen, (0, 0, 0), 0.0, gaze_world=(0.0, 1.0, 0.0))
+    aside = salience(model, seen, (0, 0, 0), 0.0, gaze=(0.0, 1.0, 0.0))
     assert (aside.translation[0], aside.looming[0], aside.rotation[0]) == (1.0, 2.0, 0.0)
 
 
 def test_retinal_form_is_relative_to_the_moving_eye() -> None:
     model = BottomUp(UNBOUNDED)
     seen = bodies(body(1, "x", (2, 0, 0), (0, 1, 0)), body(2, "x", (2, 0, 0)))
-    with_it = model.step(seen, (0, 0, 0), 0.0, (0, 1, 0))
+    with_it = salience(model, seen, (0, 0, 0), 0.0, (0, 1, 0))
     assert with_it.total.tolist() == [0.0, 1.0]  # what stands still slides by 0.5 rad/s
-    coming = model.step(seen, (0, 0, 0), 0.0, (2, 0, 0))
+    coming = salience(model, seen, (0, 0, 0), 0.0, (2, 0, 0))
     assert coming.looming.tolist() == [2.0, 2.0]
 
 
@@ -279,20 +285,20 @@ def test_what_has_just_come_into_view_pulls_and_that_wears_off() -> None:
     model = BottomUp(BottomUpParams(onset_salience=0.8, onset_s=0.5))
     first, second = body(1, "x", (1, 0, 0)), body(2, "x", (1, 0.3, 0))
     for k in range(11):
-        assert model.step(bodies(first), (0, 0, 0), k / 10).onset.tolist() == [0.0]
+        assert salience(model, bodies(first), (0, 0, 0), k / 10).onset.tolist() == [0.0]
     for age in (0.0, 0.25, 0.5, 0.75, 1.0):
-        onset = model.step(bodies(second, first), (0, 0, 0), 1.0 + age).onset
+        onset = salience(model, bodies(second, first), (0, 0, 0), 1.0 + age).onset
         assert onset.tolist() == pytest.approx([0.8 * exp(-age / 0.5), 0.0])
     model.reset(9.0)
-    assert model.step(bodies(second), (0, 0, 0), 9.0).onset.tolist() == [0.0]
+    assert salience(model, bodies(second), (0, 0, 0), 9.0).onset.tolist() == [0.0]
 
 
 def test_nothing_is_new_in_the_first_moments_but_later_after_an_empty_view() -> None:
     for arrives, onset in ((0.2, 0.0), (0.4, 1.0)):
         model = BottomUp(UNBOUNDED)
         for k in range(round(arrives * 20)):
-            model.step(bodies(), (0, 0, 0), k / 20)
-        assert model.step(bodies(FACE), (0, 0, 0), arrives).onset.tolist() == [onset]
+            salience(model, bodies(), (0, 0, 0), k / 20)
+        assert salience(model, bodies(FACE), (0, 0, 0), arrives).onset.tolist() == [onset]
 
 
 @pytest.mark.parametrize(("from_s", "onset"), [(0.3, 0.0), (0.7, 1.0)])
@@ -302,7 +308,7 @@ def test_what_moves_in_the_first_moments_has_not_just_begun_to(from_s: float, on
     for k in range(20):
         speed = 1.0 if k / 20 >= from_s else 0.0
         seen = bodies(body(1, "hand", (1.0, 0.0, 0.0), (0.0, speed, 0.0)))
-        found.append(float(model.step(seen, (0, 0, 0), k / 20).onset[0]))
+        found.append(float(salience(model, seen, (0, 0, 0), k / 20).onset[0]))
     assert max(found) == pytest.approx(onset)
 
 
@@ -312,14 +318,14 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
     model = BottomUp(replace(UNBOUNDED, smoothing_s=1.0))
     moving = bodies(body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(21):
-        before = model.step(moving, (0, 0, 0), k / 10).translation[0]
+        before = salience(model, moving, (0, 0, 0), k / 10).translation[0]
     gone = 2.0
     while (gone := gone + 0.05) < 2.0 + gap_s - 1e-9:
         if how == "missed":
-            model.step(bodies(), (0, 0, 0), gone)
+            salience(model, bodies(), (0, 0, 0), gone)
         else:
-            model.step(moving, (0, 0, 0), gone, seen=np.array([False]))
-    back = model.step(moving, (0, 0, 0), 2.0 + gap_s)
+            salience(model, moving, (0, 0, 0), gone, in_view=False)
+    back = salience(model, moving, (0, 0, 0), 2.0 + gap_s)
     assert back.onset.tolist() == [onset]
     if how == "missed":
         assert bool(back.translation[0] > 0.5 * before) is (onset == 0.0)
@@ -328,12 +334,30 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
 def test_nothing_is_new_after_a_pause_of_the_camera() -> None:
     model = BottomUp(UNBOUNDED)
     for k in range(11):
-        model.step(bodies(FACE), (0, 0, 0), k / 10)
-    back = model.step(bodies(FACE, body(8, "face", (1, 1, 0))), (0, 0, 0), 3.0)
+        salience(model, bodies(FACE), (0, 0, 0), k / 10)
+    back = salience(model, bodies(FACE, body(8, "face", (1, 1, 0))), (0, 0, 0), 3.0)
     assert back.onset.tolist() == [0.0, 0.0]
 
 
-def test_arrays_remember_what_a_memory_body_by_body_would() -> None:
+def test_a_pause_of_the_camera_keeps_smoothed_motion() -> None:
+    model, moving = (
+        BottomUp(replace(UNBOUNDED, smoothing_s=2.0)),
+        body(1, "x", (1, 0, 0), (0, 1, 0)),
+    )
+    for k in range(100):
+        before = salience(model, bodies(moving), (0, 0, 0), k / 10).translation[0]
+    still = salience(model, bodies(body(1, "x", (1, 0, 0))), (0, 0, 0), 10.4)
+    assert still.translation[0] == pytest.approx(before * exp(-0.5 / 2.0))
+
+
+def test_states_of_former_bodies_are_dropped() -> None:
+    model = BottomUp(UNBOUNDED)
+    for k in range(500):
+        salience(model, bodies(body(k, "x", (1, 0, 0))), (0, 0, 0), k / 10)
+    assert len(model._states) < 25
+
+
+def test_states_are_kept_by_body() -> None:
     """Bodies come, go, and change places in the list; each keeps its own low-pass."""
     rng = np.random.default_rng(5)
     model, tau = BottomUp(replace(UNBOUNDED, smoothing_s=0.2)), 0.2
@@ -343,7 +367,7 @@ def test_arrays_remember_what_a_memory_body_by_body_would() -> None:
         ids = rng.permutation(40)[: rng.integers(0, 40)].tolist()
         speeds = rng.uniform(0, 2, len(ids)).tolist()
         rows = [body(i, "x", (1, 0, 0), (0, v, 0)) for i, v in zip(ids, speeds, strict=True)]
-        saliences = model.step(bodies(*rows), (0, 0, 0), t)
+        saliences = salience(model, bodies(*rows), (0, 0, 0), t)
         for row, (i, v) in enumerate(zip(ids, speeds, strict=True)):
             past, entered, seen = known.get(i, (0.0, 0.0, -9.0))
             if t - seen > 0.3:
@@ -362,10 +386,10 @@ def test_many_bodies_at_once_are_as_one_by_one() -> None:
     crowd = Bodies(ids, ("x",) * n, p, v, w, np.full(n, 0.1))
     state = looking(20.0)
     view, model = FieldOfView(FieldOfViewParams()), BottomUp(UNBOUNDED)
-    seen, total = view.visible(crowd, state), model.step(crowd, (0, 0, 0), 0.0).total
+    seen, total = view.visible(crowd, state), salience(model, crowd, (0, 0, 0), 0.0).total
     for i in range(0, n, 997):
         alone = Bodies((1,), ("x",), p[i : i + 1], v[i : i + 1], w[i : i + 1], np.full(1, 0.1))
-        one = BottomUp(UNBOUNDED).step(alone, (0, 0, 0), 0.0).total[0]
+        one = salience(BottomUp(UNBOUNDED), alone, (0, 0, 0), 0.0).total[0]
         assert view.visible(alone, state)[0] == seen[i] and one == pytest.approx(total[i])
 
 

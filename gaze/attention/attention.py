@@ -197,7 +197,7 @@ class Attention:
         n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
         seen = self._field_of_view.visible_rows(bodies, rows, state)
         v_eye = self._eye_velocity(eye, t_s)
-        motion = self._bottom_up.step_rows(
+        motion = self._bottom_up.step(
             rows, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
         )
         rule_target = self.top_down.step_rows(rows, seen, eye)
@@ -236,15 +236,16 @@ class Attention:
         n, eye = len(bodies), state.p_world_head_m
         seen = self._field_of_view.visible(bodies, state)
         v_eye = self._eye_velocity(eye, t_s)
+        limits = self._motion_limits(bodies)
         motion = self._bottom_up.step(
-            bodies, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
+            bodies.rows(), eye, t_s, v_eye, self._gaze(state), seen.tolist(), *limits
         )
         rule_target = self.top_down.step(bodies, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
         habituation, rule = np.ones(n + 1), np.zeros(n + 1)
         left = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
         habituation[:n] = left * worth
-        amount = np.append(motion.total, 0.0)
+        amount = np.array([*[terms.total for terms in motion], 0.0])
         if rule_target is not None:
             rows = rule_target.rows if rule_target.point_world_m is None else np.array([n])
             rule[rows] = rule_target.salience
@@ -258,7 +259,7 @@ class Attention:
         best = int(total.argmax())
         plan = self.top_down.plan_text
         return TargetComparison(
-            bodies, motion.row, rule_target, rule, habituation, total, best, plan
+            bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
         )
 
     def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:

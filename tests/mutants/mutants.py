@@ -22,7 +22,7 @@ class Mutant(NamedTuple):
 
 MUTANTS = (
     # ---- gaze: attention
-    Mutant("gaze/attention/bottom_up.py", "total, bound = slide + rest + spin, ", "total, bound = slide + rest, ",
+    Mutant("gaze/attention/bottom_up.py", "- max(loom - _FAST, 0.0) + spin", "- max(loom - _FAST, 0.0)",
            "eq 1 without its third term, spin", ("attention", "attention_choice")),
     Mutant("gaze/attention/bottom_up.py", "worth * (exempt - expm1", "worth * (-expm1",
            "what comes nearer fast saturates like other motion", ("behaviours",)),
@@ -36,10 +36,10 @@ MUTANTS = (
            "what spins is not perceived to", ("group_scenes",)),
     Mutant("sim_mock/cameras/detections.py", "thing.radius_m, thing.spin_rad_s),)", "thing.radius_m),)",
            "the camera of a scene does not see a spin", ("group_scenes",)),
-    Mutant("gaze/attention/bottom_up.py", "raw.looming / (distance * par", "raw.looming / (par",
+    Mutant("gaze/attention/bottom_up.py", "loom / (distance * par", "loom / (par",
            "far things that come nearer draw as much as near ones", ("attention", "attention_choice")),
-    Mutant("gaze/attention/bottom_up.py", "np.exp((entered_s - t_s) / self._params.onset_s)",
-           "np.exp((entered_s - t_s) / 10.0)", "what appeared draws the gaze for ever",
+    Mutant("gaze/attention/bottom_up.py", "exp((state.entered_s - t_s) / par.onset_s)",
+           "exp((state.entered_s - t_s) / 10.0)", "what appeared draws the gaze for ever",
            ("attention", "attention_choice", "habituation")),
     Mutant("gaze/attention/habituation.py", "habituation *= factor", "habituation *= 1.0",
            "no inhibition of return", ("habituation",)),
