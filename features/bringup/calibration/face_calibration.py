@@ -92,8 +92,11 @@ def initial_calibration(own_mm: Mapping[str, Vec3]) -> FaceCalibration:
 
     own_mm: part -> place in the face frame, as under ``face_parts_mm`` of a rig file
     """
-    starts = tuple(own_mm[part] if part in own_mm else _usual_mm(part) for part in ORDER)
-    return FaceCalibration(starts, starts)
+    starts = [
+        own_mm[part] if part in own_mm else _tenths((x * 1e3, y * 1e3, z * 1e3))
+        for part, (x, y, z) in ((part, PARTS_FACE_M[part]) for part in ORDER)
+    ]
+    return FaceCalibration(tuple(starts), tuple(starts))
 
 
 def apply_key(state: FaceCalibration, key: Key) -> FaceCalibration:
@@ -139,11 +142,6 @@ def changes(state: FaceCalibration) -> dict[str, Vec3]:
         for part in ORDER
         if part in state.chosen
     }
-
-
-def _usual_mm(part: str) -> Vec3:
-    x, y, z = PARTS_FACE_M[part]
-    return _tenths((x * 1e3, y * 1e3, z * 1e3))
 
 
 def _tenths(place_mm: Vec3) -> Vec3:

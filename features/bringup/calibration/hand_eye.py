@@ -160,11 +160,11 @@ def camera_on_head(
     _judge(fit, par, width_px)
     spread = fit.spread()
     return HandEye(
-        _mat3(fit.guess.camera.R),
-        _vec3(fit.guess.camera.p),
-        _mat3(fit.guess.board.R),
-        _vec3(fit.guess.board.p),
-        fit.guess.lens(lens),
+        _mat3(fit.estimate.camera.R),
+        _vec3(fit.estimate.camera.p),
+        _mat3(fit.estimate.board.R),
+        _vec3(fit.estimate.board.p),
+        fit.estimate.lens(lens),
         fit.rms_px,
         tuple(fit.view_rms_px.tolist()),
         fit.corner_px,
@@ -226,25 +226,27 @@ def _judge(fit: Fit, params: HandEyeParams, width_px: int) -> None:
 def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: HandEyeParams) -> Fit:
     """Refine the start that explains the frames best."""
     centre_px = params.centre_error_px * width_px / _WIDTH_PX
-    sights = Observations.of(
+    observations = Observations.of(
         [(v.R_world_head, v.p_world_head_m, v.seen) for v in views],
         lens,
         np.array((params.lens_error_percent / 100.0, centre_px, centre_px)),
         radians(params.joint_error_deg),
     )
-    starts = sorted(_starts(views, lens), key=lambda found: _off(sights, *found))
+    starts = sorted(_starts(views, lens), key=lambda found: _off(observations, *found))
     if not starts:
         raise CameraCalibrationRefused(
             "the images of the board do not agree with any place of the camera: see that "
             "board, lens and joints are the ones calibrated"
         )
-    best = refine(sights, first_estimate(sights, *starts[0]))
+    best = refine(observations, first_estimate(observations, *starts[0]))
     if not best.corner_px < _DOUBTFUL_PX:
-        others = [refine(sights, first_estimate(sights, *other)) for other in starts[1:]]
+        others = [
+            refine(observations, first_estimate(observations, *other)) for other in starts[1:]
+        ]
         best = min((best, *others), key=lambda fit: fit.cost)
     # Joints that proved better than usual are trusted more.
     proven = min(max(best.joint_error_deg, _BEST_JOINT_DEG), params.joint_error_deg)
-    return refine(sights._replace(joint_error_rad=radians(proven)), best.guess)
+    return refine(observations._replace(joint_error_rad=radians(proven)), best.estimate)
 
 
 def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pose]]:
@@ -270,9 +272,9 @@ def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pos
     return found
 
 
-def _off(sights: Observations, camera: Pose, board: Pose) -> float:
+def _off(observations: Observations, camera: Pose, board: Pose) -> float:
     """Return the usual reprojection error of a start, by which starts are compared."""
-    errors = np.abs(sights.errors(first_estimate(sights, camera, board)))
+    errors = np.abs(observations.errors(first_estimate(observations, camera, board)))
     return float(np.median(np.where(np.isfinite(errors), errors, inf)))
 
 

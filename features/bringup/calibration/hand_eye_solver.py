@@ -130,36 +130,36 @@ class Observations(NamedTuple):
             joint_error_rad,
         )
 
-    def errors(self, guess: Estimate) -> Floats:
+    def errors(self, estimate: Estimate) -> Floats:
         """Return by how much each corner is seen off: (2 n,) pixels, nan behind the camera."""
-        world = self.corners_board_m @ guess.board.R.T + guess.board.p
+        world = self.corners_board_m @ estimate.board.R.T + estimate.board.p
         head = np.einsum("nji,nj->ni", self.R_world_head, world - self.p_world_head_m)
         # The turns are so small that their squares do not count.
-        head -= np.cross(guess.turns_rad[self.view], head)
-        shown = project((head - guess.camera.p) @ guess.camera.R, guess.lens(self.lens))
+        head -= np.cross(estimate.turns_rad[self.view], head)
+        shown = project((head - estimate.camera.p) @ estimate.camera.R, estimate.lens(self.lens))
         return np.asarray((shown - self.corners_px).ravel(), dtype=np.float64)
 
-    def slopes(self, guess: Estimate) -> tuple[Floats, Floats]:
+    def slopes(self, estimate: Estimate) -> tuple[Floats, Floats]:
         """Return the slopes of errors by shared numbers (2 n, 15) and head turns (2 n, 3)."""
         columns = []
         for k in range(_SHARED + 3):
             step = np.zeros(_SHARED + 3 * self.views)
             step[[k] if k < _SHARED else slice(k, None, 3)] = _SMALL
-            more, less = (self.errors(guess.moved(sign * step)) for sign in (1.0, -1.0))
+            more, less = (self.errors(estimate.moved(sign * step)) for sign in (1.0, -1.0))
             columns.append((more - less) / (2.0 * _SMALL))
         return np.stack(columns[:_SHARED], axis=1), np.stack(columns[_SHARED:], axis=1)
 
-    def residuals(self, guess: Estimate) -> Floats:
+    def residuals(self, estimate: Estimate) -> Floats:
         """Return the errors over a corner's usual one, then lens and turns over theirs."""
         usual = np.concatenate(
-            (self.lens_error, np.full(guess.turns_rad.size, self.joint_error_rad))
+            (self.lens_error, np.full(estimate.turns_rad.size, self.joint_error_rad))
         )
-        off = np.concatenate((guess.lens_off, guess.turns_rad.ravel())) / usual
-        return np.concatenate((self.errors(guess) / _CORNER_PX, off))
+        off = np.concatenate((estimate.lens_off, estimate.turns_rad.ravel())) / usual
+        return np.concatenate((self.errors(estimate) / _CORNER_PX, off))
 
-    def jacobian(self, guess: Estimate) -> Floats:
+    def jacobian(self, estimate: Estimate) -> Floats:
         """Return the slopes of ``residuals``: (2 n + 3 + 3 views, 15 + 3 views)."""
-        shared, own = self.slopes(guess)
+        shared, own = self.slopes(estimate)
         rows, columns = len(shared), _SHARED + 3 * self.views
         slopes = np.zeros((rows + columns - 12, columns))
         slopes[:rows, :_SHARED] = shared / _CORNER_PX
@@ -181,8 +181,8 @@ class Fit:
     joint_error_deg: root mean square of those turns, a joint
     """
 
-    sights: Observations
-    guess: Estimate
+    observations: Observations
+    estimate: Estimate
     cost: float
     rms_px: float
     view_rms_px: Floats
@@ -191,71 +191,71 @@ class Fit:
 
     def spread(self) -> Floats:
         """Return standard deviations (6,) of the camera's turn (rad) and place (m)."""
-        sights, errors = self.sights, self.sights.errors(self.guess)
-        shared, own = sights.slopes(self.guess)
-        weight, of_row = _weights(errors), np.repeat(sights.view, 2)
-        inner = np.zeros((sights.views, _SHARED, _SHARED))
-        pull = np.zeros((sights.views, _SHARED))
-        for k in range(sights.views):
+        observations, errors = self.observations, self.observations.errors(self.estimate)
+        shared, own = observations.slopes(self.estimate)
+        weight, of_row = _weights(errors), np.repeat(observations.view, 2)
+        inner = np.zeros((observations.views, _SHARED, _SHARED))
+        pull = np.zeros((observations.views, _SHARED))
+        for k in range(observations.views):
             mine = of_row == k
             a, b, w = shared[mine], own[mine], weight[mine, None]
-            free = b.T @ (b * w) + np.eye(3) / sights.joint_error_rad**2
+            free = b.T @ (b * w) + np.eye(3) / observations.joint_error_rad**2
             across = a.T @ (b * w)
             inner[k] = a.T @ (a * w) - across @ np.linalg.solve(free, across.T)
             pull[k] = a.T @ (errors[mine] * weight[mine])
         try:
             # Without view k the best place is this far from the best with all of them.
             whole = inner.sum(axis=0)
-            whole[12:, 12:] += np.diag(1.0 / sights.lens_error**2)
+            whole[12:, 12:] += np.diag(1.0 / observations.lens_error**2)
             off = np.linalg.solve(whole - inner, pull[:, :, None])[:, :6, 0]
         except np.linalg.LinAlgError:
             return np.full(6, np.inf)
         off -= off.mean(axis=0)
-        views = (sights.views - 1) / sights.views * (off * off).sum(axis=0)
+        views = (observations.views - 1) / observations.views * (off * off).sum(axis=0)
         # An error of the lens calibration is the same in all views.
-        by_lens = np.linalg.inv(whole)[:6, 12:] / sights.lens_error
+        by_lens = np.linalg.inv(whole)[:6, 12:] / observations.lens_error
         found: Floats = np.sqrt(views + (by_lens * by_lens).sum(axis=1))
         return found
 
 
-def first_estimate(sights: Observations, camera: Pose, board: Pose) -> Estimate:
+def first_estimate(observations: Observations, camera: Pose, board: Pose) -> Estimate:
     """Return an estimate with the lens as calibrated and the measured joint angles."""
-    return Estimate(camera, board, np.zeros(3), np.zeros((sights.views, 3)))
+    return Estimate(camera, board, np.zeros(3), np.zeros((observations.views, 3)))
 
 
-def refine(sights: Observations, guess: Estimate) -> Fit:
+def refine(observations: Observations, estimate: Estimate) -> Fit:
     """Move camera and board until the corners fit best."""
     from scipy.optimize import least_squares  # takes a moment to load
 
     cost = float("inf")
     for _ in range(_ROUNDS):
-        errors = sights.errors(guess)
+        errors = observations.errors(estimate)
         if not np.isfinite(errors).all():
             break
-        first, huber = guess, _huber(_bound(errors) / _CORNER_PX, len(errors))
+        first, huber = estimate, _huber(_bound(errors) / _CORNER_PX, len(errors))
         found = least_squares(
-            lambda step, first=first: sights.residuals(first.moved(step)),
-            np.zeros(_SHARED + 3 * sights.views),
-            lambda step, first=first: sights.jacobian(first.moved(step)),
+            lambda step, first=first: observations.residuals(first.moved(step)),
+            np.zeros(_SHARED + 3 * observations.views),
+            lambda step, first=first: observations.jacobian(first.moved(step)),
             x_scale="jac",
             loss=huber,
             max_nfev=_MOST_STEPS,
         )
-        guess, cost = guess.moved(found.x), float(found.cost)
+        estimate, cost = estimate.moved(found.x), float(found.cost)
         if float(np.abs(found.x[:12]).max()) < _SETTLED:
             break
-    errors = sights.errors(guess)
-    plain = sights.errors(guess._replace(turns_rad=np.zeros_like(guess.turns_rad)))
+    errors = observations.errors(estimate)
+    plain = observations.errors(estimate._replace(turns_rad=np.zeros_like(estimate.turns_rad)))
     squares = (plain * plain).reshape(-1, 2).sum(axis=1)
-    by_view = [np.sqrt(squares[sights.view == k].mean()) for k in range(sights.views)]
+    by_view = [np.sqrt(squares[observations.view == k].mean()) for k in range(observations.views)]
     return Fit(
-        sights,
-        guess,
+        observations,
+        estimate,
         cost,
         float(np.sqrt(squares.mean())),
         np.array(by_view),
         float(np.sqrt((errors * errors).reshape(-1, 2).sum(axis=1).mean())),
-        float(np.degrees(np.sqrt((guess.turns_rad**2).mean()))),
+        float(np.degrees(np.sqrt((estimate.turns_rad**2).mean()))),
     )
 
 

@@ -25,7 +25,7 @@ from gazerig.features.bringup.move_result import PASSING, MoveResult, Step
 from gazerig.robot.app.rig_limits import lid_ends, limits
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.event_text import group_events
 
 app = typer.Typer()
 
@@ -232,7 +232,7 @@ def _report_look(looked: GazeResult, rig: Rig) -> bool:
 
 def _print_events(events: Iterable[str]) -> None:
     """Print what was done to which servo."""
-    for line in drawn_together(events):
+    for line in group_events(events):
         say(line)
 
 

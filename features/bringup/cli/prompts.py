@@ -23,19 +23,6 @@ YES, NO = ("y", "yes"), ("n", "no")
 _LARGEST = 1_000_000  # bytes of a file of answers
 
 
-def _answers_of(file: Path) -> list[str]:
-    """Read the answers of a file.
-
-    Raises:
-        SetupError: it is no text.
-        OSError: it cannot be read.
-    """
-    try:
-        return read_limited(file, _LARGEST).decode().splitlines()
-    except UnicodeDecodeError:
-        raise SetupError(f"{file}: is no UTF-8 text; write one answer a line") from None
-
-
 class Lines:
     """Lines of a file, or of standard input as they come."""
 
@@ -44,10 +31,15 @@ class Lines:
 
         Raises:
             OSError: the file cannot be read.
+            SetupError: it is no text.
         """
-        self._file = answers
-        self._ready = [] if answers is None else _answers_of(answers)
-        self._rest = b""
+        self._file, self._rest = answers, b""
+        self._ready: list[str] = []
+        if answers is not None:
+            try:
+                self._ready = read_limited(answers, _LARGEST).decode().splitlines()
+            except UnicodeDecodeError:
+                raise SetupError(f"{answers}: is no UTF-8 text; write one answer a line") from None
 
     @property
     def scripted(self) -> bool:
@@ -55,7 +47,7 @@ class Lines:
         return self._file is not None
 
     def next(self, wait_s: float) -> str | None:
-        """Return the next line, None where none came in time.
+        """Return the next line, None if none came in time.
 
         Raises:
             EOFError: there are no more.

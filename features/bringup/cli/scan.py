@@ -77,7 +77,11 @@ def scan(
     Moves and changes nothing; only a Maestro's list of errors is cleared by asking for it.
     """
     with clear_errors(rig or DEFAULT_RIG, port, mock):
-        rates, kinds = parse_bauds(bauds), _parse_kind(kind or "all")
+        rates = parse_bauds(bauds)
+        try:
+            kinds = parse_kinds(kind or "all")
+        except ValueError as error:
+            raise SetupError(f"--kind {error}") from None
         found_ports = bench.ports_here()
         if not as_json:
             _show_ports(found_ports)
@@ -130,13 +134,6 @@ def _boards(path: str, as_json: bool) -> bool:
             markup=False,
         )
     return bool(found)
-
-
-def _parse_kind(text: str) -> tuple[BusKind, ...]:
-    try:
-        return parse_kinds(text)
-    except ValueError as error:
-        raise SetupError(f"--kind {error}") from None
 
 
 def parse_bauds(text: str) -> tuple[int, ...] | None:
@@ -238,7 +235,16 @@ def _show(
         answer: dict[str, object] = {
             "port": where,
             "servos": [{"kind": kind, **servo._asdict()} for kind, servo in found],
-            "boards": [_board_plain(one) for one in boards],
+            "boards": [
+                {
+                    **one.board._asdict(),
+                    "channels": one.channels,
+                    "baud": one.baud,
+                    "pulses": [pulse / US_STEPS for pulse in one.board.pulses],  # us, 0 for none
+                }
+                for one in rounds
+                if one.board is not None
+            ],
         }
         print(json.dumps(answer))
         return
@@ -255,15 +261,6 @@ def _show(
             out.print(f"{where}: {line}", markup=False)
     for line in remarks(rounds, where, requested):
         out.print(completed(line), markup=False)
-
-
-def _board_plain(looked: SearchRound) -> dict[str, object]:
-    """Return a Maestro as JSON can hold it; pulses in us, 0 for none."""
-    board = looked.board
-    if board is None:
-        raise ValueError("no board answered")
-    pulses = [pulse / US_STEPS for pulse in board.pulses]
-    return {**board._asdict(), "channels": looked.channels, "baud": looked.baud, "pulses": pulses}
 
 
 def _board_text(looked: SearchRound) -> Iterator[str]:

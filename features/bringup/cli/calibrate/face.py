@@ -52,7 +52,7 @@ from gazerig.robot.cli.terminal import (
     signals,
     status,
 )
-from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.control.loop import run as run_loop
@@ -182,7 +182,7 @@ def _run(
     count = LoopCount(0, 0, "fault: unexpected error")
     with contextlib.ExitStack() as closed_last, way_out(made, say, interrupts) as leaving:
         leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
-        for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
+        for note in (*made.notes, *group_events(made.robot.body.bus.events())):
             say(note)
         closed_last.callback(lambda: observers.close(count))
         observers.open()
@@ -216,13 +216,21 @@ class _CalibrationSession:
         self._ready_s = self._shown_s = self._seen_s = now_s()
 
     def over(self, _: float) -> str | None:
-        """Handle a key; return why the procedure ended, None while it goes on."""
+        """Handle a key; return why the procedure ended, None while it continues.
+
+        Raises:
+            SetupError: nothing can happen any more in a script.
+        """
         steering, now_s = self._steering, self._now_s()
         if (why := self._stopped()) is not None:
             return why
         if steering.state.part is None:
             return "you" if steering.state.at < len(PART_NAMES_TEXT) else "the last part"
-        self._refuse_hopeless(now_s)
+        if steering.aimed:
+            self._ready_s = now_s
+        if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
+            what = "no face is seen" if steering.face is None else "the eyes cannot reach it"
+            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or pipe end here")
         key = self._keys.next(steering.aimed)
         if key is not None:
             self._tell(steering.press(key, now_s))
@@ -233,7 +241,7 @@ class _CalibrationSession:
         self._observers.update(tick)
         self._door.update(tick)
         self._tell(self._steering.update(tick))
-        for event in drawn_together(tick.events):
+        for event in group_events(tick.events):
             say(event)
         self._say_what_is_due(tick.t_s)
         if self._live_line and tick.t_s - self._shown_s >= _SHOW_S:
@@ -254,14 +262,6 @@ class _CalibrationSession:
         else:
             self._tell("no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it")
         self._said = part, seen
-
-    def _refuse_hopeless(self, now_s: float) -> None:
-        """End a script that nothing can happen to any more."""
-        if self._steering.aimed:
-            self._ready_s = now_s
-        if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
-            what = "no face is seen" if self._steering.face is None else "the eyes cannot reach it"
-            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or pipe end here")
 
     def _tell(self, what: str | None) -> None:
         if what is not None:

@@ -1,5 +1,8 @@
 """The command calibrate joints: zero, sign and range of each joint, found and written down."""
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 from rich.console import Console
 
@@ -10,7 +13,6 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
 from gazerig.features.bringup.calibration.joint_calibration import Value, changes
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
-from gazerig.features.bringup.cli.calibrate import options as options
 from gazerig.features.bringup.cli.calibrate.joint import (
     ActuationMode,
     CalibrationJob,
@@ -33,22 +35,54 @@ from gazerig.features.bringup.cli.rig_writer import (
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
 from gazerig.robot.model.coupling_params import pairs_of, partners
 
+JointOption = Annotated[
+    list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")
+]
+TurnedByOption = Annotated[
+    ActuationMode, typer.Option(help="Turned by hand, torque off, or gently by itself.")
+]
+MarginOption = Annotated[
+    float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Kept from each end.")
+]
+ZeroOption = Annotated[
+    ZeroReference, typer.Option(help="With --by motion: zero half-way, or where a person puts it.")
+]
+StrengthOption = Annotated[
+    float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")
+]
+ClearOffsetOption = Annotated[
+    bool, typer.Option("--clear-offset", help="Set the offset in a servo to 0 first.")
+]
+SetMiddleOption = Annotated[
+    bool,
+    typer.Option("--set-middle", help="Feetech: make the middle of its travel 2048 first."),
+]
+PulsesOption = Annotated[
+    str, typer.Option(metavar="US:US", help="Hobby servos: never narrower or wider pulses.")
+]
+MoreOption = Annotated[
+    int, typer.Option(min=0, max=5, help="Push rods: places between each two you mark.")
+]
+AnswersOption = Annotated[
+    Path | None, typer.Option(help="File with one answer a line; empty is Enter.")
+]
+
 
 def calibrate_joints(
     rig: RigArgument = "desk",
-    joint: options.Joint = None,
-    by: options.TurnedBy = ActuationMode.hand,
-    margin: options.Margin = 2.0,
-    zero: options.Zero = ZeroReference.middle,
-    strength: options.Strength = 0.3,
-    clear_offset: options.ClearOffset = False,
-    set_middle: options.SetMiddle = False,
-    pulses: options.Pulses = "500:2500",
-    more: options.More = 1,
+    joint: JointOption = None,
+    by: TurnedByOption = ActuationMode.hand,
+    margin: MarginOption = 2.0,
+    zero: ZeroOption = ZeroReference.middle,
+    strength: StrengthOption = 0.3,
+    clear_offset: ClearOffsetOption = False,
+    set_middle: SetMiddleOption = False,
+    pulses: PulsesOption = "500:2500",
+    more: MoreOption = 1,
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
-    answers: options.Answers = None,
+    answers: AnswersOption = None,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
