@@ -21,6 +21,8 @@ PLACES = (5000, 4780, 5220, 5000)
 class Bench:
     """A board whose time passes as it is waited for; every look at its channel is kept."""
 
+    pulse = "position"
+
     def __init__(self, low=2000, high=10_000):
         self.now_s = 5.0
         spec = HobbySpec(2, 6500.0, min_steps=low, max_steps=high)
@@ -34,10 +36,17 @@ class Bench:
         while self.now_s < t_s:
             self.now_s = min(t_s, self.now_s + 0.01)
             channel = self.board.faults.reports()[2]
-            self.seen.append((self.now_s, channel["position"], channel["place"]))
+            self.seen.append((self.now_s, channel[self.pulse], channel["place"]))
 
-    def walk(self, places=PLACES):
-        return walk(self.driver, LID, places, self.sleep_until)
+    def walk(self, fault="", looks=None):
+        """Walk; a fault command is carried out at every wait, or after this many looks."""
+
+        def sleep_until(t_s):
+            self.sleep_until(t_s)
+            if fault and looks in (None, len(self.seen)):
+                self.board.faults.command(fault)
+
+        return walk(self.driver, LID, PLACES, sleep_until)
 
 
 def test_the_first_place_at_once_the_others_slowly_and_the_pulses_end():
@@ -78,14 +87,7 @@ def test_a_channel_that_gives_pulses_already_is_led_slowly_from_there():
 
 
 def test_an_error_of_the_board_on_the_way_is_no_place():
-    bench = Bench()
-
-    def sleep_and_fail(t_s):
-        bench.sleep_until(t_s)
-        bench.board.faults.command("error protocol")
-
-    gone = walk(bench.driver, LID, PLACES, sleep_and_fail)
-    assert gone[0] == ChannelPosition(5000, 0)
+    assert Bench().walk("error protocol")[0] == ChannelPosition(5000, 0)
 
 
 def test_an_input_is_refused():
@@ -110,31 +112,22 @@ def test_ctrl_c_ends_the_pulses():
 
 def test_a_board_that_falls_silent():
     bench = Bench()
-
-    def sleep_and_lose(t_s):
-        bench.sleep_until(t_s)
-        bench.board.faults.command("lose all")
-
     with pytest.raises(ServoFault, match="may still get pulses: switch the servo supply off"):
-        walk(bench.driver, LID, PLACES, sleep_and_lose)
+        bench.walk("lose all")
     # It did not answer, but it obeyed.
     assert bench.board.faults.reports()[2]["position"] == 0
 
 
 def test_a_cable_that_is_pulled_out():
-    bench = Bench()
-
-    def sleep_and_pull(t_s):
-        bench.sleep_until(t_s)
-        bench.board.faults.command("unplug")
-
-    with pytest.raises(ServoFault, match="may still get pulses") as error:
-        walk(bench.driver, LID, PLACES, sleep_and_pull)
+    with pytest.raises(ServoFault) as error:
+        Bench().walk("unplug")
     assert isinstance(error.value.__context__, BusLost)
 
 
 class I2cBench(Bench):
     """The same on a PCA9685, whose pulses the driver leads."""
+
+    pulse = "target"
 
     def __init__(self):
         self.now_s = 5.0
@@ -145,12 +138,6 @@ class I2cBench(Bench):
         self.port.setBaudRate(115_200)
         self.driver = Pca9685Board(self.port, Pca9685Params(oscillator_hz=25.4e6))  # type: ignore[assignment]
         self.seen = []
-
-    def sleep_until(self, t_s):
-        while self.now_s < t_s:
-            self.now_s = min(t_s, self.now_s + 0.01)
-            channel = self.board.faults.reports()[2]
-            self.seen.append((self.now_s, channel["target"], channel["place"]))
 
 
 def test_a_pca9685_is_led_as_slowly_and_its_pulses_end():
@@ -167,12 +154,6 @@ def test_a_pca9685_is_led_as_slowly_and_its_pulses_end():
 
 def test_a_pca9685_that_restarts_on_the_way_gives_no_pulses_and_is_told():
     bench = I2cBench()
-
-    def sleep_and_restart(t_s):
-        bench.sleep_until(t_s)
-        if len(bench.seen) == 60:
-            bench.board.faults.command("brown-out")
-
-    gone = walk(bench.driver, LID, PLACES, sleep_and_restart)
+    gone = bench.walk("brown-out", looks=60)
     assert gone[0] == ChannelPosition(5000, 5000) and gone[-1] == ChannelPosition(5000, 0)
     assert bench.board.faults.reports()[2]["target"] == 0

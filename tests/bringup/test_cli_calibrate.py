@@ -335,13 +335,6 @@ def test_a_rig_file_named_like_a_command_has_a_path(
     assert done.code == 2 and "profile: missing" in done.err
 
 
-def test_board_and_camera_are_reached(tmp_path: Path) -> None:
-    out = tmp_path / "board.png"
-    assert calibrate("board", str(out)).code == 0 and out.stat().st_size > 4000
-    done = calibrate("camera", "desk", "--mock", "--dry-run", "--ruler", "0")
-    assert done.code == 2 and "a printer scales by" in done.err
-
-
 # --- a camera
 
 
@@ -368,7 +361,7 @@ def test_a_simulated_lens_is_measured_and_shown() -> None:
 
 
 def test_a_ruler_that_cannot_be_is_refused() -> None:
-    done = calibrate("camera", "--mock", "--dry-run", "--ruler", "0")
+    done = calibrate("camera", "desk", "--mock", "--dry-run", "--ruler", "0")
     assert done.code == 2
     assert "a printer scales by 0.2 to 5" in done.out + done.err
 

@@ -166,13 +166,6 @@ def test_the_cure_for_the_seam_is_what_the_servo_can_do() -> None:
         calibration("neck_yaw", Marks(4200, 3900, 4050), JOINT, 0.0)
 
 
-def test_a_lower_lid_writes_its_own_ends() -> None:
-    wanted = changes("left_lower_lid", JOINT, Calibration(2000, -1, -20.0, 22.0), {})
-    assert wanted["lid_joints.left_lower_shut_deg"] == -20.0
-    assert wanted["lid_joints.left_lower_open_deg"] == 22.0
-    assert "lid_joints.left_shut_deg" not in wanted
-
-
 # --- what goes into the rig file
 
 
@@ -181,13 +174,13 @@ def test_only_what_differs_is_changed() -> None:
     assert changes("left_eye_pan", JOINT, found, {}) == {"joints.left_eye_pan.max_deg": 30.0}
 
 
-def test_lids_and_parking_follow_the_new_range() -> None:
-    found = Calibration(2000, -1, -20.0, 22.0)
-    wanted = changes("left_upper_lid", JOINT, found, {"left_upper_lid": -25.0, "neck_pitch": -12.0})
-    assert wanted["lid_joints.left_shut_deg"] == -20.0
-    assert wanted["lid_joints.left_open_deg"] == 22.0
-    assert wanted["park_deg.left_upper_lid"] == -20.0
-    assert "park_deg.neck_pitch" not in wanted
+@pytest.mark.parametrize(("lid", "key"), [("upper", "left"), ("lower", "left_lower")])
+def test_a_lid_s_own_ends_and_its_parking_follow_the_new_range(lid: str, key: str) -> None:
+    name, found = f"left_{lid}_lid", Calibration(2000, -1, -20.0, 22.0)
+    wanted = changes(name, JOINT, found, {name: -25.0, "neck_pitch": -12.0})
+    ends = {f"lid_joints.{key}_shut_deg": -20.0, f"lid_joints.{key}_open_deg": 22.0}
+    assert {one: wanted[one] for one in wanted if one.startswith("lid_joints")} == ends
+    assert wanted[f"park_deg.{name}"] == -20.0 and "park_deg.neck_pitch" not in wanted
 
 
 def test_the_middle_is_half_way() -> None:
