@@ -82,7 +82,7 @@ def test_who_can_read_the_file_may_call(listener: socket_io.Listener, tmp_path: 
     assert file.stat().st_mode & 0o077 == 0
     assert socket_io.sockets(tmp_path) == {file: 7}
     with socket_io.dial(file, 1.0) as caller, listener.accept() as end:
-        assert listener.admitted(end) is not None
+        assert listener.identify(end) is not None
         caller.sendall(b"hello")
         assert end.recv(5) == b"hello"
 
@@ -96,7 +96,7 @@ def test_who_cannot_show_the_token_is_not_admitted(
     with socket.create_connection(("127.0.0.1", int(port))) as caller, listener.accept() as end:
         caller.sendall(shown)
         caller.shutdown(socket.SHUT_WR)
-        assert listener.admitted(end) is None
+        assert listener.identify(end) is None
 
 
 def test_the_file_of_a_killed_rig_is_removed(listener: socket_io.Listener, tmp_path: Path) -> None:

@@ -19,10 +19,10 @@ from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glb
 from gazerig.robot.dashboard.view.glow import glow
-from gazerig.robot.dashboard.view.head_view import shown_measures
+from gazerig.robot.dashboard.view.head_view import head_dimensions
 from gazerig.robot.dashboard.view.lid_edges import lid_edges
 from gazerig.robot.dashboard.view.scene_node import turned_up
-from gazerig.robot.dashboard.view.snapshot_shape import wide_awake
+from gazerig.robot.dashboard.view.snapshot_shape import with_shown_lids
 from gazerig.robot.dashboard.view.views import BOTH, FACE, SHOULDER, View, view
 from gazerig.robot.description import head_mesh
 from gazerig.robot.description.head_shape import (
@@ -86,7 +86,7 @@ def skin_and_cap() -> Floats:
 @pytest.mark.parametrize("aspect", CANVASES)
 def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name: str, aspect: float) -> None:
     shot = at_rest(name)
-    unit = shown_measures(shot).interocular_m
+    unit = head_dimensions(shot).interocular_m
     points = skin_and_cap() * unit + shot.p_world_head_m
     on_canvas = drawn(view(FACE, shot), points, aspect)
     low, high = on_canvas.min(axis=0), on_canvas.max(axis=0)
@@ -132,7 +132,7 @@ def covered(opening: float, lower: float) -> Floats:
         (np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)), axis=-1
     ).reshape(-1, 3)
     hidden = np.zeros(len(rays), bool)
-    edges = lid_edges(wide_awake(shape_of(load_rig("maker"))))  # all lids move
+    edges = lid_edges(with_shown_lids(shape_of(load_rig("maker"))))  # all lids move
     for upper, edge_rad in (
         (True, edges.elevation_rad("left_upper_lid", opening)),
         (False, edges.elevation_rad("left_lower_lid", lower)),
@@ -208,7 +208,7 @@ def test_measures_follow_the_rig() -> None:
     )
     for name in RIGS:
         rig = load_rig(name)
-        found = shown_measures(at_rest(name))
+        found = head_dimensions(at_rest(name))
         assert 1e3 * found.interocular_m == pytest.approx(rig.geometry.interocular_mm, abs=0.1)
         assert -1e3 * found.pivot_m[2] == pytest.approx(rig.geometry.eyes_above_mm, abs=0.1)
 

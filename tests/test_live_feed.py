@@ -146,7 +146,7 @@ def test_what_has_not_changed_is_not_sent_again_and_tuning_is(ran: Run, page: Pa
         page.stream.update(tick)
         page.shown()
     assert page.rigs == 1
-    page.publisher.obeyed((Tune((("camera.yaw_deg", 3.0),)),))
+    page.publisher.process_commands((Tune((("camera.yaw_deg", 3.0),)),))
     page.stream.update(ran.ticks[-1]._replace(t_s=ran.ticks[-1].t_s + 1.0))
     assert page.rigs == 2
 

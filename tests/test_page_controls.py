@@ -30,7 +30,7 @@ from gazerig.robot.dashboard.requests.inbox import (
     MESSAGE_BYTES,
     REQUEST,
     Inbox,
-    overtaken,
+    is_superseded,
     parse_request,
     request_message,
     urgent,
@@ -143,10 +143,10 @@ def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
     def change(who: str, key: str) -> bytes:
         return request_message(who, b'{"do":"set","changes":{"%s":1}}' % key.encode())
 
-    assert overtaken(change("7", "a"), change("7", "a"))
-    assert not overtaken(change("7", "a"), change("8", "a"))
-    assert not overtaken(change("7", "a"), change("7", "b"))
-    assert not overtaken(request_message("7", b'{"do":"save","path":null}'), change("7", "a"))
+    assert is_superseded(change("7", "a"), change("7", "a"))
+    assert not is_superseded(change("7", "a"), change("8", "a"))
+    assert not is_superseded(change("7", "a"), change("7", "b"))
+    assert not is_superseded(request_message("7", b'{"do":"save","path":null}'), change("7", "a"))
     assert parse_request(request_message("7:tuning", b'{"a":"b c"}')) == (
         "7:tuning",
         b'{"a":"b c"}',
@@ -160,10 +160,10 @@ def test_answers_wait_until_the_page_has_room() -> None:
         for number in range(40):
             Outbox(theirs).command(Ask("behaviour", str(number)), str(number))
         said = []
-        wait_for(lambda: len(page._owed) > 0, "a full socket")
+        wait_for(lambda: len(page._pending_replies) > 0, "a full socket")
         for _ in range(40):
             said.append(sent(theirs)[1][0])
-            page._pay()
+            page._flush_replies()
         assert said == [str(number) for number in range(40)]
 
 

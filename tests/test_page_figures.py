@@ -15,7 +15,7 @@ from gazerig.robot.dashboard.panels.dwell_chart import BIN_S, BINS, DwellChart
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.panels.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face
 from gazerig.robot.dashboard.panels.main_sequence_chart import KEPT, MainSequenceChart
-from gazerig.robot.dashboard.panels.run_figures import RunFigure, RunFigures, judged
+from gazerig.robot.dashboard.panels.run_figures import RunFigure, RunFigures, compare_with_band
 from gazerig.robot.dashboard.view.view_frusta import field_edge
 from gazerig.robot.model.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
 
@@ -44,12 +44,12 @@ def test_stretches_join_end_to_end_and_are_forgotten() -> None:
     for k in range(1000):
         t_s = 0.05 * k
         timeline.update(looking(t_s, "face 1: nose" if t_s < 40.0 else "hand <7>", None))
-    (face, hand) = timeline.stretches("target")
+    (face, hand) = timeline.intervals("target")
     assert face == (0.0, pytest.approx(39.95), "face 1")
     assert hand == (pytest.approx(39.95), pytest.approx(49.95), "hand <7>")
     for k in range(1000, 1700):
         timeline.update(looking(0.05 * k, "hand <7>", None))
-    assert [what for _, _, what in timeline.stretches("target")] == ["hand <7>"]
+    assert [what for _, _, what in timeline.intervals("target")] == ["hand <7>"]
 
 
 def test_strip_shows_targets_saccades_blinks_and_the_guard_and_runs_no_markup() -> None:
@@ -77,9 +77,9 @@ def test_strip_says_when_somebody_stopped_the_rig_and_starts_anew_with_the_clock
     timeline = Timeline()
     timeline.update(looking(50.0))
     timeline.update(replace(looking(51.0), stopped="space bar"))
-    assert [what for _, _, what in timeline.stretches("guard")] == ["ok", "stopped"]
+    assert [what for _, _, what in timeline.intervals("guard")] == ["ok", "stopped"]
     timeline.update(looking(0.0))
-    assert timeline.stretches("guard") == ((0.0, 0.0, "ok"),)
+    assert timeline.intervals("guard") == ((0.0, 0.0, "ok"),)
 
 
 # --- the main sequence ------------------------------------------------------------------
@@ -236,14 +236,14 @@ def test_figures_are_those_of_the_report() -> None:
 
 def test_few_events_never_judge_and_chance_is_called_so() -> None:
     band = BY_KEY["duration_small"]  # a share of .75 and more, of at least 30
-    assert judged(RunFigure(band.key, 0.0, 29), band) == "too few: 29 of 30"
-    assert judged(RunFigure(band.key, 0.8, 30), band) == "inside"
-    assert judged(RunFigure(band.key, 0.7, 40), band) == "may be chance"
-    assert judged(RunFigure(band.key, 0.7, 4000), band) == "outside"
-    assert judged(RunFigure(band.key, 0.0, 30), band) == "outside"
+    assert compare_with_band(RunFigure(band.key, 0.0, 29), band) == "too few: 29 of 30"
+    assert compare_with_band(RunFigure(band.key, 0.8, 30), band) == "inside"
+    assert compare_with_band(RunFigure(band.key, 0.7, 40), band) == "may be chance"
+    assert compare_with_band(RunFigure(band.key, 0.7, 4000), band) == "outside"
+    assert compare_with_band(RunFigure(band.key, 0.0, 30), band) == "outside"
     rate = BY_KEY["rate"]
-    assert judged(RunFigure("rate", 4.2, 100), rate) == "may be chance"
-    assert judged(RunFigure("rate", 6.0, 100), rate) == "outside"
+    assert compare_with_band(RunFigure("rate", 4.2, 100), rate) == "may be chance"
+    assert compare_with_band(RunFigure("rate", 6.0, 100), rate) == "outside"
 
 
 def test_the_table_shows_the_range_of_people_and_its_source() -> None:

@@ -249,13 +249,13 @@ def test_what_nobody_measured_is_drawn_and_named_otherwise() -> None:
 
     assert shown(1.0, SIX) == [True, True, True]
     assert "> measured<" not in view.key.content and "estimated" in view.key.content
-    assert "no measurements" in panel.of_what.content
+    assert "no measurements" in panel.estimation_note.content
     before = view.charts
     assert shown(1.1, SIX) == [True, True, True]
     assert view.charts is before  # what stays as it is is not made again
     assert shown(1.2, ("left_lower_lid",)) == [False, False, True]
     assert "> measured<" in view.key.content and "estimated" in view.key.content
-    assert panel.of_what.content == ""
+    assert panel.estimation_note.content == ""
     assert shown(1.3, ()) == [False, False, False]
     assert "estimated" not in view.key.content
 

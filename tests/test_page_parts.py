@@ -37,7 +37,7 @@ from gazerig.robot.dashboard.panels.joint_charts import (
 from gazerig.robot.dashboard.panels.servo_health import guard, health
 from gazerig.robot.dashboard.panels.status import (
     alarms,
-    drawn_together,
+    group_reasons,
     other_heads,
     without_feedback,
 )
@@ -146,8 +146,8 @@ def test_why_a_planner_chose_is_said_with_it() -> None:
 
 
 def test_equal_reasons_are_said_once() -> None:
-    assert drawn_together(("a: hot", "b: too fast", "c: too fast")) == "hot (a), too fast (b, +1)"
-    assert drawn_together(()) == ""
+    assert group_reasons(("a: hot", "b: too fast", "c: too fast")) == "hot (a), too fast (b, +1)"
+    assert group_reasons(()) == ""
 
 
 def test_a_short_limit_moves_nothing_on_the_page() -> None:

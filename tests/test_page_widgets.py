@@ -15,15 +15,15 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.control.command_handler import plain
 from gazerig.robot.dashboard.feed.page_feed import News
 from gazerig.robot.dashboard.panels.controls import LeadPanel
-from gazerig.robot.dashboard.panels.jog_panel import ESTIMATED, JogPanel, not_measured
+from gazerig.robot.dashboard.panels.jog_panel import ESTIMATED, JogPanel, estimated_joints_note
 from gazerig.robot.dashboard.panels.param_control import (
     ParamControl,
+    fits_slider,
+    format_value,
     hint,
     label,
     read,
-    slides,
-    step_of,
-    written,
+    slider_step,
 )
 from gazerig.robot.dashboard.panels.param_panel import ParamState, found, group_of
 from gazerig.robot.dashboard.requests.inbox import (
@@ -141,15 +141,15 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
 
 
 def test_angles_that_nobody_measured_are_called_so(place: Container) -> None:
-    assert not_measured(SNAPSHOT) == ""
-    assert f"all joints: {ESTIMATED}" in not_measured(of_six(SNAPSHOT))
-    one = not_measured(of_six(SNAPSHOT, SIX[1:2]))
+    assert estimated_joints_note(SNAPSHOT) == ""
+    assert f"all joints: {ESTIMATED}" in estimated_joints_note(of_six(SNAPSHOT))
+    one = estimated_joints_note(of_six(SNAPSHOT, SIX[1:2]))
     assert f">{SIX[1].replace('_', ' ')}: {ESTIMATED}" in one
     view, _ = jogging(place)
     view.show(of_six(SNAPSHOT))
-    assert ESTIMATED in str(view.not_measured.content)
+    assert ESTIMATED in str(view.estimated_joints_note.content)
     view.show(SNAPSHOT)
-    assert view.not_measured.content == ""
+    assert view.estimated_joints_note.content == ""
 
 
 def test_sliders_are_those_of_the_rig(place: Container) -> None:
@@ -184,19 +184,19 @@ def test_a_hint_says_all_there_is_to_know() -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-35.0, 35.0), (0.3, 0.7), (10.0, 1e5)])
 def test_a_slider_has_some_hundred_round_steps(low: float, high: float) -> None:
-    step = step_of(low, high)
+    step = slider_step(low, high)
     assert 190 <= (high - low) / step <= 501
     assert f"{step:.0e}"[0] in "125"
 
 
 def test_what_a_slider_cannot_set_finely_is_typed() -> None:
-    assert slides(PARAM, 1.0)
-    assert not slides(PARAM._replace(high=1e6), 1.0)
-    assert not slides(PARAM, 11.0)
-    assert not slides(PARAM._replace(optional=True, default=None), 1.0)
-    assert slides(PARAM._replace(optional=True), 1.0)
-    assert not slides(PARAM._replace(optional=True), None)
-    assert not slides(PARAM._replace(kind="list"), (1.0, 2.0))
+    assert fits_slider(PARAM, 1.0)
+    assert not fits_slider(PARAM._replace(high=1e6), 1.0)
+    assert not fits_slider(PARAM, 11.0)
+    assert not fits_slider(PARAM._replace(optional=True, default=None), 1.0)
+    assert fits_slider(PARAM._replace(optional=True), 1.0)
+    assert not fits_slider(PARAM._replace(optional=True), None)
+    assert not fits_slider(PARAM._replace(kind="list"), (1.0, 2.0))
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_what_a_slider_cannot_set_finely_is_typed() -> None:
 )
 def test_what_is_written_is_read_again(kind: str, value: JsonValue) -> None:
     param = PARAM._replace(kind=kind, default=value)
-    assert read(param, written(param, value)) == value
+    assert read(param, format_value(param, value)) == value
 
 
 def test_what_cannot_be_read_is_refused_with_an_example() -> None:

@@ -303,10 +303,10 @@ class RunObservers:
         if self._publisher is None:
             return
         if tick.commands:
-            self._publisher.obeyed(tick.commands)
+            self._publisher.process_commands(tick.commands)
         if self._lent != (lent := getattr(self._made.robot.camera, "lent", False)):
             self._lent = lent
-            self._publisher.rebuilt()
+            self._publisher.resend_geometry()
 
 
 def only_stops(command: CommandTaker) -> CommandTaker:

@@ -116,7 +116,7 @@ def serve(
     browsers, widgets = Browsers(token), Widgets()
     outbox = Outbox(
         feed,
-        name=lambda client: widgets.browser(client) or _browser(server, client),
+        name=lambda client: widgets.browser(client) or _browser_name(server, client),
         leads=browsers.led_by,
     )
     pointer = PointerToLook(
@@ -136,7 +136,7 @@ def serve(
     return Served(server, door, outbox, pointer, url, "; ".join(text) or None)
 
 
-def _browser(server: viser.ViserServer, client: str) -> str:
+def _browser_name(server: viser.ViserServer, client: str) -> str:
     """Return the name of a client's browser; client: its number, maybe with a suffix."""
     number = client.partition(":")[0]
     return browser_of(server, int(number)) if number.isdecimal() else ""
@@ -203,12 +203,12 @@ def main(arguments: list[str]) -> int:
     stop = StopSender(message_link.open_link(stop_fd, shown))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
     try:
-        return _show(feed, stop, (host, int(port)), token, folder, int(parent))
+        return _serve_page(feed, stop, (host, int(port)), token, folder, int(parent))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _show(
+def _serve_page(
     feed: MessageLink,
     stop: StopSender,
     address: tuple[str, int],

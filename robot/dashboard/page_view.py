@@ -132,7 +132,7 @@ class PageView:
         """Apply messages of the rig other than snapshots and frames."""
         if kind == MESSAGE and isinstance(data, list):
             who, text = data
-            self._answered(who, text)
+            self._show_reply(who, text)
         elif kind == PARAMS and isinstance(data, list):
             self._controls.params(data)
         elif isinstance(data, dict):
@@ -144,7 +144,7 @@ class PageView:
             elif kind == REPLAY:
                 self._show_replay(data)
 
-    def _answered(self, who: str, text: str | None) -> None:
+    def _show_reply(self, who: str, text: str | None) -> None:
         """Show the rig's reply to its client; other messages go to all users."""
         self._controls.answered(who)
         if text:

@@ -148,7 +148,7 @@ class Guardian:
         for i in range(len(self.plans)):
             if self.releasing(i):  # the dead guardian cannot finish
                 self._heartbeat.set_state(i, RELEASED)
-        why = "did not respond" if code is None else f"ended by itself ({_ending(code)})"
+        why = "did not respond" if code is None else f"ended by itself ({_exit_text(code)})"
         self._events.append(f"the guardian {why}: started again")
         try:
             self._start()
@@ -214,7 +214,7 @@ class Guardian:
         )
 
 
-def _ending(code: int) -> str:
+def _exit_text(code: int) -> str:
     return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
@@ -265,9 +265,9 @@ class GuardedBus:
         if self._lost_hold or self._guardian.released(self._plan):
             if self._guardian.releasing(self._plan):
                 return self._silent
-            self._take_hold_again(now_s)
+            self._restore_torque(now_s)
         feedback = self._bus.read(now_s)
-        return self._marked(feedback) if self._rearmed else feedback
+        return self._mark_rearmed(feedback) if self._rearmed else feedback
 
     def enable_torque(self) -> tuple[int, ...]:
         """Arm the guardian and switch torque on at the present positions.
@@ -329,7 +329,7 @@ class GuardedBus:
         """Return byte and error counts."""
         return self._bus.health()
 
-    def _take_hold_again(self, now_s: float) -> None:
+    def _restore_torque(self, now_s: float) -> None:
         """Switch the torque of released servos on again, as after a restart of the servos."""
         if not self._lost_hold:
             self._guardian.acknowledge(self._plan)
@@ -351,7 +351,7 @@ class GuardedBus:
         self._rearmed = set(self._silent.missing)
         self._events.append("torque on again where the joints are: going on slowly")
 
-    def _marked(self, feedback: Feedback) -> Feedback:
+    def _mark_rearmed(self, feedback: Feedback) -> Feedback:
         """Return feedback with each servo's first answer after torque-on marked ``rearmed``."""
         here = self._rearmed.difference(feedback.missing)
         self._rearmed -= here

@@ -123,20 +123,20 @@ class ProgramWatch:
 
     def run(self) -> None:
         """Monitor the program until it ends or closes the pipe, then release armed servos."""
-        while not self._gone():
+        while not self._is_program_gone():
             self._heartbeat.look()
-            self._watch(self._clock.now_s())
+            self._release_if_hung(self._clock.now_s())
         self._release_all()
 
-    def _gone(self) -> bool:
+    def _is_program_gone(self) -> bool:
         """Wait for ``LOOK_S``; return whether the program has ended or closed the pipe."""
         readable, _, _ = select.select([sys.stdin.fileno()], [], [], LOOK_S)
         # A child of the program may hold its end of the pipe open: check the parent's id, too.
         return bool(readable) or os.getppid() != self._parent
 
-    def _watch(self, now_s: float) -> None:
+    def _release_if_hung(self, now_s: float) -> None:
         """Release armed servos if the loop hangs."""
-        armed = self._armed()
+        armed = self._armed_plans()
         if not armed:
             self._hang.reset()
         if not self._hang.step(self._heartbeat.beats, now_s) or now_s < self._retry_s:
@@ -145,7 +145,7 @@ class ProgramWatch:
             if self._heartbeat.state(i) == IDLE:
                 self._release_hung(i)
 
-    def _armed(self) -> list[int]:
+    def _armed_plans(self) -> list[int]:
         return [i for i in range(len(self._plans)) if self._heartbeat.armed(i)]
 
     def _release_hung(self, i: int) -> None:
@@ -161,7 +161,7 @@ class ProgramWatch:
     def _release_all(self) -> None:
         """Release all armed servos; wait up to ``UNPLUGGED_S`` for adaptors that are unplugged."""
         began_s = self._clock.now_s()
-        left = self._armed()
+        left = self._armed_plans()
         while left:
             since_s = self._clock.now_s() - began_s
             left = [i for i in left if not self._release(i, "the program died", since_s > ALONE_S)]

@@ -52,7 +52,7 @@ def look(path: Path) -> FileState | None:
     )
 
 
-class Settling:
+class Debouncer:
     """Detects when a file has new content that no longer changes."""
 
     def __init__(self, first: FileState | None) -> None:
@@ -103,7 +103,7 @@ class FileWatch:
         self._changed = changed
         self._every_s = every_s
         self._lock = threading.Lock()
-        self._watched: dict[Path, Settling] = {}
+        self._watched: dict[Path, Debouncer] = {}
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="file watch", daemon=True)
 
@@ -130,14 +130,14 @@ class FileWatch:
             for watched in known:
                 self._watched[watched].known(look(watched))
             if not known:
-                self._watched[path] = Settling(look(path))
+                self._watched[path] = Debouncer(look(path))
 
     def look(self) -> None:
         """Check all files once and report those that are new or stay missing."""
         with self._lock:
             files = dict.fromkeys(self._files())
             self._watched = {
-                path: self._watched.get(path) or Settling(look(path)) for path in files
+                path: self._watched.get(path) or Debouncer(look(path)) for path in files
             }
             new = [path for path, settling in self._watched.items() if settling.update(look(path))]
         # Not under the lock: the receiver may wait for a thread that saves.

@@ -184,25 +184,25 @@ class RequestHandler:
             peer: Client at the other end, as "process 123", "" if unknown.
         """
         try:
-            return {"ok": self._told(self._handler.do(request, partial(_signed, peer)))}
+            return {"ok": self._outcome_json(self._handler.do(request, partial(_signed, peer)))}
         except _NotDone as error:
             return {"refused": str(error), "reply": error.reply.as_json()}
         except self._handler.refusals as error:
             return {"refused": str(error)}
 
-    def _told(self, outcome: RequestResult) -> object:
+    def _outcome_json(self, outcome: RequestResult) -> object:
         """Return an outcome as JSON after the loop has executed it."""
         match outcome:
             case QuestionAnswer(value):
                 return value
             case ParamsChanged(notes):
-                return self._in_force(notes)
+                return self._wait_until_applied(notes)
             case ParamsSaved(saved):
                 backup = None if saved.backup is None else str(saved.backup)
                 changes = as_changes(saved.changes)
                 return {"path": str(saved.path), "backup": backup, "changes": changes}
             case PendingCommand(command, ticket):
-                return self._replied(command, ticket)
+                return self._wait_for_reply(command, ticket)
 
     def _status(self) -> dict[str, object]:
         version = self._params.version if self._params is not None else 0
@@ -212,10 +212,10 @@ class RequestHandler:
         about = {**self._about, "version": version, "unsaved": self._unsaved[1]}
         return {**about, **self._pulse.as_json()}
 
-    def _replied(self, command: Command, ticket: Ticket | None) -> object:
+    def _wait_for_reply(self, command: Command, ticket: Ticket | None) -> object:
         """Wait for the tick that executes a command; return its reply."""
         if ticket is None:
-            return self._in_force(())
+            return self._wait_until_applied(())
         reply = ticket.wait(_TAKEN_UP_S)
         if reply is None:
             raise ValueError(_HANGS)
@@ -225,7 +225,7 @@ class RequestHandler:
             self._pulse.taken_up(ticks=1)  # so that the status includes it
         return {"notes": [], "reply": reply.as_json()}
 
-    def _in_force(self, notes: tuple[str, ...]) -> dict[str, object]:
+    def _wait_until_applied(self, notes: tuple[str, ...]) -> dict[str, object]:
         """Wait for the tick that applies the values; return the notes for the user."""
         if not self._pulse.taken_up():
             raise ValueError(_HANGS)

@@ -179,7 +179,7 @@ class Listener:
 
     @property
     def waits_for_token(self) -> bool:
-        """Return whether ``admitted`` waits for a token from the caller."""
+        """Return whether ``identify`` waits for a token from the caller."""
         return bool(self._token)
 
     def accept(self) -> socket.socket:
@@ -190,7 +190,7 @@ class Listener:
         """
         return self._end.accept()[0]
 
-    def admitted(self, caller: socket.socket) -> Peer | None:
+    def identify(self, caller: socket.socket) -> Peer | None:
         """Return the caller, None if it may not connect.
 
         Raises:
@@ -333,7 +333,7 @@ class Wire:
 
     def _line(self, first_s: float | None, rest_s: float) -> bytes:
         """Return one line without its end."""
-        held = self._rest or self._received(first_s)
+        held = self._rest or self._receive(first_s)
         due_s = self._clock.now_s() + rest_s
         while b"\n" not in held:
             if len(held) > self._longest:
@@ -342,7 +342,7 @@ class Wire:
             try:
                 if left_s <= 0.0:  # a sender of single bytes without a line end
                     raise TimeoutError
-                held += self._received(left_s)
+                held += self._receive(left_s)
             except TimeoutError:
                 raise MalformedMessage(
                     f"no end of the line within {rest_s:g} s", over=True
@@ -352,7 +352,7 @@ class Wire:
             raise MalformedMessage(f"longer than {self._longest} bytes", over=True)
         return line
 
-    def _received(self, within_s: float | None) -> bytes:
+    def _receive(self, within_s: float | None) -> bytes:
         self._end.settimeout(within_s)
         data = self._end.recv(_CHUNK_BYTES)
         if not data:

@@ -145,7 +145,7 @@ class RemoteServer:
     def _admit(self, end: socket.socket, listener: Listener) -> None:
         """Accept a program if it belongs to this user."""
         try:
-            caller = listener.admitted(end)
+            caller = listener.identify(end)
         except OSError:  # gone already
             caller = None
         if caller is None:
@@ -169,14 +169,14 @@ class RemoteServer:
         """Answer one program until it disconnects or its data cannot be parsed."""
         own = Budget(EACH, self._clock.now_s())
         try:
-            while self._served(wire, peer, own):
+            while self._serve_request(wire, peer, own):
                 pass
         finally:
             with self._lock:
                 self._wires.pop(wire, None)
             wire.close()
 
-    def _served(self, wire: Wire, peer: str, own: Budget) -> bool:
+    def _serve_request(self, wire: Wire, peer: str, own: Budget) -> bool:
         """Answer one request; return whether another can follow."""
         try:
             request = wire.read(None, _REST_S)
@@ -187,7 +187,7 @@ class RemoteServer:
         with self._lock:
             if wire in self._wires:
                 self._wires[wire] = self._wires.pop(wire)
-        if not is_stop(request) and (text := self._delayed(own)):
+        if not is_stop(request) and (text := self._delay(own)):
             return self._answer(wire, {"refused": text})
         began_s = time.thread_time()
         try:
@@ -202,7 +202,7 @@ class RemoteServer:
         self._budget.spend(used_s, now_s)
         return taken
 
-    def _delayed(self, own: Budget) -> str:
+    def _delay(self, own: Budget) -> str:
         """Delay a program that uses too much time; return the reason if it is refused."""
         now_s = self._clock.now_s()
         wait_s = max(own.wait_s(now_s), self._budget.wait_s(now_s))

@@ -51,7 +51,7 @@ class Steering:
 
     def key(self, right: int, up: int, now_s: float) -> None:
         """Press an arrow key: -1, 0 or 1 on each axis."""
-        yaw, pitch = self._keys_deg if self._held(now_s) else (0.0, 0.0)
+        yaw, pitch = self._keys_deg if self._is_key_held(now_s) else (0.0, 0.0)
         wide, high = _WIDEST_DEG
         self._keys_deg = (
             max(-wide, min(wide, yaw + _KEY_DEG * right)),
@@ -66,11 +66,11 @@ class Steering:
             share = min(1.0, (held - _DEAD) / (1.0 - _DEAD)) / held
             aside, up = (share * self._stick.x, share * self._stick.y)
             degrees = aside * _WIDEST_DEG[0], up * _WIDEST_DEG[1]
-        elif self._held(now_s):
+        elif self._is_key_held(now_s):
             degrees = self._keys_deg
         else:
             return None
         return radians(self._sign * degrees[0]), radians(degrees[1])
 
-    def _held(self, now_s: float) -> bool:
+    def _is_key_held(self, now_s: float) -> bool:
         return self._key_s is not None and now_s - self._key_s < KEYS_LET_GO_S

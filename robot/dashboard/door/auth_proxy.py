@@ -177,13 +177,13 @@ class AuthProxy:
 
     async def _serve(self) -> None:
         app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
-        app.router.add_get("/rig/line", self._line)
+        app.router.add_get("/rig/line", self._handle_line)
         app.router.add_get("/rig/panels", self._panels)
         app.router.add_get("/rig/webcam", self._webcam)
-        app.router.add_post("/rig/ask", self._asked)
+        app.router.add_post("/rig/ask", self._handle_post)
         PageFiles(_HEADERS).add_to(app.router)
-        app.router.add_get(VIEW, self._pass_on)
-        app.router.add_get(f"{VIEW}/{{path:.*}}", self._pass_on)
+        app.router.add_get(VIEW, self._relay_view)
+        app.router.add_get(f"{VIEW}/{{path:.*}}", self._relay_view)
         app.router.add_get("/{path:.*}", self._nothing)
         runner = web.AppRunner(
             app, access_log=None, shutdown_timeout=0.5, lingering_time=0.0, max_line_size=4096
@@ -252,7 +252,7 @@ class AuthProxy:
 
     # --- the stop button ------------------------------------------------------------------
 
-    async def _asked(self, request: web.Request) -> web.Response:
+    async def _handle_post(self, request: web.Request) -> web.Response:
         """Send a request to the rig; answer whether it was accepted."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
@@ -276,7 +276,7 @@ class AuthProxy:
             self.browsers.led_by(who)
         return (204, "") if self._ask(compact(asked)) else (503, "the rig takes nothing now")
 
-    async def _line(self, request: web.Request) -> web.StreamResponse:
+    async def _handle_line(self, request: web.Request) -> web.StreamResponse:
         """Send the state whenever it changes, with heartbeats in between; receive stops.
 
         It is already open when STOP is pressed; a browser opens only six others.
@@ -377,7 +377,7 @@ class AuthProxy:
 
     # --- the server behind the door -------------------------------------------------------
 
-    async def _pass_on(self, request: web.Request) -> web.StreamResponse:
+    async def _relay_view(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" in request.headers:
             return await self._view.relay(request, self._who(request), self._over.wait())
         if request.path == VIEW:  # paths in the document are relative to it

@@ -19,9 +19,9 @@ from gazerig.robot.dashboard.door.viser_server import (
     ViewAddress,
 )
 from gazerig.robot.dashboard.door.websocket_relay import (
-    carry_in,
-    carry_out,
     close_socket,
+    relay_in,
+    relay_out,
     until_one_ends,
 )
 from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
@@ -142,7 +142,7 @@ class ViewProxy:
                 await browser.prepare(request)
                 self._connections.lasting(request)
                 await until_one_ends(
-                    carry_in(browser, inside), carry_out(inside, browser), over, leave.wait()
+                    relay_in(browser, inside), relay_out(inside, browser), over, leave.wait()
                 )
         await close_socket(browser, request)
         return browser

@@ -20,7 +20,7 @@ _CLOSES_WITHIN_S = 1.0
 Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
-async def carry_in(browser: web.WebSocketResponse, inside: Socket) -> None:
+async def relay_in(browser: web.WebSocketResponse, inside: Socket) -> None:
     """Relay a browser's messages, at a limited rate."""
     messages, size = (
         TokenBucket(MESSAGES_PER_S, MESSAGES_BURST),
@@ -32,10 +32,10 @@ async def carry_in(browser: web.WebSocketResponse, inside: Socket) -> None:
             await asyncio.sleep(wait_s)
         messages.take(loop.time())
         size.take(loop.time(), len(message.data or ""))
-        await _hand_on(message, inside)
+        await _forward(message, inside)
 
 
-async def carry_out(inside: Socket, browser: web.WebSocketResponse) -> None:
+async def relay_out(inside: Socket, browser: web.WebSocketResponse) -> None:
     """Relay the server's messages, as fast as the browser reads them.
 
     Raises:
@@ -43,7 +43,7 @@ async def carry_out(inside: Socket, browser: web.WebSocketResponse) -> None:
     """
     async for message in inside:
         async with asyncio.timeout(TAKES_S):
-            await _hand_on(message, browser)
+            await _forward(message, browser)
 
 
 async def until_one_ends(*works: Awaitable[object]) -> None:
@@ -69,7 +69,7 @@ async def close_socket(socket: web.WebSocketResponse, request: web.Request) -> N
         request.transport.abort()
 
 
-async def _hand_on(message: aiohttp.WSMessage, there: Socket) -> None:
+async def _forward(message: aiohttp.WSMessage, there: Socket) -> None:
     if message.type is aiohttp.WSMsgType.BINARY:
         await there.send_bytes(message.data)
     elif message.type is aiohttp.WSMsgType.TEXT:

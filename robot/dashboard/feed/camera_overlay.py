@@ -165,7 +165,7 @@ def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: flo
     if z <= 0.0:  # behind the camera
         return
     u, v = project([blob.p_camera_m], lens)[0].tolist()
-    radius = max(2, _clipped(lens.fx_px * blob.radius_m / z * scale))
+    radius = max(2, _clip(lens.fx_px * blob.radius_m / z * scale))
     centre = _pixel(u, v, scale)
     cv2.circle(drawn, centre, radius, _BLOB, 1, cv2.LINE_AA)
     _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
@@ -184,10 +184,10 @@ def _write(drawn: ImageArray, text: str, at: Point, colour: tuple[int, int, int]
 
 
 def _pixel(x: float, y: float, scale: float) -> Point:
-    return _clipped(x * scale), _clipped(y * scale)
+    return _clip(x * scale), _clip(y * scale)
 
 
-def _clipped(value: float) -> int:
+def _clip(value: float) -> int:
     """Round; OpenCV draws nothing sensible at coordinates beyond 16 bits."""
     return round(min(max(value, -30_000.0), 30_000.0))
 

@@ -69,7 +69,7 @@ _HANG_S = 5.0
 _LAST_LINES_BYTES = 4096
 _MOST_PIXELS = 1 << 23  # of a message that contains images
 _MOST_WORDS = 20_000  # of one answer, in characters
-_MOST_OWED = 100  # answers to a page that takes none
+_MAX_PENDING = 100  # answers to a page that takes none
 _AGAIN_AFTER_S = 0.5
 _AGAIN_LATEST_S = 30.0
 _WELL_AFTER_S = 60.0  # after this time the wait before a restart is short again
@@ -152,7 +152,7 @@ class PageProcess:
         self._folder = ""
         self._url: str | None = None
         self._notices: deque[str] = deque()
-        self._owed: deque[bytes] = deque(maxlen=_MOST_OWED)
+        self._pending_replies: deque[bytes] = deque(maxlen=_MAX_PENDING)
         self._paying = threading.Lock()
         self._shown_s = nan
         self.dropped = 0
@@ -197,16 +197,16 @@ class PageProcess:
         """
         link.setblocking(False)
         self._socket = link
-        self._inbox = Inbox(link, self._take, self._lose, self._refuse)
+        self._inbox = Inbox(link, self._take, self._handle_loss, self._refuse)
         self._stops = StopListener(stops, self._stop) if stops is not None else None
 
     def show(self, snapshot: Snapshot) -> None:
         """Send a snapshot; if the page does not accept it, it is dropped and counted."""
-        self._end_hung()
+        self._kill_if_hung()
         if abs(snapshot.t_s - self._shown_s) < SHOWN_EVERY_S:
             return
         self._shown_s = snapshot.t_s
-        self._pay()
+        self._flush_replies()
         if not self.send(pack(snapshot)):
             self.dropped += 1
 
@@ -303,16 +303,16 @@ class PageProcess:
     def _answer(self, who: str, text: str | None) -> None:
         """Acknowledge a request, with the reply."""
         text = text[:_MOST_WORDS] if text is not None else None
-        self._owed.append(MESSAGE + json.dumps((who, text)).encode())
-        self._pay()
+        self._pending_replies.append(MESSAGE + json.dumps((who, text)).encode())
+        self._flush_replies()
 
-    def _pay(self) -> None:
+    def _flush_replies(self) -> None:
         """Send the answers that the page could not accept so far."""
         with self._paying:
-            while self._owed and self.send(self._owed[0]):
-                self._owed.popleft()
+            while self._pending_replies and self.send(self._pending_replies[0]):
+                self._pending_replies.popleft()
 
-    def _lose(self) -> None:
+    def _handle_loss(self) -> None:
         """Report once that the page has died, and restart it if that can help."""
         process = self._process
         self._hang_up()
@@ -326,9 +326,9 @@ class PageProcess:
         self._mourned = True
         if self.gone:
             return
-        threading.Thread(target=self._begin_again, name="page start", daemon=True).start()
+        threading.Thread(target=self._restart, name="page start", daemon=True).start()
 
-    def _begin_again(self) -> None:
+    def _restart(self) -> None:
         wait_s, self._wait_s = self._wait_s, min(2.0 * self._wait_s, _AGAIN_LATEST_S)
         self._over.wait(wait_s)
         with self._beginning:
@@ -340,7 +340,7 @@ class PageProcess:
             except OSError as error:  # no memory, no processes, no files
                 self._notices.append(f"the page cannot be started again: {error.strerror}")
 
-    def _end_hung(self) -> None:
+    def _kill_if_hung(self) -> None:
         """Kill and restart a page that hangs or is suspended: its STOP button may not work.
 
         One that is still starting, without an address, does not hang.

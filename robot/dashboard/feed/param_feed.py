@@ -32,7 +32,7 @@ class ParamFeed:
         self._version: int | None = None
         self._write()
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Send everything again to a restarted page."""
         self._due.clear()
         self._known, self._version = {}, None
@@ -98,7 +98,7 @@ class ParamThread:
                 self._thread.start()
             self._wanted.set()
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Request that everything is sent again to a restarted page."""
         self._again = True
         self._wanted.set()
@@ -119,7 +119,7 @@ class ParamThread:
             try:
                 if self._again:
                     self._again = False
-                    self._feed.begin_anew()
+                    self._feed.restart()
                 self._feed.step()
             except Exception as error:
                 if not self._failed:

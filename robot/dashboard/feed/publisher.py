@@ -63,12 +63,12 @@ class Publisher:
         self._frame = 0
         self._images = False
 
-    def obeyed(self, commands: Iterable[Command]) -> None:
+    def process_commands(self, commands: Iterable[Command]) -> None:
         """Process executed commands: tuning may have changed the rig's geometry."""
         if any(isinstance(command, Tune) for command in commands):
-            self.rebuilt()
+            self.resend_geometry()
 
-    def rebuilt(self) -> None:
+    def resend_geometry(self) -> None:
         """Send the rig's geometry again, after a change of its camera or its parameters."""
         self._rig_sent = False
 
@@ -78,7 +78,7 @@ class Publisher:
         self._tell_notices()
         new = page.started != self._started
         if new:
-            self._begin_anew()
+            self._restart()
         if self._started == 0:
             return True
         if self._params is not None:
@@ -101,10 +101,10 @@ class Publisher:
         if self._params is not None:
             self._params.close()
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         """Send everything to a new page: only the one before has received it."""
         if self._params is not None and self._started:
-            self._params.begin_anew()
+            self._params.restart()
         self._started = self._page.started
         self._rig_sent, self._sent, self._frame = False, None, 0
         self._state_s = self._frame_s = -inf

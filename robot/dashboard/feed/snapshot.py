@@ -125,7 +125,7 @@ class SnapshotBuilder:
                 worst = tick.guard_result.level
         if self._newest is None:
             return None
-        timing = self._timed(self._newest.t_s)
+        timing = self._loop_figures(self._newest.t_s)
         busy = busy_text(timing)
         plain = snapshot(
             self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,
@@ -140,7 +140,7 @@ class SnapshotBuilder:
             ),
             timing=timing,
             busy=busy,
-            reasons=_by_time(plain.reasons, busy),
+            reasons=_limit_reasons(plain.reasons, busy),
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),
@@ -152,7 +152,7 @@ class SnapshotBuilder:
         if tick.joints.missing:
             self._unanswered.update(tick.joints.missing)
 
-    def _timed(self, t_s: float) -> LoopFigures | None:
+    def _loop_figures(self, t_s: float) -> LoopFigures | None:
         """Return the timing of the loop, computed twice a second."""
         if t_s - self._figures_s >= _TIMING_S:
             self._figures, self._figures_s = self._timing.figures(), t_s
@@ -220,7 +220,7 @@ def snapshot(
     )
 
 
-def _by_time(reasons: tuple[str, ...], busy: str) -> tuple[str, ...]:
+def _limit_reasons(reasons: tuple[str, ...], busy: str) -> tuple[str, ...]:
     """Return why joints are limited; a busy computer replaces joints with old readings."""
     others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
     return (*others, busy) if busy and len(others) < len(reasons) else reasons

@@ -37,7 +37,7 @@ class AnimationPanel:
         if self.expressions is not None:
             self.expressions.options = options
             return
-        section = self._shown()
+        section = self._open_section()
         self.expressions = section.buttons(EXPRESSION, options, order=1)
         strength = self.strength = section.slider("strength", (0.0, 1.0), 0.05, 1.0, order=2)
 
@@ -56,7 +56,7 @@ class AnimationPanel:
         if self.gestures is not None:
             self.gestures.options = options
             return
-        section = self._shown()
+        section = self._open_section()
         self.gestures = section.buttons(GESTURE, options, order=3)
         speed = self.speed = section.slider("speed", _SPEEDS, _SPEED_STEP, 1.0, order=4)
 
@@ -66,7 +66,7 @@ class AnimationPanel:
 
         self.gestures.on_press(play)
 
-    def _shown(self) -> Container:
+    def _open_section(self) -> Container:
         """Return the section; create it at the first call."""
         if self._section is None:
             self._section = self._place.section("face", order=20)

@@ -26,7 +26,7 @@ def winner(snapshot: Snapshot) -> str:
         f"<div class='big'>{escape(snapshot.target_name)}</div>"
         f"<div class='tall'>{escape(reason(snapshot))}</div>"
         f"<div class='in-force'>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))} "
-        f"{_in_force(snapshot)}</div>"
+        f"{_present_choices(snapshot)}</div>"
     )
 
 
@@ -50,21 +50,21 @@ def reason(snapshot: Snapshot) -> str:
     if first.rule < _LEAST_TOLD:
         return f"because it {moves}" if moves else snapshot.why
     if not moves:
-        return f"because the {behaviour} asks for it ({first.rule:.2f}){_planned(because)}"
-    return f"because it {moves}, and the {behaviour} adds {first.rule:.2f}{_planned(because)}"
+        return f"because the {behaviour} asks for it ({first.rule:.2f}){_plan_reason(because)}"
+    return f"because it {moves}, and the {behaviour} adds {first.rule:.2f}{_plan_reason(because)}"
 
 
-def _planned(because: str) -> str:
+def _plan_reason(because: str) -> str:
     """Return the planner's reason as the end of a sentence, "" without one."""
     return f": {because}" if because else ""
 
 
 def saliences(snapshot: Snapshot) -> str:
     """Return the saliences by term as HTML, the highest first."""
-    return "" if snapshot.leader.led else _saliences(snapshot.saliences)
+    return "" if snapshot.leader.led else _salience_rows(snapshot.saliences)
 
 
-def _in_force(snapshot: Snapshot) -> str:
+def _present_choices(snapshot: Snapshot) -> str:
     named = (
         ("behaviour", snapshot.behaviour),
         ("plan", snapshot.plan.partition(":")[0]),
@@ -74,7 +74,7 @@ def _in_force(snapshot: Snapshot) -> str:
     return " ".join(chip(f"{what}: {name}") for what, name in named if name)
 
 
-def _saliences(rows: tuple[Salience, ...]) -> str:
+def _salience_rows(rows: tuple[Salience, ...]) -> str:
     if not rows:
         return note("nothing is salient: the gaze wanders by itself")
     full = max(_LEAST_FULL, *(_sum(one) for one in rows), rows[0].total)

@@ -10,7 +10,7 @@ from gazerig.robot.analysis.human_norms import DWELL_MEAN_S
 from gazerig.robot.dashboard.widgets.html import (
     LINE_PX,
     box,
-    counted,
+    count_text,
     heading,
     line,
     note,
@@ -78,7 +78,7 @@ class DwellChart:
             f"{PART_NAMES[part]} {100.0 * shares.get(part, 0.0):.0f} %" for part in PARTS
         )
         return (
-            heading("rests on face parts", counted(self.rests, "rest"))
+            heading("rests on face parts", count_text(self.rests, "rest"))
             + svg(foot + 17.0, (*rows, *ends), f"share of the time on each part: {said}")
             + note(
                 "dashes: mean of the person measured (Nakamoto & Tsuruno, table 1); "

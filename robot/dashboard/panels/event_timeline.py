@@ -30,7 +30,7 @@ _SACCADE_PX, _LARGE_DEG = 34.0, 30.0
 _LETTER_PX = 7.4
 
 
-class _Stretch(NamedTuple):
+class _Interval(NamedTuple):
     """Interval with a constant value."""
 
     start_s: float
@@ -48,7 +48,7 @@ class Timeline(PagePanel):
     period = 8
 
     def __init__(self) -> None:
-        self._rows: dict[str, deque[_Stretch]] = {
+        self._rows: dict[str, deque[_Interval]] = {
             "target": deque(), "part": deque(), "guard": deque(),
         }  # fmt: skip
         self._events: deque[SeenEvent] = deque()
@@ -63,20 +63,20 @@ class Timeline(PagePanel):
                 stretches.clear()
         self._now_s = t_s
         target = snapshot.target_name.partition(":")[0]
-        self._lengthen("target", t_s, target, snapshot.target_kind)
-        self._lengthen("part", t_s, snapshot.target_part or "", snapshot.target_part or "")
+        self._extend("target", t_s, target, snapshot.target_kind)
+        self._extend("part", t_s, snapshot.target_part or "", snapshot.target_part or "")
         level = "stopped" if snapshot.stopped else snapshot.worst
-        self._lengthen("guard", t_s, level, level)
+        self._extend("guard", t_s, level, level)
         self._events += snapshot.events
         self._forget(t_s - STRIP_S)
 
-    def _lengthen(self, row: str, t_s: float, what: str, kind: str) -> None:
+    def _extend(self, row: str, t_s: float, what: str, kind: str) -> None:
         """Extend a row's last interval, or start a new one if the value has changed."""
         stretches = self._rows[row]
         if stretches and (stretches[-1].what, stretches[-1].kind) == (what, kind):
             stretches[-1] = stretches[-1]._replace(end_s=t_s)
             return
-        stretches.append(_Stretch(stretches[-1].end_s if stretches else t_s, t_s, what, kind))
+        stretches.append(_Interval(stretches[-1].end_s if stretches else t_s, t_s, what, kind))
 
     def _forget(self, before_s: float) -> None:
         for stretches in self._rows.values():
@@ -85,7 +85,7 @@ class Timeline(PagePanel):
         while self._events and self._events[0][0] < before_s:
             self._events.popleft()
 
-    def stretches(self, row: str) -> tuple[tuple[float, float, str], ...]:
+    def intervals(self, row: str) -> tuple[tuple[float, float, str], ...]:
         """Return start, end and value of each interval of a row: target, part or guard."""
         return tuple(stretch[:3] for stretch in self._rows[row])
 
@@ -94,10 +94,10 @@ class Timeline(PagePanel):
         now_s = self._now_s
         if now_s is None:
             return note("waiting for the rig")
-        parts = [*_ground(), *self._bands(now_s), *self._marks(now_s)]
-        return svg(_AXIS_PX + 18.0, parts, self._says())
+        parts = [*_axes(), *self._bands(now_s), *self._marks(now_s)]
+        return svg(_AXIS_PX + 18.0, parts, self._description())
 
-    def _says(self) -> str:
+    def _description(self) -> str:
         """Return the strip as text, for screen readers."""
         targets = dict.fromkeys(stretch.what for stretch in self._rows["target"] if stretch.what)
         saccades = sum(isinstance(event, SeenSaccade) for event in self._events)
@@ -139,7 +139,7 @@ def _x(t_s: float, now_s: float) -> float:
     return _RIGHT_PX + ago * (_RIGHT_PX - _LEFT_PX) / STRIP_S
 
 
-def _ground() -> Iterable[str]:
+def _axes() -> Iterable[str]:
     """Return the names of the rows, their lines, and the axis of time."""
     for name, y in _ROWS_PX.items():
         yield text(1.0, y + (28.0 if name == "saccades" else 12.0), name)
@@ -154,7 +154,7 @@ def _ground() -> Iterable[str]:
 
 
 def _band(
-    row: str, stretch: _Stretch, now_s: float, high: float, colour: str, label: str
+    row: str, stretch: _Interval, now_s: float, high: float, colour: str, label: str
 ) -> Iterable[str]:
     """Return one interval as a bar, with its name if it fits."""
     x0, x1 = _x(stretch.start_s, now_s), _x(stretch.end_s, now_s)

@@ -42,7 +42,7 @@ class JogPanel:
             ),
             order=0,
         )
-        self.not_measured = place.html(order=_LAST)
+        self.estimated_joints_note = place.html(order=_LAST)
 
     def let_go(self) -> None:
         """Forget the jogged joints; their sliders follow them again."""
@@ -89,14 +89,14 @@ class JogPanel:
         for joint, slider in self.sliders.items():
             if (i := places.get(joint)) is None:
                 continue
-            self._note_held(joint, degrees(snapshot.desired_rad[i]), bool(snapshot.stopped))
+            self._track_jogged(joint, degrees(snapshot.desired_rad[i]), bool(snapshot.stopped))
             angle_deg = degrees(snapshot.measured_rad[i])
             if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
                 low, high = slider.ends
                 slider.value = round(min(max(angle_deg, low), high), 1)
-        self.not_measured.content = not_measured(snapshot)
+        self.estimated_joints_note.content = estimated_joints_note(snapshot)
 
-    def _note_held(self, joint: str, desired_deg: float, stopped: bool) -> None:
+    def _track_jogged(self, joint: str, desired_deg: float, stopped: bool) -> None:
         """Forget a joint that a stop or another command has released."""
         held = self._held.get(joint)
         if held is None:
@@ -110,7 +110,7 @@ class JogPanel:
             del self._held[joint]
 
 
-def not_measured(snapshot: Snapshot) -> str:
+def estimated_joints_note(snapshot: Snapshot) -> str:
     """Return the joints with estimated angles as HTML, "" if all are measured."""
     estimated = [joint for joint in snapshot.joints if joint in frozenset(snapshot.estimated)]
     if not estimated:

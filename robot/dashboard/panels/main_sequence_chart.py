@@ -10,7 +10,7 @@ import numpy as np
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.human_norms import fastest_peak, longest_ms, shortest_ms, slowest_peak
-from gazerig.robot.dashboard.widgets.html import LINE_PX, counted, heading, line, note, svg, text
+from gazerig.robot.dashboard.widgets.html import LINE_PX, count_text, heading, line, note, svg, text
 from gazerig.robot.model.types import SeenSaccade
 
 KEPT = 400
@@ -45,7 +45,7 @@ class MainSequenceChart:
         speed, length = "peak speed, deg/s, against size, deg", "duration, ms, against size, deg"
         fastest, longest = _room(_FASTEST_DEG_S, speeds), _room(_LONGEST_MS, lengths)
         return (
-            heading(speed, counted(self.count, "saccade"))
+            heading(speed, count_text(self.count, "saccade"))
             + _image(speed, sizes, speeds, widest, fastest, slowest_peak, fastest_peak)
             + heading(length)
             + _image(length, sizes, lengths, widest, longest, shortest_ms, longest_ms)

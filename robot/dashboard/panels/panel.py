@@ -51,7 +51,7 @@ class PanelView:
         self.saliences = watch.html(order=2)
         self.traces = JointCharts(watch.section("traces", order=4))
         statistics = watch.section("statistics", is_open=False, order=5)
-        self.of_what = statistics.html(order=1)
+        self.estimation_note = statistics.html(order=1)
         self.saccades = statistics.html(order=2)
         self.dwells = statistics.html(order=3)
         heat = watch.section("heat map on the face", is_open=False, order=6)
@@ -106,7 +106,7 @@ class PanelView:
             if "watch" in self._open:
                 self.winner.content = winner(snapshot) + other_heads(snapshot)
                 self.saliences.content = saliences(snapshot)
-                self.of_what.content = of_what(snapshot)
+                self.estimation_note.content = estimation_note(snapshot)
             if "health" in self._open:
                 self.health.content = health(snapshot)
         if "watch" in self._open and self._shown % _TRACES_EVERY == 0:
@@ -155,7 +155,7 @@ class PanelView:
         return layers
 
 
-def of_what(snapshot: Snapshot) -> str:
+def estimation_note(snapshot: Snapshot) -> str:
     """Return a note that eye movements are estimated, "" if they are measured."""
     if not any("eye" in joint for joint in snapshot.estimated):
         return ""

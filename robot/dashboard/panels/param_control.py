@@ -26,7 +26,7 @@ def hint(param: Parameter) -> str:
     if param.choices:
         parts.append("one of " + ", ".join(map(str, param.choices)))
     if param.default is not None or param.optional:  # the shipped rig may have no such joint or bus
-        parts.append(f"default {written(param, param.default)}{unit}")
+        parts.append(f"default {format_value(param, param.default)}{unit}")
     parts.append(f"in force at the {param.live}")
     return "; ".join(parts)
 
@@ -38,14 +38,14 @@ def label(param: Parameter, unsaved: bool) -> str:
     return f"{'● ' if unsaved else ''}{name}{unit}"
 
 
-def step_of(low: float, high: float) -> float:
+def slider_step(low: float, high: float) -> float:
     """Return a slider's step: 1, 2 or 5 times a power of ten, some hundreds in the range."""
     fine = (high - low) / _SLIDER_STEPS
     ten = 10.0 ** floor(log10(fine))
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
 
 
-def slides(param: Parameter, value: object) -> bool:
+def fits_slider(param: Parameter, value: object) -> bool:
     """Return whether a slider can set a parameter finely enough."""
     if param.kind not in ("number", "whole") or isinstance(value, bool):
         return False
@@ -58,7 +58,7 @@ def slides(param: Parameter, value: object) -> bool:
     return low <= value <= high and (usual == 0.0 or high - low <= _FAR * usual)
 
 
-def written(param: Parameter, value: object) -> str:
+def format_value(param: Parameter, value: object) -> str:
     """Return a value as a person types it: text unchanged, other values as in the file."""
     if isinstance(value, str) and param.kind in ("text", "choice"):
         return value
@@ -81,7 +81,7 @@ def read(param: Parameter, text: str) -> object:
     try:
         return json.loads(text)
     except ValueError:
-        like = written(param, param.default)
+        like = format_value(param, param.default)
         raise ValueError(
             f"{param.key}: {text!r} is no {param.kind}; write it like {like}"
         ) from None
@@ -124,14 +124,14 @@ class ParamControl:
         if param.choices and not param.optional and value in param.choices:
             names = tuple(map(str, param.choices))
             return place.choice(text, names, str(value), hint=tooltip, order=order)
-        if slides(param, value):
+        if fits_slider(param, value):
             return self._slider(place, text, value, order)
-        shown = written(param, value)
+        shown = format_value(param, value)
         return place.text(text, shown, hint=f"{tooltip}; Enter sets it", order=order)
 
     def _slider(self, place: Container, text: str, value: object, order: float) -> Slider:
         low, high = cast(float, self.param.low), cast(float, self.param.high)
-        now, whole, step = cast(float, value), self.param.kind == "whole", step_of(low, high)
+        now, whole, step = cast(float, value), self.param.kind == "whole", slider_step(low, high)
         if whole:
             step = max(1, round(step)) if high - low > 500 else 1
         return place.slider(
@@ -141,13 +141,13 @@ class ParamControl:
     def _asked(self, shown: object) -> None:
         """Request the value that a person has set."""
         try:
-            value = self._meant(shown)
+            value = self._parse_input(shown)
         except ValueError as error:
             self._refuse(str(error))
         else:
             self._put(self.param.key, value)
 
-    def _meant(self, shown: object) -> object:
+    def _parse_input(self, shown: object) -> object:
         """Return the choice of a name, the value of a text, or the value itself.
 
         Raises:
@@ -161,7 +161,7 @@ class ParamControl:
         """Show the present value."""
         self.field.label = label(self.param, unsaved)
         if isinstance(self.field, TextField):
-            self.field.value = written(self.param, value)
+            self.field.value = format_value(self.param, value)
         elif isinstance(self.field, Choice):
             self.field.value = str(value)
         elif isinstance(self.field, Checkbox):

@@ -88,7 +88,7 @@ class ReplayView:
             self._asked_s = None
             self.slider.value = min(round(at_s, 3), self._duration_s)
         self._show_playing(bool(state["playing"]), float(state["speed"]))
-        self.place.content = place_words(at_s, self._duration_s, self._playing)
+        self.place.content = position_text(at_s, self._duration_s, self._playing)
         self.events.content = event_list(self._events, at_s)
 
     def _show_playing(self, playing: bool, speed: float) -> None:
@@ -130,7 +130,7 @@ def _bars(counts: Sequence[int], colour: str, top: int, height: int) -> str:
     )
 
 
-def place_words(at_s: float, duration_s: float, playing: bool) -> str:
+def position_text(at_s: float, duration_s: float, playing: bool) -> str:
     """Show the present position in the recording."""
     word = "playing" if playing else "standing still"
     return f"<div class='ends'><span>{word}</span><span>{clock(at_s)} / {clock(duration_s)}</span></div>"

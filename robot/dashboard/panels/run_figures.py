@@ -112,7 +112,7 @@ class RunFigures:
         )
 
 
-def judged(figure: RunFigure, band: NormBand) -> str:
+def compare_with_band(figure: RunFigure, band: NormBand) -> str:
     """Return the relation of a measure to the range of people as text.
 
     As in the report, a measure is not called outside if its distance may be chance.
@@ -131,7 +131,7 @@ def judged(figure: RunFigure, band: NormBand) -> str:
 
 def _row(figure: RunFigure, band: NormBand) -> str:
     """Return the row of one measure: its value and the range of people."""
-    verdict = judged(figure, band)
+    verdict = compare_with_band(figure, band)
     kind = " class='near'" if verdict == "outside" else ""
     unit, factor = ("%", 100.0) if band.unit == "share" else (band.unit, 1.0)
     here, low, high = (f"{factor * value:.3g}" for value in (figure.value, band.low, band.high))

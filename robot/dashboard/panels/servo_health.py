@@ -5,7 +5,7 @@ from typing import Literal
 
 from gazerig.robot.dashboard.panels.status import (
     OLD_FRAME_S,
-    drawn_together,
+    group_reasons,
     one_line,
     without_feedback,
 )
@@ -35,7 +35,7 @@ def health(snapshot: Snapshot) -> str:
         + _timing(snapshot.timing)
         + heading("camera")
         + _frame(snapshot.frame_age_s)
-        + f"<div>{escape(_beside_age(snapshot.perception))}</div>"
+        + f"<div>{escape(_without_frame_age(snapshot.perception))}</div>"
     )
 
 
@@ -47,7 +47,7 @@ def guard(snapshot: Snapshot) -> str:
     elif level in ("hold", "torque_off"):
         said = "".join(f"<div>{escape(reason)}</div>" for reason in snapshot.reasons)
     else:
-        said = one_line(drawn_together(snapshot.reasons))
+        said = one_line(group_reasons(snapshot.reasons))
     words = f"guard: {level.replace('_', ' ')}"
     return f"<div class='stay'>{pill(words, LEVELS[level])}{said}</div>"
 
@@ -81,7 +81,7 @@ def _row(servos: Servos, i: int, joint: str, estimated: bool) -> str:
     silent = servos.unanswered[i] if servos.unanswered else None
     late: Strain = "over" if servos.age_s[i] > _OLD_S else ""
     figures = f"<td colspan='3' class='nothing'>{NO_FEEDBACK}</td>"
-    said = _said(servos, i)
+    said = _fault_text(servos, i)
     more = f"<div class='{'fault' if said != 'torque off' else 'quiet'}'>{escape(said)}</div>"
     return (
         f"<tr><th scope='row'>{escape(joint.replace('_', ' '))}"
@@ -104,7 +104,7 @@ def _figures(servos: Servos, i: int) -> str:
     )
 
 
-def _said(servos: Servos, i: int) -> str:
+def _fault_text(servos: Servos, i: int) -> str:
     """Return a servo's fault, silence or missing torque as text, "" if it is well."""
     if servos.fault and servos.fault[i]:
         return servos.fault[i]
@@ -163,7 +163,7 @@ def _timing(timing: LoopFigures | None) -> str:
     )
 
 
-def _beside_age(perception: str) -> str:
+def _without_frame_age(perception: str) -> str:
     """Return the text about perception without the frame's age, which has its own line."""
     first, _, others = perception.partition(" | ")
     return others if first.startswith(("frame ", "no frame")) else perception

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from gazerig.robot.dashboard.widgets.html import LEVELS, banner, counted, note
+from gazerig.robot.dashboard.widgets.html import LEVELS, banner, count_text, note
 from gazerig.robot.model.types import Snapshot
 
 _REASONS_SHOWN = 4
@@ -21,7 +21,7 @@ def alarms(snapshot: Snapshot) -> str:
     """
     said, kind = "", LEVELS[snapshot.level]
     if not snapshot.stopped and snapshot.level in ("hold", "torque_off"):
-        said += banner(_STANDS_STILL[snapshot.level], kind, _shown(snapshot.reasons))
+        said += banner(_STANDS_STILL[snapshot.level], kind, _first_reasons(snapshot.reasons))
     if snapshot.frame_age_s is not None and snapshot.frame_age_s >= OLD_FRAME_S:
         said += banner(f"the frame is {snapshot.frame_age_s:.1f} s old", "hold")
     for other in snapshot.others:
@@ -43,7 +43,7 @@ def silence() -> str:
     )
 
 
-def drawn_together(reasons: tuple[str, ...]) -> str:
+def group_reasons(reasons: tuple[str, ...]) -> str:
     """Return each reason once, with its first joint and the number of others.
 
     For example "too fast (neck_yaw, +2)": a short limitation must not move the elements below it.
@@ -76,10 +76,10 @@ def without_feedback(snapshot: Snapshot) -> str:
         where += f"; {'all' if without_torque == len(estimated) else without_torque} without torque: may be anywhere"
     return (
         f"<div class='warn'>{len(estimated)} of "
-        f"{counted(len(snapshot.joints), 'joint')} without feedback: {where}</div>"
+        f"{count_text(len(snapshot.joints), 'joint')} without feedback: {where}</div>"
     )
 
 
-def _shown(reasons: tuple[str, ...]) -> tuple[str, ...]:
+def _first_reasons(reasons: tuple[str, ...]) -> tuple[str, ...]:
     more = len(reasons) - _REASONS_SHOWN
     return reasons[:_REASONS_SHOWN] + ((f"and {more} more",) if more > 0 else ())

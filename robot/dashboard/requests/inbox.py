@@ -49,7 +49,7 @@ def parse_request(message: bytes) -> tuple[str, bytes]:
     return who.decode(), data
 
 
-def overtaken(earlier: bytes, later: bytes) -> bool:
+def is_superseded(earlier: bytes, later: bytes) -> bool:
     """Return whether a later change of the same parameters replaces an earlier one."""
     who, first = parse_request(earlier)
     again, second = parse_request(later)
@@ -107,12 +107,12 @@ class Inbox:
             if urgent(message):
                 self._take(message)
             else:
-                self._put_off(message)
+                self._defer(message)
         self._end_later()
         if not self._over.is_set():
             self._lost()
 
-    def _put_off(self, message: bytes) -> None:
+    def _defer(self, message: bytes) -> None:
         try:
             self._later.put_nowait(message)
         except queue.Full:
@@ -137,7 +137,7 @@ class Inbox:
                 waiting.append(self._later.get())
             # A dragged slider sends more than can be checked: only its last value counts.
             message = waiting.pop(0)
-            if not any(overtaken(message, later) for later in waiting if later):
+            if not any(is_superseded(message, later) for later in waiting if later):
                 self._take(message)
                 if parse_request(message)[1].startswith(_CHANGE):
                     self._over.wait(_CHANGES_EVERY_S)

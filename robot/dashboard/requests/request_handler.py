@@ -61,7 +61,7 @@ class PageRequestHandler:
         paths: PathGuard | None = None,
     ) -> None:
         self._handler = CommandHandler(
-            _Taking(command), params, refusals=refusals, saved=saved, paths=paths
+            _CommandSink(command), params, refusals=refusals, saved=saved, paths=paths
         )
         self._point = point
         self._steer = steer
@@ -80,7 +80,7 @@ class PageRequestHandler:
     def _do(self, data: Mapping[str, object]) -> str | None:
         match data:
             case {"do": str(verb)}:
-                return self._told(verb, self._handler.do(data, _signed), data)
+                return self._outcome_text(verb, self._handler.do(data, _signed), data)
             case {"pick": {"x": int() | float() as x, "y": int() | float() as y, **rest}}:
                 return self._pick(float(x), float(y), str(rest.get("who") or PAGE))
             case {"steer": str(way)} if self._steer is not None:
@@ -92,11 +92,13 @@ class PageRequestHandler:
                 return self._replay(asked)
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} cannot be asked for here")
 
-    def _told(self, verb: str, outcome: RequestResult, data: Mapping[str, object]) -> str | None:
+    def _outcome_text(
+        self, verb: str, outcome: RequestResult, data: Mapping[str, object]
+    ) -> str | None:
         """Return an outcome as text, None if no message is needed."""
         match outcome:
             case PendingCommand():
-                return self._replied(outcome)
+                return self._reply_text(outcome)
             case ParamsSaved(saved):
                 backup = saved.backup
                 kept = f", what was there is in {backup}" if backup is not None else ""
@@ -114,7 +116,7 @@ class PageRequestHandler:
                 return "\n".join(lines) or "all is as by default"
         return None  # the page gets these by other messages
 
-    def _replied(self, given: PendingCommand) -> str | None:
+    def _reply_text(self, given: PendingCommand) -> str | None:
         """Return a command's restrictions as text, None if there are none or no client waits."""
         if given.ticket is None or not isinstance(given.command, Leading | Resume):
             return None
@@ -138,10 +140,10 @@ class PageRequestHandler:
         point = self._point(x, y) if self._point is not None else None
         if point is None:
             return "refused: there is no camera image to look into yet"
-        return self._replied(self._handler.give(LookAt(point, who)))
+        return self._reply_text(self._handler.give(LookAt(point, who)))
 
 
-class _Taking:
+class _CommandSink:
     """Robot of which the page only uses the commands."""
 
     def __init__(self, take: CommandTaker) -> None:

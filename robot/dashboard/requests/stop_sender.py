@@ -26,7 +26,7 @@ class StopSender:
             OSError: the rig has ended or does not answer.
         """
         if self._waiting is None:
-            self._waiting = self._sent(why[:WORDS], who[:WORDS])
+            self._waiting = self._start_stop(why[:WORDS], who[:WORDS])
         waiting = self._waiting
         try:
             return await asyncio.wait_for(asyncio.shield(waiting), _ANSWERED_WITHIN_S)
@@ -39,7 +39,7 @@ class StopSender:
         """Receive the replies in this event loop."""
         loop.add_reader(self._link.fileno(), self._receive)
 
-    def _sent(self, why: str, who: str) -> asyncio.Future[str]:
+    def _start_stop(self, why: str, who: str) -> asyncio.Future[str]:
         self._number += 1
         stop = {"number": self._number, "do": "stop", "why": why, "who": who}
         # It may be full of stops, which a rig that hangs receives when it resumes.

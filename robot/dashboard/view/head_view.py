@@ -13,7 +13,7 @@ from gazerig.robot.dashboard.view.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Fi
 from gazerig.robot.dashboard.view.glow import glow
 from gazerig.robot.dashboard.view.lid_edges import LidEdges, lid_edges
 from gazerig.robot.dashboard.view.scene_node import put
-from gazerig.robot.dashboard.view.snapshot_shape import shape_of, wide_awake
+from gazerig.robot.dashboard.view.snapshot_shape import shape_of, with_shown_lids
 from gazerig.robot.description import links
 from gazerig.robot.description.build import SIDES, RigShape, describe
 from gazerig.robot.description.head_shape import HeadMeasures, measures_of
@@ -116,9 +116,9 @@ class HeadView:
 
     def _fit(self, snapshot: Snapshot) -> None:
         """Draw another rig if the geometry has changed."""
-        shape = wide_awake(self.shape) if self.shape is not None else None
+        shape = with_shown_lids(self.shape) if self.shape is not None else None
         if shape is None:
-            seen = snapshot.joints, shown_measures(snapshot)
+            seen = snapshot.joints, head_dimensions(snapshot)
             shape = self._drawn if seen == self._seen else shape_of(*seen, snapshot)
             self._seen = seen
         if shape != self._drawn and shape is not None:
@@ -130,14 +130,14 @@ class HeadView:
         before, self._description = self._description, description
         if before is None or _tree(before) != _tree(description):
             before = None
-            self._plant(description)
+            self._add_frames(description)
         at_rest = dict.fromkeys((joint.name for joint in description.joints), 0.0)
         lit = description.poses(at_rest | lid_angles(shape, (_LIT_OPEN,) * 2, (_LIT_OPEN,) * 2))
         paths = _paths(description)
         for link in description.links:
             node = self.links[link.name]
             put(node.frame, link.p_m, quaternion(link.R))
-            if before is not None and _alike(before.link(link.name), link):
+            if before is not None and _look_alike(before.link(link.name), link):
                 continue
             while node.looks:
                 node.looks.pop().remove()
@@ -150,7 +150,7 @@ class HeadView:
             x, y, _ = base.visuals[0].p_m
             put(self._shade, (x, y, FLOOR_M + 0.001))
 
-    def _plant(self, description: Description) -> None:
+    def _add_frames(self, description: Description) -> None:
         """Add a frame for every link to the scene, in that of its parent."""
         self._root.remove()
         self._root = self._scene.add_frame("/rig", show_axes=False)
@@ -187,7 +187,7 @@ def _tree(description: Description) -> list[tuple[str, str | None]]:
     return [(link.name, link.parent) for link in description.links]
 
 
-def _alike(one: Link, other: Link) -> bool:
+def _look_alike(one: Link, other: Link) -> bool:
     """Return whether two links look alike in their own frames."""
     return len(one.visuals) == len(other.visuals) and all(
         a._replace(painted=b.painted) == b
@@ -222,7 +222,7 @@ def lid_angles(
     }
 
 
-def shown_measures(snapshot: Snapshot) -> HeadMeasures:
+def head_dimensions(snapshot: Snapshot) -> HeadMeasures:
     """Return the measures of the head in a snapshot, from its eyes and the pivot of its neck."""
     pivot_m = None
     if snapshot.p_world_pivot_m is not None:

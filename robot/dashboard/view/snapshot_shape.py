@@ -31,9 +31,9 @@ def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot
     )
     lids = dict.fromkeys((name for name in LIDS if name in joints), (0.0, 0.0))
     shape = RigShape("rig", geometry, dict.fromkeys(joints, _JOINT), lids, {}, CameraParams())
-    return wide_awake(shape)
+    return with_shown_lids(shape)
 
 
-def wide_awake(shape: RigShape) -> RigShape:
+def with_shown_lids(shape: RigShape) -> RigShape:
     """Return a rig whose lids have the rotation that is shown."""
     return shape._replace(lids={name: (0.0, _LID_RAD[name.split("_")[1]]) for name in shape.lids})

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from gazerig.gaze.angles import add, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.dashboard.view.head_view import shown_measures
+from gazerig.robot.dashboard.view.head_view import head_dimensions
 from gazerig.robot.description.head_shape import CHIN, TOP, HeadMeasures
 from gazerig.robot.model.types import Snapshot
 
@@ -63,7 +63,7 @@ def _face(snapshot: Snapshot | None) -> View:
     """Return a close-up of the head with its neck straight."""
     measures, eyes_m = HeadMeasures(), (0.038, 0.0, 0.125)
     if snapshot is not None:
-        measures = shown_measures(snapshot)
+        measures = head_dimensions(snapshot)
         eyes_m = snapshot.p_world_head_m
         if snapshot.p_world_pivot_m is not None:
             eyes_m = sub(snapshot.p_world_pivot_m, measures.pivot_m)

@@ -43,7 +43,7 @@ def heading(text: str, aside: str = "") -> str:
     return f"<div class='heading'>{escape(text)}<span>{escape(aside)}</span></div>"
 
 
-def counted(n: int, what: str) -> str:
+def count_text(n: int, what: str) -> str:
     """Return a number of things, e.g. "1 saccade", "2 saccades"."""
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
