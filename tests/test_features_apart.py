@@ -11,7 +11,7 @@ from outside_package import install
 
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_format import WORLD
-from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.robot.recording.run_info import WorldInfo
 
 COMMANDS = {
     "study": ("study",),
@@ -81,7 +81,7 @@ from gazerig.robot.app.camera_factory import locator_of, scene_camera, true_head
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.surroundings import Surroundings
 from gazerig.robot.recording.run_format import WORLD
-from gazerig.robot.recording.world_info import WorldInfo
+from gazerig.robot.recording.run_info import WorldInfo
 from gazerig.sim_mock.scenes.registry import scenes
 class Room:
     stands = ()

@@ -10,7 +10,7 @@ import gazerig.robot.control.loop as loop
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.garbage import freeze_objects
+from gazerig.robot.control.real_time import freeze_objects
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

@@ -44,14 +44,19 @@ from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.model.leader import GestureState, LeadState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
-from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.record_router import RecordRouter
-from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, read_run_end, read_run_info
+from gazerig.robot.recording.recorder import FramePicker, Recorder
+from gazerig.robot.recording.run_info import (
+    RunEnd,
+    RunInfo,
+    WorldInfo,
+    as_text,
+    read_run_end,
+    read_run_info,
+)
 from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.viewer_messages import orientation
-from gazerig.robot.recording.world_info import WorldInfo
 from gazerig.robot.recording.writer_process import PIECE_BYTES
 
 pytestmark = pytest.mark.usefixtures("branched_children")

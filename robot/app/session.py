@@ -23,13 +23,13 @@ from gazerig.robot.app.run_figures import SceneScore, run_figures
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_info, run_rig
 from gazerig.robot.app.surroundings import RunRoom
-from gazerig.robot.control.event_text import drawn_together, is_register_change
+from gazerig.robot.control.event_text import group_events, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.loop import LoopCount, Robot, Tick, TickLoop
 from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
-from gazerig.robot.control.switch_interval import SWITCH_INTERVAL
+from gazerig.robot.control.real_time import SWITCH_INTERVAL
 from gazerig.robot.model.clock import RealClock
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ class Session:
         """Print the events of a tick."""
         events = tick.events
         if events:
-            events = tuple(drawn_together(events))
+            events = tuple(group_events(events))
         for event in (*events, *self._run_observers.events()):
             self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
         if not self._options.fast:
@@ -243,7 +243,7 @@ class Session:
         events, options = self._made.robot.body.bus.events(), self._options
         if options.mock and not options.verbose:
             events = tuple([event for event in events if not is_register_change(event)])
-        return drawn_together(events)
+        return group_events(events)
 
     def _unwritten_heatmap(self) -> Path | None:
         """Write the heat map if requested; return its file if that failed."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gazerig.robot.description.world_shapes import WorldShapes
     from gazerig.robot.model.clock import Clock
     from gazerig.robot.model.frames import CameraParams
-    from gazerig.robot.recording.world_info import WorldInfo
+    from gazerig.robot.recording.run_info import WorldInfo
     from gazerig.sim_mock.scenes.scene import Scene
 
 WORLD = "world"

@@ -147,9 +147,10 @@ class Body:
         rates = tuple(map(mul, speeds, self._rates))
         if self._bent or self._coupled is not None:
             angles = self.angles(steps)
-            rates = self._bent_rates(rates, speeds, steps)
-            if self._coupled is not None:
-                rates = tuple(self._coupled.speeds(angles, rates))
+            right = list(rates)
+            for i, linkage in self._bent:
+                right[i] = speeds[i] * linkage.rate_rad(steps[i])
+            rates = tuple(right if self._coupled is None else self._coupled.speeds(angles, right))
         else:
             angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
         missing = tuple([self.names[i] for i in gone]) if gone else ()
@@ -160,15 +161,6 @@ class Body:
                 angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured,
             ),
         )  # fmt: skip
-
-    def _bent_rates(
-        self, rates: tuple[float, ...], speeds: Sequence[float], steps: Sequence[float]
-    ) -> tuple[float, ...]:
-        """Return the rates of all joints, corrected for linkages that are not straight."""
-        right = list(rates)
-        for i, linkage in self._bent:
-            right[i] = speeds[i] * linkage.rate_rad(steps[i])
-        return tuple(right)
 
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo.

@@ -73,7 +73,7 @@ class GuardedChooser:
         rule: The rule.
         own: The rig's attention; it chooses if the rule does not, and after it was dropped.
         label: Name of the rule in messages.
-        say: Receives one line when the rule is dropped.
+        report: Receives one line when the rule is dropped.
         longest_s: Real time for the rule in s; None in simulated time, without a limit.
     """
 
@@ -82,11 +82,11 @@ class GuardedChooser:
         rule: Chooser,
         own: TargetChooser,
         label: str,
-        say: Callable[[str], None],
+        report: Callable[[str], None],
         longest_s: float | None = LONGEST_S,
     ) -> None:
         self._rule: Chooser | None = rule
-        self._own, self._label, self._say = own, label, say
+        self._own, self._label, self._report = own, label, report
         self.top_down = own.top_down
         self._call = BoundedCall(label, longest_s)
         self._overruns: list[float] = []
@@ -153,7 +153,7 @@ class GuardedChooser:
 
     def _drop(self, why: str) -> None:
         self.close()
-        self._say(f"{self._label} {why}: dropped, the rig's own attention chooses")
+        self._report(f"{self._label} {why}: dropped, the rig's own attention chooses")
 
 
 def _reset(rule: Chooser, t_s: float) -> None:

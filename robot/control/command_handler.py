@@ -248,13 +248,20 @@ class CommandHandler:
             case {"do": "differs", **rest} if not rest:
                 return QuestionAnswer(as_changes(self._require_params().differs()))
             case {"do": "set", "changes": dict(changes), **rest} if not rest:
-                return self._set(changes)
+                params = self._require_params()
+                if self._paths is not None:
+                    self._paths.changes(changes)
+                notes = params.set({key: as_value(value) for key, value in changes.items()})
+                return ParamsChanged(_notes(notes))
             case {"do": "save", "path": str() | None as path, **rest} if not rest:
                 return self._save(path)
             case {"do": "revert", **rest} if not rest:
                 return ParamsChanged(_notes(self._require_params().revert()))
             case {"do": "character", "name": str(name), **rest} if not rest:
-                return self._character(name)
+                params = self._require_params()
+                if self._paths is not None and name not in params.characters():
+                    name = self._paths.file(name, "characters")
+                return ParamsChanged(_notes(params.character(name)))
         raise ValueError(f"not understood; there is {'; '.join(REQUESTS)}")
 
     def _require_params(self) -> ParamAccess:
@@ -271,13 +278,6 @@ class CommandHandler:
             self._described = found, [(one.key, plain(one._asdict())) for one in found]
         return self._described[1]
 
-    def _set(self, changes: Mapping[str, object]) -> RequestResult:
-        params = self._require_params()
-        if self._paths is not None:
-            self._paths.changes(changes)
-        notes = params.set({key: as_value(value) for key, value in changes.items()})
-        return ParamsChanged(_notes(notes))
-
     def _save(self, path: str | None) -> RequestResult:
         params = self._require_params()
         if path and self._paths is not None:
@@ -289,12 +289,6 @@ class CommandHandler:
         if self._saved is not None:
             self._saved(saved.path)
         return ParamsSaved(saved)
-
-    def _character(self, name: str) -> RequestResult:
-        params = self._require_params()
-        if self._paths is not None and name not in params.characters():
-            name = self._paths.file(name, "characters")
-        return ParamsChanged(_notes(params.character(name)))
 
 
 def plain(value: object) -> object:

@@ -1,19 +1,11 @@
 """Conversion for pairs of servos that together move two joints."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from gazerig.drivers.types import Feedback
-from gazerig.robot.model.coupling import Coupling, Pair, Unreachable, joint_rates
+from gazerig.robot.model.coupling import Pair, Unreachable, joint_rates
 from gazerig.robot.model.coupling_params import CoupledPair
-
-
-class _Pair(NamedTuple):
-    """A coupling of the joints at two positions of every sequence."""
-
-    i: int
-    j: int
-    coupling: Coupling
 
 
 class CoupledServos:
@@ -25,8 +17,9 @@ class CoupledServos:
     """
 
     def __init__(self, pairs: Iterable[CoupledPair], names: Sequence[str]) -> None:
+        # The positions of both joints in every sequence, and their coupling.
         self._pairs = tuple(
-            _Pair(names.index(one.first), names.index(one.second), one.coupling) for one in pairs
+            (names.index(one.first), names.index(one.second), one.coupling) for one in pairs
         )
         self._goals: dict[int, Pair] = {}
         self._last: dict[int, Feedback] = {}

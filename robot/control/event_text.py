@@ -7,7 +7,7 @@ _SERVO = re.compile(r"servo (\d+)")
 _REGISTER = re.compile(r": .+ (-?\d+ -> -?\d+|set)$")
 
 
-def drawn_together(events: Iterable[str]) -> list[str]:
+def group_events(events: Iterable[str]) -> list[str]:
     """Group events that differ only in their servo, e.g. "servos 1-9: Return Delay Time 250 -> 0".
 
     An event is "neck_yaw (servo 7): what" or "servo 7: what"; other texts stay unchanged.

@@ -223,7 +223,13 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
         for name, one in data["joints"].items()
     }
     made["gaze"] = GazeReading(**_known_fields(GazeReading, data["gaze"]))
-    made["people"] = tuple(_read_person(one) for one in data["people"])
+    made["people"] = tuple(
+        Person(
+            **_known_fields(Person, one)
+            | {"parts_m": {name: tuple(point) for name, point in one["parts_m"].items()}}
+        )
+        for one in data["people"]
+    )
     made["lead"] = _read(LeadState, data["lead"])
     made["gesture"] = _read(GestureState, data["gesture"])
     if "leader" in data:
@@ -235,11 +241,6 @@ def _read(kind: Any, values: Sequence[Any]) -> Any:
     """Return a named tuple of JSON values; values unknown to this version are left out."""
     known = values[: len(kind._fields)]
     return kind(*[tuple(value) if isinstance(value, list) else value for value in known])
-
-
-def _read_person(data: Mapping[str, Any]) -> Person:
-    parts = {name: tuple(point) for name, point in data["parts_m"].items()}
-    return Person(**{**_known_fields(Person, data), "parts_m": parts})
 
 
 def _known_fields(kind: Any, data: Mapping[str, Any]) -> dict[str, Any]:

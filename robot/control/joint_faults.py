@@ -51,25 +51,6 @@ class _OpenFault:
         self.reported = False
 
 
-class _Lines:
-    """The lines about joints of one tick; the same text for several joints is one line."""
-
-    def __init__(self) -> None:
-        self._joints: dict[tuple[float, str], list[str]] = {}
-
-    def add(self, joint: str, t_s: float, what: str) -> None:
-        """Add a text about a joint at a time."""
-        self._joints.setdefault((t_s, what), []).append(joint)
-
-    def all(self, count: int) -> list[tuple[float, str]]:
-        """Return time and text of each line.
-
-        Args:
-            count: Number of the rig's joints.
-        """
-        return [(t_s, f"{named(of, count)}: {what}") for (t_s, what), of in self._joints.items()]
-
-
 def named(joints: Sequence[str], count: int = 0) -> str:
     """Return joints as text, at most three by name.
 
@@ -86,12 +67,12 @@ class JointFaults:
     """An observer of ticks that counts faults of joints.
 
     Args:
-        say: Receives a line, with the time since the first tick, when a fault begins and ends.
+        report: Receives a line, with the time since the first tick, when a fault begins and ends.
         busy: Returns a text if the computer is too busy, which makes joints stale, else "".
     """
 
-    def __init__(self, say: Callable[[str], None], busy: Callable[[], str] = lambda: "") -> None:
-        self._say, self._busy = say, busy
+    def __init__(self, report: Callable[[str], None], busy: Callable[[], str] = lambda: "") -> None:
+        self._report, self._busy = report, busy
         self._running: dict[tuple[str, str], _OpenFault] = {}
         self._counted: dict[tuple[str, str], tuple[int, float]] = {}
         self._first_s: float | None = None
@@ -104,24 +85,30 @@ class JointFaults:
         held = guard_result.level in ("hold", "torque_off") and not tick.stopped
         if not held and not self._running:
             return
-        lines = _Lines()
+        # The same text for several joints is one line.
+        lines: dict[tuple[float, str], list[str]] = {}
         for joint, reason in _fault_holds(tick) if held else ():
             running = self._running.setdefault((joint, reason), _OpenFault(tick.t_s))
             running.last_s = tick.t_s
             if not running.reported and tick.t_s - running.from_s >= _PASSING_S.get(reason, 0.0):
                 running.reported = True
                 busy = self._busy() if reason in _BY_TIME else ""
-                lines.add(joint, running.from_s, f"{reason}: held" + (f", as {busy}" * bool(busy)))
+                text = f"{reason}: held" + f", as {busy}" * bool(busy)
+                lines.setdefault((running.from_s, text), []).append(joint)
         for key, running in tuple(self._running.items()):
-            if tick.t_s - running.last_s > _OVER_S:
-                self._end(key, running, lines)
-        for t_s, line in lines.all(len(guard_result.joints)):
-            self._say(f"{t_s - self._first_s:.2f} s: {line}")
+            if tick.t_s - running.last_s <= _OVER_S:
+                continue
+            if (seconds := self._end(key, running)) is not None:
+                text = f"{key[1]}: over after {seconds:.1f} s"
+                lines.setdefault((running.last_s, text), []).append(key[0])
+        for (t_s, text), joints in lines.items():
+            who = named(joints, len(guard_result.joints))
+            self._report(f"{t_s - self._first_s:.2f} s: {who}: {text}")
 
     def close(self) -> None:
         """Count faults that have not ended, at the end of a run."""
         for key, running in tuple(self._running.items()):
-            self._end(key, running, None)
+            self._end(key, running)
 
     def counted(self) -> tuple[JointFault, ...]:
         """Return all faults that have ended, sorted by joint and reason."""
@@ -136,23 +123,15 @@ class JointFaults:
             figures.setdefault(fault.joint, {})[fault.reason] = entry
         return figures
 
-    def _end(self, key: tuple[str, str], running: _OpenFault, lines: "_Lines | None") -> None:
-        """Count a fault.
-
-        Args:
-            key: Joint and reason.
-            running: The fault.
-            lines: Receives the line about its end; None at the end of a run.
-        """
+    def _end(self, key: tuple[str, str], running: _OpenFault) -> float | None:
+        """Count a fault; return its duration in s, None if it was not reported."""
         del self._running[key]
         if not running.reported:
-            return
+            return None
         seconds = running.last_s - running.from_s
         times, before_s = self._counted.get(key, (0, 0.0))
         self._counted[key] = times + 1, before_s + seconds
-        if lines is not None:
-            joint, reason = key
-            lines.add(joint, running.last_s, f"{reason}: over after {seconds:.1f} s")
+        return seconds
 
 
 def _fault_holds(tick: "Tick") -> list[tuple[str, str]]:

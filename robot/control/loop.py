@@ -22,9 +22,9 @@ from gazerig.robot.control.command_choices import (
 )
 from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
-from gazerig.robot.control.garbage import freeze_objects
 from gazerig.robot.control.gesture_choices import GestureChoices, GestureInfo
 from gazerig.robot.control.look_point import LastObservation, LookPoints
+from gazerig.robot.control.real_time import freeze_objects
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import stopped_result

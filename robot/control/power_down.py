@@ -1,6 +1,6 @@
 """Shutdown of everything that switches torque on: park, torque off, one line.
 
-    with PowerDown(park, control.stop, say, interrupts) as power:
+    with PowerDown(park, control.stop, report, interrupts) as power:
         power.switch_on(control.start)
         ...
 
@@ -11,11 +11,10 @@ writing cannot prevent it.
 
 import contextlib
 from collections.abc import Callable, Sequence
-from types import FrameType
 from typing import Self, TypeVar
 
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
 
 T = TypeVar("T")
@@ -32,7 +31,7 @@ class PowerDown:
             to switch the torque off at the present angles.
         torque_off: Switches the torque of all servos off and closes the bus; returns the bus's
             messages about servos that do not confirm it.
-        say: Receives one line about the result.
+        report: Receives one line about the result.
         interrupts: Requests to end this program.
         off: Text for torque that is off.
         left: Text for unreachable servos, after the reason.
@@ -48,13 +47,13 @@ class PowerDown:
         self,
         park: Callable[[Again], str] | None,
         torque_off: Callable[[], Sequence[str] | None],
-        say: Callable[[str], None],
+        report: Callable[[str], None],
         interrupts: Interrupts,
         off: str = "torque off",
         left: str = "",
         quiet: bool = False,
     ) -> None:
-        self._park, self._torque_off, self._say = park, torque_off, say
+        self._park, self._torque_off, self._report = park, torque_off, report
         self._interrupts = interrupts
         self._off, self._left, self._quiet = off, left, quiet
         self._starting = self._on = False
@@ -79,7 +78,10 @@ class PowerDown:
 
     def __enter__(self) -> Self:
         """Start the block."""
-        self._interrupts.spared = _is_this_file
+        # This file may be interrupted only in its callees.
+        self._interrupts.spared = lambda frame: (
+            frame is not None and frame.f_code.co_filename == __file__
+        )
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
@@ -111,7 +113,7 @@ class PowerDown:
         interrupts.never_raise()
         failed = True
         try:
-            self.unreleased = tuple(drawn_together(self._torque_off() or ()))
+            self.unreleased = tuple(group_events(self._torque_off() or ()))
             how, failed = how + "; ".join((self._off, *self.unreleased)), bool(self.unreleased)
         except BaseException as error:
             how += f"torque-off could not be sent ({_error_text(error)}){self._left}"
@@ -120,13 +122,8 @@ class PowerDown:
         self.how = how
         with contextlib.suppress(Exception):
             if failed or not self._quiet:
-                self._say(f"stopped by {self.cause}: {how}" if self.cause else how)
+                self._report(f"stopped by {self.cause}: {how}" if self.cause else how)
         interrupts.tolerated = max(1, interrupts.requests)
-
-
-def _is_this_file(frame: FrameType | None) -> bool:
-    """Return whether a frame is in this file, which may be interrupted only in its callees."""
-    return frame is not None and frame.f_code.co_filename == __file__
 
 
 def _error_text(error: BaseException) -> str:

@@ -27,9 +27,9 @@ def reached_joints(
 ) -> JointAngles:
     """Return the joint angles at which head and eyes come to rest, with open lids."""
     further_rad = kinematics.further_rad(reach.base_rad)
-    return _within(
-        kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad), further_rad), limits
-    )
+    angles_rad = kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad), further_rad)
+    pairs = zip(angles_rad, limits, strict=True)
+    return tuple(min(max(angle, limit.low_rad), limit.high_rad) for angle, limit in pairs)
 
 
 def look_reply(
@@ -86,11 +86,6 @@ def jog_reply(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit])
 
 def _command(head: Angles3, left: Angles2, right: Angles2) -> GazeCommand:
     return GazeCommand(head, left, right, 1.0, 1.0, "fixate", False, (0.0, 0.0, 0.0), 0, 0, 0)
-
-
-def _within(angles_rad: JointAngles, limits: Sequence[JointLimit]) -> JointAngles:
-    pairs = zip(angles_rad, limits, strict=True)
-    return tuple(min(max(angle, limit.low_rad), limit.high_rad) for angle, limit in pairs)
 
 
 def _ranges(

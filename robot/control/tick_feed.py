@@ -58,7 +58,7 @@ class TickFeed:
         self._joining.append(follower)
 
     def progress(self) -> Progress:
-        """Return the lead and the gesture of the newest tick."""
+        """Return the states of control and gesture in the newest tick."""
         tick = self.newest
         return Progress(tick.lead, tick.gesture, tick.led) if tick is not None else Progress()
 

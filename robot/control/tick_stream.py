@@ -105,22 +105,17 @@ class TickBatch(NamedTuple):
     newest: Tick
 
 
-class _Sink(NamedTuple):
-    name: str
-    take: Callable[[TickBatch], bool]
-
-
 class TickStream:
     """A stream of ticks to sinks in batches; used only in the loop's thread.
 
     Args:
-        say: Receives one line about each sink that fails and is removed.
+        report: Receives one line about each sink that fails and is removed.
         every_s: Time between two batches.
     """
 
-    def __init__(self, say: Callable[[str], None], every_s: float = LIVE_S) -> None:
-        self._say, self._every_s = say, every_s
-        self._sinks: tuple[_Sink, ...] = ()
+    def __init__(self, report: Callable[[str], None], every_s: float = LIVE_S) -> None:
+        self._report, self._every_s = report, every_s
+        self._sinks: tuple[tuple[str, Callable[[TickBatch], bool]], ...] = ()
         self._ticks: list[tuple[Tick, float, Before]] = []
         self._due_s = -inf
         self._percept: Percept | None = None
@@ -129,7 +124,7 @@ class TickStream:
 
     def add(self, name: str, take: Callable[[TickBatch], bool]) -> None:
         """Add a sink, which returns False if it loses a batch."""
-        self._sinks = (*self._sinks, _Sink(name, take))
+        self._sinks = (*self._sinks, (name, take))
 
     def update(self, tick: Tick) -> None:
         """Add a tick of a run that is not recorded."""
@@ -152,10 +147,10 @@ class TickStream:
         ticks.clear()
         for sink in self._sinks:
             try:
-                self._again |= not sink.take(batch)
+                self._again |= not sink[1](batch)
             except Exception as error:
                 self._sinks = tuple([one for one in self._sinks if one is not sink])
-                self._say(failure_text(sink.name, error))
+                self._report(failure_text(sink[0], error))
 
     def _encode_batch(self) -> bytes:
         percepts, rows = [], []

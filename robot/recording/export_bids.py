@@ -11,7 +11,6 @@ import io
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +21,7 @@ from gazerig.drivers.files.file_input import read_limited
 from gazerig.drivers.files.file_output import make_folder, output_file, write_file
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.control.feedback_basis import ESTIMATED, PARTLY, Basis
+from gazerig.robot.recording.export_csv import number
 from gazerig.robot.recording.gaze_angles import GazeAngles
 from gazerig.robot.recording.gaze_labels import LabelledInterval, Labels
 
@@ -262,7 +262,7 @@ def _even_rows(values: Floats, rate_hz: float) -> Iterator[list[str]]:
         for k in range(1, missed + 1):
             between_s = before + k * (time_s - before) / (missed + 1)
             yield [f"{between_s:.6f}", *([_MISSING] * len(rest))]
-        yield [f"{time_s:.6f}", *(_cell(value, 4) for value in rest)]
+        yield [f"{time_s:.6f}", *(number(value) or _MISSING for value in rest)]
         before = time_s
 
 
@@ -276,9 +276,9 @@ def _write_events(
 ) -> tuple[Path, Path]:
     rows = [
         (s.onset_s, [
-            f"{s.onset_s:.6f}", f"{s.duration_s:.6f}", s.event, _cell(s.amplitude_deg, 3),
-            _cell(s.peak_deg_s, 1), s.looked_at.target or _MISSING, s.looked_at.part or _MISSING,
-            _MISSING,
+            f"{s.onset_s:.6f}", f"{s.duration_s:.6f}", s.event,
+            number(s.amplitude_deg, 3) or _MISSING, number(s.peak_deg_s, 1) or _MISSING,
+            s.looked_at.target or _MISSING, s.looked_at.part or _MISSING, _MISSING,
         ])
         for s in stretches
     ]  # fmt: skip
@@ -288,12 +288,7 @@ def _write_events(
         for time_s, text in trace.messages
     ]
     rows.sort(key=lambda row: row[0])
-    lines = (row for _, row in rows)
-    return _pair(f"{stem}_physioevents", _events_sidecar(labels, task), lines, force)
-
-
-def _events_sidecar(labels: Labels, task: str) -> dict[str, object]:
-    return {
+    sidecar: dict[str, object] = {
         "TaskName": task,
         "Columns": list(_EVENT_COLUMNS),
         "OnsetSource": "timestamp",
@@ -320,6 +315,7 @@ def _events_sidecar(labels: Labels, task: str) -> dict[str, object]:
         },
         "message": {"Description": "message of the machine, or a command to it"},
     }
+    return _pair(f"{stem}_physioevents", sidecar, (row for _, row in rows), force)
 
 
 def _pair(
@@ -339,7 +335,3 @@ def _pair(
 
 def _json(value: object) -> str:
     return json.dumps(value, indent=2, ensure_ascii=False) + "\n"
-
-
-def _cell(value: float | None, decimals: int) -> str:
-    return _MISSING if value is None or not isfinite(value) else f"{value:.{decimals}f}"

@@ -53,19 +53,20 @@ def write_csv(
     Raises:
         SetupError: A file exists or cannot be written.
     """
-    refuse_existing(*csv_files(stem), force=force)
-    made = (
-        ("samples", columns(trace.joints), _sample_rows(trace, labels)),
-        ("events", EVENTS, map(_event_row, stretches)),
-        ("fixations", FIXATIONS, _fixation_rows(stretches)),
+    paths = csv_files(stem)
+    refuse_existing(*paths, force=force)
+    tables: tuple[tuple[Sequence[str], Iterable[Sequence[str]]], ...] = (
+        (columns(trace.joints), _sample_rows(trace, labels)),
+        (EVENTS, map(_event_row, stretches)),
+        (FIXATIONS, _fixation_rows(stretches)),
     )
-    tables = tuple(
-        _write(stem.with_name(f"{stem.name}_{kind}.csv"), names, rows, force)
-        for kind, names, rows in made
-    )
-    beside = stem.with_name(f"{stem.name}_samples.json")
-    write_file(beside, json.dumps(_basis_by_column(trace), indent=2) + "\n", force)
-    return (*tables, beside)
+    for path, (names, rows) in zip(paths[:3], tables, strict=True):
+        with output_text(path, force) as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(names)
+            writer.writerows(rows)
+    write_file(paths[3], json.dumps(_basis_by_column(trace), indent=2) + "\n", force)
+    return paths
 
 
 def csv_files(stem: Path) -> tuple[Path, ...]:
@@ -104,14 +105,6 @@ def _basis_by_column(trace: GazeAngles) -> dict[str, object]:
 def number(value: float | None, decimals: int = 4) -> str:
     """Format a number, "" for None, NaN and infinity."""
     return "" if value is None or not isfinite(value) else f"{value:.{decimals}f}"
-
-
-def _write(path: Path, names: Sequence[str], rows: Iterable[Sequence[str]], force: bool) -> Path:
-    with output_text(path, force) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(rows)
-    return path
 
 
 def _sample_rows(trace: GazeAngles, labels: Labels) -> Iterator[list[str]]:

@@ -100,12 +100,12 @@ def find_intervals(trace: GazeAngles, labels: Labels) -> tuple[LabelledInterval,
     key = np.where(labels.movement == _SACCADE, -1, key)
     speed = speed_deg_s(trace.time_s, trace.cyclopean_deg)
     found = [
-        _movement_interval(trace, labels, speed, first, last)
+        _interval(trace, labels, speed, first, last, MOVEMENTS[labels.movement[first]])
         for first, last in _runs(key)
         if labels.movement[first]
     ]
     found += [
-        _blink_interval(trace, labels, first, last)
+        _interval(trace, labels, speed, first, last, "blink")
         for first, last in _runs(labels.blink.astype(np.int64))
         if labels.blink[first]
     ]
@@ -133,34 +133,24 @@ def _runs(key: Ints) -> list[tuple[int, int]]:
     return list(zip(firsts, [*(b - 1 for b in breaks.tolist()), len(key) - 1], strict=True))
 
 
-def _movement_interval(
-    trace: GazeAngles, labels: Labels, speed: Floats, first: int, last: int
+def _interval(
+    trace: GazeAngles, labels: Labels, speed: Floats, first: int, last: int, event: str
 ) -> LabelledInterval:
+    onset_s = float(trace.time_s[first])
+    if last + 1 < len(trace.time_s):
+        end_s = float(trace.time_s[last + 1])
+    else:
+        end_s = float(trace.time_s[last]) + 1.0 / trace.rate_hz
     amplitude = _great_circle_deg(trace.cyclopean_deg[first], trace.cyclopean_deg[last])
     peak = float(np.max(speed[first : last + 1]))
     return LabelledInterval(
-        float(trace.time_s[first]),
-        _end_of_interval(trace, last) - float(trace.time_s[first]),
-        MOVEMENTS[labels.movement[first]],
-        amplitude if np.isfinite(amplitude) else None,
-        peak if np.isfinite(peak) else None,
+        onset_s,
+        end_s - onset_s,
+        event,
+        amplitude if event != "blink" and np.isfinite(amplitude) else None,
+        peak if event != "blink" and np.isfinite(peak) else None,
         trace.names[labels.looked_at[first]],
     )
-
-
-def _blink_interval(trace: GazeAngles, labels: Labels, first: int, last: int) -> LabelledInterval:
-    onset_s = float(trace.time_s[first])
-    duration_s = _end_of_interval(trace, last) - onset_s
-    return LabelledInterval(
-        onset_s, duration_s, "blink", None, None, trace.names[labels.looked_at[first]]
-    )
-
-
-def _end_of_interval(trace: GazeAngles, last: int) -> float:
-    """Return the time of the sample after the last one of an interval."""
-    if last + 1 < len(trace.time_s):
-        return float(trace.time_s[last + 1])
-    return float(trace.time_s[last]) + 1.0 / trace.rate_hz
 
 
 def speed_deg_s(time_s: Floats, gaze_deg: Floats) -> Floats:

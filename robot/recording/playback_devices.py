@@ -12,7 +12,7 @@ from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.robot.recording.forwarding_body import ForwardingBody
+from gazerig.robot.recording.joint_recorder import ForwardingBody
 from gazerig.robot.recording.tick_record import (
     BodyRecord,
     MeasuredJoints,

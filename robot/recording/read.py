@@ -11,44 +11,77 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import orjson
+import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, DataEnd, Header, Metadata
-from zstandard import ZstdError
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.files.mcap_file import MAGIC, open_mcap
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import run_format as fmt
-from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, decompress_chunk
 from gazerig.robot.recording.run_info import (
     FORMAT,
     PROFILE,
     RunEnd,
     RunInfo,
+    WorldInfo,
     read_run_end,
     read_run_info,
+    read_world_info,
 )
 from gazerig.robot.recording.tick_record import TickRecord, from_json, percept_from_json
-from gazerig.robot.recording.world_info import WorldInfo, read_world_info
 
 _CURE = "make one with gazerig run --record"
 _CAMERA = "gazerig-camera-"
 _RUN = PROFILE.rstrip("0123456789")
 _HEAD = 9  # bytes of a record's header: kind and length
-_LARGEST = LARGEST_BYTES + 1000  # bytes of a record; more is damage
+_LARGEST_CHUNK = 64 << 20
+"""Limit of a compressed or decompressed chunk; the writer's chunks have about 1 MB."""
+_LARGEST = _LARGEST_CHUNK + 1000  # bytes of a record; more is damage
 _CRC_PIECE = 1 << 20
 _LONGEST_GAP_S = 3600.0  # between two ticks; more is damage
 _FIXED = 22  # bytes of a message before its data: channel, sequence, two times
 _PERCEPTS_KEPT = 8  # a tick refers to the newest one or the one before it
 _KINDS = frozenset(value for name, value in vars(Opcode).items() if name.isupper())
 DAMAGE = (
-    McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error, ZstdError,
+    McapError, KeyError, TypeError, ValueError, IndexError, struct.error, zlib.error, zstandard.ZstdError,
     AttributeError, ArithmeticError, RecursionError, MemoryError,
 )  # fmt: skip
 """Errors caused by a file with damaged or impossible contents."""
+
+
+class BadChunk(McapError):
+    """A chunk that does not match its header."""
+
+
+def decompress_chunk(chunk: Chunk) -> bytes:
+    """Decompress the records of a chunk.
+
+    Raises:
+        BadChunk: The chunk is too large, does not match its header or uses another compression.
+        zstandard.ZstdError: The chunk is damaged.
+    """
+    size = chunk.uncompressed_size
+    if size > _LARGEST_CHUNK:
+        raise BadChunk(f"a chunk of {size / 1e6:.0f} MB")
+    if chunk.compression == "zstd":
+        # At most one byte more than the size: a few bytes can expand to gigabytes.
+        decompressor = zstandard.ZstdDecompressor(max_window_size=_LARGEST_CHUNK)
+        with decompressor.stream_reader(BytesIO(chunk.data), read_across_frames=True) as reader:
+            found: bytes = reader.read(size + 1)
+            data = found
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise BadChunk("a chunk compressed by another program")
+    if len(data) != size:
+        raise BadChunk("a chunk whose size differs from its header")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise BadChunk("a chunk with a wrong checksum")
+    return data
 
 
 class BadRecording(SetupError):

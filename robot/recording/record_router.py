@@ -33,12 +33,14 @@ class RecordRouter:
         """Write the ticks of a ``tick_stream.TickBatch``, each percept before the first with it."""
         percepts, rows = decode_plain(data)
         self._finite = all_finite(data)
-        self._percepts.update({percept[0]: percept for percept in percepts})
+        self._percepts.update({one[0]: one for one in percepts})
         for row in rows:
             number = row[_PERCEPT]
             if number is not None and number > self._written:
                 self._written = number
-                self._percept(self._percepts[number])
+                percept = percept_as_json(self._percepts[number], self._finite)
+                self._faces = [face["p_world_m"] for face in percept["faces"]]
+                self._add(fmt.PERCEPT, percept)
                 self._percepts = {n: one for n, one in self._percepts.items() if n > number}
             self._tick(row)
 
@@ -58,11 +60,6 @@ class RecordRouter:
             self._viewed_s = self._at_s
             self._show(TickRow(*row))
 
-    def _percept(self, percept: list[Any]) -> None:
-        data = percept_as_json(percept, self._finite)
-        self._faces = [face["p_world_m"] for face in data["faces"]]
-        self._add(fmt.PERCEPT, data)
-
     def frame(self, captured_s: float, image: ImageArray) -> None:
         """Write a camera image as JPEG."""
         from gazerig.robot.dashboard.feed.camera_overlay import encode  # loads OpenCV
@@ -73,15 +70,11 @@ class RecordRouter:
 
     def health(self, bus: BusHealth, lost: int) -> None:
         """Write the bus counts and the servos' readings of the newest tick."""
-        joints = JointState(*self._newest[_JOINTS]) if self._newest is not None else None
-        servos = (
-            {
-                name: getattr(joints, name)
-                for name in ("temperature_c", "voltage_v", "load", "fault")
-            }
-            if joints is not None
-            else {}
-        )
+        servos = {}
+        if self._newest is not None:
+            joints = JointState(*self._newest[_JOINTS])
+            fields = ("temperature_c", "voltage_v", "load", "fault")
+            servos = {name: getattr(joints, name) for name in fields}
         counts = {"tx_bytes": bus.tx_bytes, "rx_bytes": bus.rx_bytes, "errors": dict(bus.errors)}
         self._add(fmt.HEALTH, {**counts, **servos, "lost_ticks": lost})
 

@@ -28,15 +28,42 @@ from gazerig.robot.control.tick_stream import (
     encode,
 )
 from gazerig.robot.recording import writer_process as writer
-from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.joint_recorder import JointRecorder
-from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
+from gazerig.robot.recording.run_info import RunEnd, RunInfo, WorldInfo, as_text, started_ns
 from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, body_record_to_plain
-from gazerig.robot.recording.world_info import WorldInfo
 from gazerig.robot.recording.writer_client import WriterClient
 
 _HEALTH_S = 1.0
 _NOTHING: Before = ()
+_EARLY_S = 1e-3  # a frame may be this early, as times are rounded
+
+
+class FramePicker:
+    """A selector of frames at a given rate.
+
+    Args:
+        rate_hz: Rate of the selected frames, 0 for none.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._every_s = 1.0 / rate_hz if rate_hz > 0.0 else inf
+        self._due_s = -inf
+        self._number = 0
+
+    def picks(self, found: Detections | None) -> bool:
+        """Return whether the frame is new and due."""
+        if found is None or found.number == self._number:
+            return False
+        self._number = found.number
+        if found.captured_s < self._due_s - _EARLY_S or self._every_s == inf:
+            return False
+        if found.image is None:  # checked last, as reading the image may copy it
+            return False
+        # A late frame does not delay those that follow.
+        late_s = found.captured_s - self._due_s
+        began_s = self._due_s if late_s < self._every_s else found.captured_s
+        self._due_s = began_s + self._every_s
+        return True
 
 
 class Recorder:
@@ -64,7 +91,7 @@ class Recorder:
         """
         self._path, self._target = path, Path(os.path.realpath(path))
         self._info = info
-        self._health: Callable[[], BusHealth] = _no_counts
+        self._health: Callable[[], BusHealth] = lambda: BusHealth(0, 0, {})
         self._over = over
         self._link = WriterClient(patient)
         self._frames = FramePicker(info.pictures_hz)
@@ -223,10 +250,6 @@ class Recorder:
     def unwritten(self) -> Path | None:
         """Return the incomplete file, None if the recording is complete."""
         return self._path if self._opened and self._link.failed else None
-
-
-def _no_counts() -> BusHealth:
-    return BusHealth(0, 0, {})
 
 
 def _create(path: Path, over: bool) -> int:

@@ -78,9 +78,18 @@ class Replay:
         with self._lock:
             state = self._player.state(now_s)
         self._show_frames(screen, self._frames.at(state.at_s))
-        self._show_frame(screen, state.at_s)
+        number = self._frames.frame_at(state.at_s)
+        if (
+            number is not None
+            and number != self._frame
+            and screen.send(FRAME + self._frames.frame(number))
+        ):
+            self._frame = number
         if self._due(state, now_s):
-            self._send_state(screen, state, now_s)
+            more = {} if self._introduced else introduction(self._frames)
+            message = REPLAY + json.dumps({**state._asdict(), **more}).encode()
+            if screen.send(message):
+                self._sent, self._sent_s, self._introduced = state, now_s, True
         return state
 
     def _show_frames(self, screen: Screen, number: int) -> None:
@@ -114,13 +123,6 @@ class Replay:
         elif screen.send(self._frames.message_with_history(self._missing, self._number)):
             self._missing = None
 
-    def _show_frame(self, screen: Screen, at_s: float) -> None:
-        number = self._frames.frame_at(at_s)
-        if number is None or number == self._frame:
-            return
-        if screen.send(FRAME + self._frames.frame(number)):
-            self._frame = number
-
     def _due(self, state: PlaybackState, now_s: float) -> bool:
         """Return whether to send the state: changes immediately, else at intervals."""
         sent = self._sent
@@ -132,12 +134,6 @@ class Replay:
     def send_introduction_again(self) -> None:
         """Send the introduction again, to a new page process."""
         self._introduced = False
-
-    def _send_state(self, screen: Screen, state: PlaybackState, now_s: float) -> None:
-        more = {} if self._introduced else introduction(self._frames)
-        message = REPLAY + json.dumps({**state._asdict(), **more}).encode()
-        if screen.send(message):
-            self._sent, self._sent_s, self._introduced = state, now_s, True
 
 
 def introduction(frames: SnapshotIndex) -> dict[str, object]:

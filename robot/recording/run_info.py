@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass, field, fields
 from datetime import datetime
 from typing import Any
 
-from gazerig.robot.recording.world_info import WorldInfo
-
 FORMAT = 1
 """Version of the message contents; it rises when an older reader would misread them."""
 PROFILE = "gazerig-run-1"
@@ -75,6 +73,23 @@ class RunEnd:
     tx_sha256: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class WorldInfo:
+    """A simulated world of a run.
+
+    Attributes:
+        name: Name of its script or file, without folder and suffix.
+        script_yaml: The complete script, "" for a world in MuJoCo's own format.
+        seed: Seed of its people's behaviour.
+        start_s: Start of their script on the clock of the ticks.
+    """
+
+    name: str
+    script_yaml: str = ""
+    seed: int = 0
+    start_s: float = 0.0
+
+
 def versions() -> dict[str, str]:
     """Return the versions of Python, of this package and of the packages for its arithmetic."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
@@ -120,17 +135,9 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
 
 def _check_values(info: RunInfo) -> None:
     """Refuse impossible settings, as exports use these numbers and names."""
-    texts = (
-        info.rig,
-        info.profile,
-        info.config_yaml,
-        info.walk_yaml,
-        info.gestures_yaml,
-        info.eyes,
-        info.bus,
-    )
-    maybe = (info.character, info.scene)
-    if not all(isinstance(word, str) for word in texts + tuple(m for m in maybe if m is not None)):
+    texts = ("rig", "profile", "config_yaml", "walk_yaml", "gestures_yaml", "eyes", "bus")
+    optional = [key for key in ("character", "scene") if getattr(info, key) is not None]
+    if not all(isinstance(getattr(info, key), str) for key in (*texts, *optional)):
         raise ValueError("a name of the run is not text")
     if not (_within(info.rate_hz, 1.0, 10_000.0) and _within(info.pictures_hz, 0.0, 1000.0)):
         raise ValueError(f"a control rate of {info.rate_hz} Hz")
@@ -140,16 +147,12 @@ def _check_values(info: RunInfo) -> None:
         raise ValueError("mock or fast is not a boolean")
     if not isinstance(info.versions, dict):
         raise ValueError("no versions")
-    if not _is_pose(info.stands):
+    pose = info.stands
+    if not isinstance(pose, tuple) or len(pose) not in (0, 12):
+        raise ValueError("an invalid pose of the neck base")
+    if not all(_within(number, -1000.0, 1000.0) for number in pose):
         raise ValueError("an invalid pose of the neck base")
     started_ns(info)
-
-
-def _is_pose(stands: object) -> bool:
-    """Return whether this is a valid ``RunInfo.stands``."""
-    if not isinstance(stands, tuple) or len(stands) not in (0, 12):
-        return False
-    return all(_within(number, -1000.0, 1000.0) for number in stands)
 
 
 def _within(value: object, low: float, high: float) -> bool:
@@ -168,6 +171,24 @@ def read_run_end(text: Mapping[str, str]) -> RunEnd:
     if type(end.lost) is not int or not (end.ran_s is None or _within(end.ran_s, 0.0, 1e9)):
         raise ValueError("a field of the end is not a number")
     return end
+
+
+def read_world_info(text: Mapping[str, str]) -> WorldInfo:
+    """Read a world that ``as_text`` wrote.
+
+    Raises:
+        ValueError: A field is missing, is not JSON or has an impossible value.
+    """
+    try:
+        name, seed, start_s = (json.loads(text[key]) for key in ("name", "seed", "start_s"))
+        script_yaml = text["script_yaml"]
+    except KeyError as error:
+        raise ValueError(f"a world without {error}") from None
+    if not isinstance(name, str) or type(seed) is not int or seed < 0:
+        raise ValueError(f"the world {name!r}, seed {seed!r}")
+    if type(start_s) not in (int, float) or not -1e9 < start_s < 1e9:
+        raise ValueError(f"a world that began at {start_s!r}")
+    return WorldInfo(name, script_yaml, seed, float(start_s))
 
 
 def _read(text: Mapping[str, str], names: set[str]) -> dict[str, Any]:

@@ -6,8 +6,8 @@ truncated to its last complete chunk, so that it can be read.
 
 import contextlib
 import os
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import orjson
 from mcap.writer import CompressionType, Writer
@@ -53,7 +53,10 @@ class RunWriter:
         self._channels: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self.failed = ""
-        self._guard_write(self._begin, about)
+        with self._error_handling():
+            self._writer.start(PROFILE, "gazerig")
+            self._writer.add_metadata(fmt.RUN, dict(about))
+            self._file.keep()
 
     @property
     def written(self) -> WrittenFile:
@@ -69,68 +72,58 @@ class RunWriter:
         """Append a message to the present chunk; do nothing after a failure."""
         if self.failed:
             return
-        self._counts[message.topic] = self._counts.get(message.topic, 0) + 1
-        self._guard_write(self._add, message)
+        topic = message.topic
+        self._counts[topic] = self._counts.get(topic, 0) + 1
+        with self._error_handling():
+            channel = self._channels.get(topic)
+            if channel is None:
+                name, schema = fmt.SCHEMAS[topic]
+                about = self._writer.register_schema(name, "jsonschema", orjson.dumps(schema))
+                channel = int(self._writer.register_channel(topic, "json", about))
+                self._channels[topic] = channel
+            at_ns, data = self.time_ns(message.at_s), orjson.dumps(message.data)
+            self._writer.add_message(channel, at_ns, data, at_ns, self._counts[topic])
 
     def world(self, about: Mapping[str, str]) -> None:
         """Write the run's simulated world from ``run_info.as_text``."""
         if not self.failed:
-            self._guard_write(self._add_world, about)
+            with self._error_handling():
+                self._flush()
+                self._writer.add_metadata(fmt.WORLD, dict(about))
+                self._file.keep()
 
     def flush(self) -> None:
         """Write the present chunk to the operating system."""
         if not self.failed:
-            self._guard_write(self._flush)
+            with self._error_handling():
+                self._flush()
 
     def sync(self) -> None:
         """Make the operating system write everything to the disk."""
         if not self.failed:
-            self._guard_write(self._file.sync)
+            with self._error_handling():
+                self._file.sync()
 
     def close(self, end: RunEnd) -> None:
         """Write the end of the run and the index, unless writing failed; close the file."""
         if not self.failed:
-            self._guard_write(self._finish, end)
+            with self._error_handling():
+                self._writer.flush()  # type: ignore[no-untyped-call]
+                self._writer.add_metadata(fmt.END, as_text(end))
+                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._file.keep()
+                self._file.sync()
         self._file.close()
-
-    def _begin(self, about: Mapping[str, str]) -> None:
-        self._writer.start(PROFILE, "gazerig")
-        self._writer.add_metadata(fmt.RUN, dict(about))
-        self._file.keep()
-
-    def _add_world(self, about: Mapping[str, str]) -> None:
-        self._flush()
-        self._writer.add_metadata(fmt.WORLD, dict(about))
-        self._file.keep()
-
-    def _add(self, message: fmt.Message) -> None:
-        channel = self._channels.get(message.topic)
-        if channel is None:
-            channel = self._channels[message.topic] = self._register(message.topic)
-        at_ns = self.time_ns(message.at_s)
-        data = orjson.dumps(message.data)
-        self._writer.add_message(channel, at_ns, data, at_ns, self._counts[message.topic])
-
-    def _register(self, topic: str) -> int:
-        name, schema = fmt.SCHEMAS[topic]
-        about = self._writer.register_schema(name, "jsonschema", orjson.dumps(schema))
-        return int(self._writer.register_channel(topic, "json", about))
 
     def _flush(self) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._file.keep()
 
-    def _finish(self, end: RunEnd) -> None:
-        self._writer.flush()  # type: ignore[no-untyped-call]
-        self._writer.add_metadata(fmt.END, as_text(end))
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.keep()
-        self._file.sync()
-
-    def _guard_write(self, act: Callable[..., None], *arguments: Any) -> None:
-        """Call ``act``; on an error, truncate the file and store the reason."""
+    @contextlib.contextmanager
+    def _error_handling(self) -> Iterator[None]:
+        """On an error in the block, truncate the file and store the reason."""
         try:
-            act(*arguments)
+            yield
         except OSError as error:
             self.failed = error.strerror or str(error)
             self._file.cut()

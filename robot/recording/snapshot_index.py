@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import guard_text, perception_text
 from gazerig.robot.dashboard.feed.page_process import pack, unpack
@@ -189,17 +189,14 @@ class MarkDetector:
             if isinstance(command, REPEATED):
                 continue
             found.append(Mark(at_s, "event", command_text(command)))
-            if isinstance(command, Ask):
-                self._note_choice(command)
-        found += [Mark(at_s, "event", text) for text in drawn_together(tick.events)]
+            match command:
+                case Ask("behaviour", choice):
+                    self.behaviour = choice
+                case Ask("conversation", choice):
+                    self.conversation = choice
+        found += [Mark(at_s, "event", text) for text in group_events(tick.events)]
         grave = tick.guard_result.level if tick.guard_result.level in _GRAVE else ""
         if grave and grave != self._grave:
             found.append(Mark(at_s, "event", f"guard: {guard_text(tick.guard_result)}"))
         self._grave = grave
         return found
-
-    def _note_choice(self, command: Ask) -> None:
-        if command.menu == "behaviour":
-            self.behaviour = command.choice
-        elif command.menu == "conversation":
-            self.conversation = command.choice

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gazerig.gaze.angles import add, compose, norm, rotate, rotation, sub
-from gazerig.gaze.types import Angles2, GazeState, Mat3, Vec3
+from gazerig.gaze.types import GazeState, Mat3, Vec3
 from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.run_format import UNUSED
@@ -69,7 +69,7 @@ def transforms(pose: GazeState, at_ns: int) -> Json:
         ("right_eye", pose.p_world_eye_right_m, pose.eye_right_rad),
     )
     turned = [
-        _transform("world", name, p, compose(pose.R_world_head, _eye(angles)), at_ns)
+        _transform("world", name, p, compose(pose.R_world_head, rotation((*angles, 0.0))), at_ns)
         for name, p, angles in eyes
     ]
     return {"transforms": [head, *turned]}
@@ -82,7 +82,7 @@ def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json
         (pose.p_world_eye_left_m, pose.eye_left_rad),
         (pose.p_world_eye_right_m, pose.eye_right_rad),
     ):
-        R = compose(pose.R_world_head, _eye(angles))
+        R = compose(pose.R_world_head, rotation((*angles, 0.0)))
         sights += [p, add(p, rotate(R, (norm(sub(point_m, p)), 0.0, 0.0)))]
     entity: Json = {
         **{kind: [] for kind in UNUSED},
@@ -115,10 +115,6 @@ def _transform(parent: str, child: str, p: Vec3, R: Mat3, at_ns: int) -> Json:
 def _ball(p: Vec3, across_m: float, colour: Json) -> Json:
     size = {"x": across_m, "y": across_m, "z": across_m}
     return {"pose": {"position": _xyz(p), "orientation": _STILL}, "size": size, "color": colour}
-
-
-def _eye(angles: Angles2) -> Mat3:
-    return rotation((angles[0], angles[1], 0.0))
 
 
 def _xyz(p: Vec3) -> dict[str, float]:

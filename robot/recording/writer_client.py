@@ -10,7 +10,7 @@ import select
 import socket
 import subprocess
 from collections import deque
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gazerig.drivers.process import child_process
 from gazerig.drivers.process.passed_image import send
@@ -135,7 +135,11 @@ class WriterClient:
             if not message:
                 self._lose("its writer has died")
                 return
-            self._receive(*pickle.loads(message))
+            kind, values = pickle.loads(message)
+            if kind == writer.DONE:
+                self.done = WrittenFile(*values)
+            else:
+                self.failed = self.failed or str(values)
 
     def close(self) -> None:
         """Signal the end of the recording, and wait until the writer has closed the file."""
@@ -175,12 +179,6 @@ class WriterClient:
         self._images -= piece.image_bytes
         if piece.fd >= 0:
             os.close(piece.fd)
-
-    def _receive(self, kind: str, values: Any) -> None:
-        if kind == writer.DONE:
-            self.done = WrittenFile(*values)
-        else:
-            self.failed = self.failed or str(values)
 
     def _lose(self, why: str) -> None:
         """Continue without the writer."""

@@ -70,13 +70,19 @@ def _write(
     flushed_s = synced_s = clock.now_s()
     reported = False
     for one in messages:
-        if one is not None:
-            if one.kind == END:
-                end = RunEnd(**decode_plain(one.body))
-            elif one.kind == WORLD:
-                writer.world(decode_plain(one.body))
-            else:
-                _take(router, one)
+        kind, body, fd = one if one is not None else (b"", b"", -1)
+        if kind == END:
+            end = RunEnd(**decode_plain(body))
+        elif kind == WORLD:
+            writer.world(decode_plain(body))
+        elif kind == TICKS:
+            router.ticks(body)
+        elif kind == FRAME:
+            captured_s, shape, dtype = decode_plain(body)
+            router.frame(captured_s, taken(PassedImage(fd, tuple(shape), dtype)))
+        elif kind == HEALTH:
+            counts, lost = decode_plain(body)
+            router.health(BusHealth(*counts), lost)
         now_s = clock.now_s()
         if now_s - flushed_s >= _FLUSH_S:
             flushed_s = now_s
@@ -88,18 +94,6 @@ def _write(
             reported = True
             _answer(rig, FAILED, writer.failed)
     return end
-
-
-def _take(router: RecordRouter, one: _Message) -> None:
-    """Write the content of a message."""
-    if one.kind == TICKS:
-        router.ticks(one.body)
-    elif one.kind == FRAME:
-        captured_s, shape, dtype = decode_plain(one.body)
-        router.frame(captured_s, taken(PassedImage(one.fd, tuple(shape), dtype)))
-    elif one.kind == HEALTH:
-        counts, lost = decode_plain(one.body)
-        router.health(BusHealth(*counts), lost)
 
 
 def _messages(rig: socket.socket, parent: int) -> Iterator[_Message | None]:

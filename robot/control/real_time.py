@@ -1,11 +1,24 @@
-"""Thread switch interval while control loops run in real time."""
+"""Garbage collection and thread switch interval of control loops in real time."""
 
+import gc
 import sys
 import threading
 
 _SHORT_S = 0.0003
 """Another thread releases the interpreter after this time instead of the usual 5 ms, which is a
 whole slot of the loop."""
+
+
+def freeze_objects() -> None:
+    """Exclude all present objects from later passes of the garbage collector.
+
+    A full pass over the objects from start-up takes 20 ms, four slots. Call this before the
+    torque is on, as nothing may delay the servos afterwards. Objects that were excluded for an
+    earlier robot in this process are collected first.
+    """
+    gc.unfreeze()
+    gc.collect()
+    gc.freeze()
 
 
 class SwitchInterval:
