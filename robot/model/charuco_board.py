@@ -105,8 +105,12 @@ class CharucoBoard:
             return None
         numbers = np.asarray(ids, dtype=np.int64).ravel()
         places: Floats = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
-        seen = SeenBoard(numbers, places, self.corners_m[numbers])
-        return seen if _spread(seen.corners_board_m) and np.isfinite(places).all() else None
+        on_board_m = self.corners_m[numbers]
+        flat_m = on_board_m[:, :2] - on_board_m[:, :2].mean(axis=0)
+        # Corners on a line determine no pose.
+        if np.linalg.matrix_rank(flat_m, tol=1e-6) < 2 or not np.isfinite(places).all():
+            return None
+        return SeenBoard(numbers, places, on_board_m)
 
     def image(self, px_per_mm: float) -> ImageArray:
         """Draw the board, edge to edge, black on white.
@@ -129,9 +133,3 @@ def _grey(image: ImageArray) -> ImageArray | None:
         return np.ascontiguousarray(image.reshape(image.shape[:2]))
     code = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}.get(image.shape[2])
     return None if code is None else np.asarray(cv2.cvtColor(image, code), dtype=np.uint8)
-
-
-def _spread(corners_m: Floats) -> bool:
-    """Return whether the corners span a plane, not only a line."""
-    flat = corners_m[:, :2] - corners_m[:, :2].mean(axis=0)
-    return bool(np.linalg.matrix_rank(flat, tol=1e-6) == 2)

@@ -6,6 +6,7 @@ servos are at their shafts, after sign, ratio and zero. The usual pair is a neck
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import pairwise
 from math import acos, atan2, cos, floor, hypot, isfinite, pi, sin
 from typing import Protocol
 
@@ -203,9 +204,12 @@ class MeasuredGrid:
             )
         self._triangles = [
             _Triangle(corners, known)
-            for i in range(len(self._firsts) - 1)
-            for j in range(len(self._seconds) - 1)
-            for corners in self._corners(i, j)
+            for low, high in pairwise(self._firsts)
+            for left, right in pairwise(self._seconds)
+            for corners in (
+                ((low, left), (high, left), (high, right)),
+                ((low, left), (high, right), (low, right)),
+            )
         ]
         self._cells = _Cells(self._triangles)
         turns = [triangle.turn for triangle in self._triangles]
@@ -215,14 +219,6 @@ class MeasuredGrid:
                     "the servos of a measured coupling reverse next to "
                     f"{_degrees(triangle.at)}: measure it again"
                 )
-
-    def _corners(self, i: int, j: int) -> tuple[tuple[Pair, Pair, Pair], ...]:
-        low, high = self._firsts[i], self._firsts[i + 1]
-        left, right = self._seconds[j], self._seconds[j + 1]
-        return (
-            ((low, left), (high, left), (high, right)),
-            ((low, left), (high, right), (low, right)),
-        )
 
     def servo_rad(self, joints: Pair) -> Pair:
         """Return the servo angles of joint angles."""

@@ -69,7 +69,12 @@ class CouplingParams:
         if self.kind == "differential":
             return Differential(self.first_ratio, self.second_ratio)
         if self.kind == "measured":
-            return MeasuredGrid([_radians(point) for point in self.points])
+            return MeasuredGrid(
+                [
+                    (radians(first), radians(second), radians(a), radians(b))
+                    for first, second, a, b in self.points
+                ]
+            )
         assert self.anchor_mm is not None and self.servo_mm is not None
         assert self.horn_mm is not None and self.rod_mm is not None
         try:
@@ -157,7 +162,8 @@ def pair_setups(
         fastest = max(_reach(slope, speeds) for slope in slopes)
         quickest = max(_reach(slope, accels) for slope in slopes)
         steps = [linkage.steps(angles[k]) for angles in servos]
-        gentle = radians(min(ENTRY_DEG_S, gentle_deg_s)) * max(map(max, map(_sizes, slopes)))
+        steepest = max(abs(slope) for pair_slopes in slopes for slope in pair_slopes)
+        gentle = radians(min(ENTRY_DEG_S, gentle_deg_s)) * steepest
         config = joint.setup(name, park_rad.get(name, 0.0), gentle_deg_s)
         found[name] = config._replace(
             min_steps=ceil(min(steps) - 1e-6),
@@ -183,15 +189,6 @@ def _range(pair: CoupledPair, joints: Mapping[str, JointParams]) -> Iterator[Pai
 
 def _reach(slope: Pair, most: list[float]) -> float:
     return abs(slope[0]) * most[0] + abs(slope[1]) * most[1]
-
-
-def _sizes(slope: Pair) -> Pair:
-    return abs(slope[0]), abs(slope[1])
-
-
-def _radians(point: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    first, second, a, b = map(radians, point)
-    return first, second, a, b
 
 
 def _metres(point: Vec3) -> Vec3:

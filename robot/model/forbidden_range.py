@@ -73,7 +73,11 @@ def forbidden_pairs(
         for one in params
     ]
     for pair in pairs:
-        if not any(_room(span, limits[span.joint]) for span in pair):
+        # A pose is left if one of the joints can be outside its range of the box.
+        if all(
+            limits[span.joint].low_rad > span.below and limits[span.joint].high_rad < span.above
+            for span in pair
+        ):
             raise ValueError(_no_pose(pair, margin_deg, limits, joints))
     return pairs
 
@@ -90,11 +94,6 @@ def _index(name: str, joints: tuple[str, ...]) -> int:
 def _range(joint: int, low_deg: float, high_deg: float, margin_deg: float) -> ForbiddenRange:
     low, high, margin = radians(low_deg), radians(high_deg), radians(margin_deg)
     return ForbiddenRange(joint, low, high, low - margin, high + margin)
-
-
-def _room(span: ForbiddenRange, limit: JointLimit) -> bool:
-    """Return whether a joint can be outside its range of the box."""
-    return limit.low_rad <= span.below or limit.high_rad >= span.above
 
 
 def _no_pose(

@@ -69,7 +69,9 @@ def motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureM
     """
     frames, left_out = _frames_for(gesture, joints)
     tracks = keys_of(gesture, frames, count or gesture.count)
-    kept = {name: keys for name, keys in tracks.items() if _is_available(name, joints)}
+    there = {*joints, *EYE_TRACKS} - {*HEAD_TRACKS}
+    there |= {track for track in HEAD_TRACKS if _neck(track) in joints}
+    kept = {name: keys for name, keys in tracks.items() if name in there}
     if not kept:
         raise GestureRefused(f"this rig has none of the joints that it moves: {', '.join(tracks)}")
     motion = GestureMotion(kept, further(joints), gesture.space == "joint")
@@ -95,26 +97,18 @@ def _frames_for(
 
 
 def _missing_joints(frames: tuple[KeyFrame, ...], joints: Sequence[str]) -> list[str]:
-    """Return the joints in frames that a rig lacks."""
-    named = [name for frame in frames for name in _joints_in(frame)]
-    return [name for name in dict.fromkeys(named) if name not in joints]
-
-
-def _joints_in(frame: KeyFrame) -> list[str]:
-    """Return the joints in a frame; groups of lids are left out, as they adapt to the rig."""
-    heads = [_neck(track) for track in HEAD_TRACKS if getattr(frame, f"{track}_deg") is not None]
-    return [*heads, *(lid for lid in frame.lids if lid in LID_TRACKS), *frame.joints_deg]
+    """Return the joints in frames that a rig lacks; groups of lids adapt to the rig."""
+    named: dict[str, None] = {}
+    for frame in frames:
+        heads = [_neck(t) for t in HEAD_TRACKS if getattr(frame, f"{t}_deg") is not None]
+        lids = [lid for lid in frame.lids if lid in LID_TRACKS]
+        named |= dict.fromkeys([*heads, *lids, *frame.joints_deg])
+    return [name for name in named if name not in joints]
 
 
 def _neck(track: str) -> str:
     """Return the joint of a track of the head."""
     return track.replace("head", "neck")
-
-
-def _is_available(track: str, joints: Sequence[str]) -> bool:
-    if track in HEAD_TRACKS:
-        return _neck(track) in joints
-    return track in EYE_TRACKS or track in joints
 
 
 class GestureFit:

@@ -105,11 +105,8 @@ class Kinematics:
         if base_rad == _UPRIGHT:
             return R, p
         R_world_base = rotation((*base_rad, 0.0))
-        return compose(R_world_base, R), self._rotate_with_base(R_world_base, p)
-
-    def _rotate_with_base(self, R_world_base: Mat3, p_m: Vec3) -> Vec3:
-        """Return the position of a point, given for an upright lower neck, on a rotated one."""
-        return add(self._base, rotate(R_world_base, sub(p_m, self._base)))
+        p = add(self._base, rotate(R_world_base, sub(p, self._base)))
+        return compose(R_world_base, R), p
 
     def own_parts(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Capsule, Capsule]:
         """Return approximate volumes of head and neck in the world.

@@ -223,7 +223,10 @@ class Lead:
         )
         if (by, self._who) != self._leads:
             self._leads, self._since_s = (by, self._who), t_s
-        what = self._held_text() if joints else self._what
+        what = self._what
+        if joints:
+            angles = (f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
+            what = ", ".join(angles)
         return LeadState(
             number, True, by=by, who=self._who, what=what, joints=joints, since_s=self._since_s
         )
@@ -247,10 +250,6 @@ class Lead:
             self.words = ""
             return
         self.words = f"{self._who or 'a client'}: {what}"
-
-    def _held_text(self) -> str:
-        """Return the held joints and their angles as text."""
-        return ", ".join(f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
 
 
 def _target_text(command: Look) -> str:

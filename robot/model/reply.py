@@ -165,18 +165,13 @@ class CommandReply(NamedTuple):
             for one in data["joints"]
         )
         asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
+        gesture = data.get("gesture")
+        if gesture is not None:
+            smaller = tuple((joint, share) for joint, share in gesture["smaller"])
+            changed = {"smaller": smaller, "left_out": tuple(gesture["left_out"])}
+            gesture = GestureReply(**{**gesture, **changed})
         error_rad = radians(data["error_deg"])
-        return cls(
-            data["refused"], asked, done, joints, error_rad, data.get("lead", 0), _gesture(data)
-        )
-
-
-def _gesture(data: Mapping[str, Any]) -> GestureReply | None:
-    found = data.get("gesture")
-    if found is None:
-        return None
-    smaller = tuple((joint, share) for joint, share in found["smaller"])
-    return GestureReply(**{**found, "smaller": smaller, "left_out": tuple(found["left_out"])})
+        return cls(data["refused"], asked, done, joints, error_rad, data.get("lead", 0), gesture)
 
 
 def _point(data: Any) -> Vec3 | None:
