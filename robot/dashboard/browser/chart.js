@@ -1,16 +1,16 @@
 // @ts-check
-// Lines over time on a canvas, in the colours that the style sheet has for them.
+// Chart of lines over time on a canvas, in the colours of the style sheet.
 
 const LEFT = 40, RIGHT = 8, TOP = 8, FOOT = 20, HEIGHT = 132;
 const TICKS = 4;
 
-/** A round step, 1, 2 or 5 times a power of ten, that goes so often into a span. */
+/** Round step, 1, 2 or 5 times a power of ten, for a number of steps in a span. */
 function step(span) {
   const fine = span / TICKS, ten = 10 ** Math.floor(Math.log10(fine));
   return [1, 2, 5, 10].map((n) => n * ten).find((n) => n >= fine) ?? 10 * ten;
 }
 
-/** The least and greatest value of all lines, at least so far apart. */
+/** Smallest and largest value of all lines, with a least distance. */
 function range(lines, least) {
   let low = Infinity, high = -Infinity;
   for (const line of lines) {
@@ -25,7 +25,7 @@ function range(lines, least) {
 }
 
 /**
- * Draw a chart and return it in words.
+ * Draw a chart and return its description.
  * @param {HTMLCanvasElement} canvas
  * @param {{title: string, unit: string, least: number, lines: [string, string][],
  *          x: number[], y: number[][]}} chart
@@ -83,7 +83,7 @@ export function drawChart(canvas, chart) {
   return words(chart);
 }
 
-/** What a chart shows, for those who do not see it. */
+/** Description of a chart for screen readers. */
 function words(chart) {
   const said = chart.lines.map(([name], i) => {
     const values = chart.y[i];

@@ -1,31 +1,31 @@
-// The page's frame: headline, drawers, buttons under the head, picture and head changing places.
+// Frame of the page: headline, drawers, buttons under the head, swap of image and head.
 //
-// STOP is in stop.js, which also brings the state of the rig ("rig-state") and takes what is asked
-// (window.rig). What the drawers hold is filled in by widgets.js.
+// STOP is in stop.js, which also provides the state of the rig ("rig-state") and sends requests
+// (window.rig). widgets.js fills the drawers.
 
 const $ = (selector) => document.querySelector(selector);
 const { ask, tell } = window.rig;
 
 const moves = [...document.querySelectorAll("#moves button")];
 
-// --- what is said ---------------------------------------------------------------------
+// --- messages -------------------------------------------------------------------------
 
 const SAID_MS = 6000;
 let saidTimer = 0;
 
-/** Say something under the buttons for a while. @param {string} text */
+/** Show a message under the buttons for some seconds. @param {string} text */
 function say(text) {
   clearTimeout(saidTimer);
   $("#said").textContent = text;
   saidTimer = setTimeout(() => { $("#said").textContent = ""; }, SAID_MS);
 }
 
-/** Write a text where it has changed, so that a screen reader reads it once. */
+/** Set a text only if it has changed, so that a screen reader reads it once. */
 function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-const LASTING = /, for \d.*$/; // how long somebody has led
+const LASTING = /, for \d.*$/; // duration of the control
 let state = {};
 
 function show(now) {
@@ -34,7 +34,7 @@ function show(now) {
   const headline = state.silent ? "nothing comes from the rig"
     : state.headline || state.leads_words || (state.recording ? "a recording is shown" : "awake");
   write($("#headline"), headline);
-  // Who leads is read out when it changes; what is looked at changes three times a second.
+  // A change of control is read out; the target changes three times a second.
   const leads = (state.leads_words ?? "").replace(LASTING, "");
   write($("#leads"), headline.startsWith(leads) ? "" : state.leads_words);
   write($("#announced"), led ? leads : "");
@@ -79,15 +79,15 @@ $("#swap").addEventListener("click", () => {
 // --- the head looks at the pointer -----------------------------------------------------
 
 const POINT_MS = 50, AGAIN_MS = 250;
-const RESTED_MS = 3000; // the rig lets go a second after the last point
-const FREE = new Set(["", "gaze", "gesture", "pointer"]); // from whom the pointer may take the lead
+const RESTED_MS = 3000; // the rig ends the control a second after the last point
+const FREE = new Set(["", "gaze", "gesture", "pointer"]); // that the pointer may replace
 const following = () => $("#pointer").getAttribute("aria-pressed") === "true";
 let pointer = null; // over the view: {x, y, aspect}
 let moved = false, movedAt = 0, sentAt = 0;
-let takesOver = false; // the button was pressed: from whoever leads
+let takesOver = false; // the button was pressed: replace any control
 
 function pointed(event) {
-  // Who drags turns the view; a finger has no other way to point.
+  // Dragging turns the view, except with a finger, which cannot point otherwise.
   if (event.buttons && event.pointerType !== "touch") return;
   const { innerWidth, innerHeight } = event.view;
   const x = event.clientX / innerWidth, y = event.clientY / innerHeight;
@@ -110,7 +110,7 @@ setInterval(() => {
   tell({ point: pointer });
 }, POINT_MS);
 
-// Unasked it follows where no real head would turn away from the people before it.
+// On from the start if no real head would turn away from the people in front of it.
 let begun = false;
 function followUnasked() {
   if (begun || state.emulated === undefined) return;
@@ -130,7 +130,7 @@ if ($("#view").contentDocument?.readyState === "complete") watchPointer();
 
 // --- picture and head -----------------------------------------------------------------
 
-$("#camera").addEventListener("load", ({ target }) => { // a picture's does not rise
+$("#camera").addEventListener("load", ({ target }) => { // that of an image does not bubble
   if (target.naturalHeight) {
     $("#camera").style.setProperty("--aspect", target.naturalWidth / target.naturalHeight);
   }
@@ -140,7 +140,7 @@ $("#camera").addEventListener("load", ({ target }) => { // a picture's does not 
 
 const tabs = [...document.querySelectorAll("[role=tab]")];
 const panelOf = (tab) => document.getElementById(tab.getAttribute("aria-controls"));
-const left = new Map(); // what had the focus in a drawer that was closed
+const left = new Map(); // element with the focus in a closed drawer
 let open = null;
 
 /** Open a tab's drawer and close the other; null closes all. */
@@ -189,6 +189,6 @@ window.addEventListener("keydown", (event) => {
   if (event.key === "Enter" && event.target.matches?.("input[type=checkbox]")) event.target.click();
 });
 
-// --- what is in the drawers -----------------------------------------------------------
+// --- content of the drawers ----------------------------------------------------------
 
-import("/rig/widgets.js").then(({ mount }) => mount(document)).catch(() => { /* none yet */ });
+import("/rig/widgets.js").then(({ mount }) => mount(document)).catch(() => { /* no panels yet */ });

@@ -1,30 +1,30 @@
-// The red button that is always there, whatever the rest of the page does.
+// The STOP button, which works whatever the rest of the page does.
 //
-// It needs none of the page's other scripts, and talks to the rig over the page's door by a
-// connection of its own, which stands before it is needed. The space bar does the same, in the
-// frame of the view too, unless the user types. A stop is sent again until the rig has taken it.
+// It needs none of the page's other scripts, and reaches the rig through the page's door by its own
+// connection, which is open before it is needed. The space bar does the same, also in the frame of
+// the view, unless the user types. A stop is sent again until the rig confirms it.
 //
-// What comes over the connection is an event "rig-state" of the window for the other scripts;
-// they talk to the rig by window.rig: ask(what) waits for an answer, tell(what) does not. There is no
-// button where a recording is shown, or films without a head ("headless").
+// Messages of the connection become an event "rig-state" of the window for the other scripts. They
+// send requests by window.rig: ask(what) waits for an answer, tell(what) does not. The button is
+// hidden for a recording and for films without a head ("headless").
 
 (() => {
   "use strict";
 
-  const SILENT_AFTER_MS = 3000; // the door gives a sign of life every second
+  const SILENT_AFTER_MS = 3000; // the door sends a heartbeat every second
   const AGAIN_MS = 250;
 
-  let stop = null; // the button and the words beside it, once the document has them
+  let stop = null; // the button and its message, once the document has them
   let words = null;
 
   const QUIET = { stopped: "", silent: false, you: "" };
   let state = QUIET;
-  let line = null; // the connection that stands
+  let line = null; // the open connection
   let heardAt = performance.now();
   let why_lost = "";
   let confirming = false;
   let failed = "";
-  let stopping = null; // a stop that the rig has not taken yet
+  let stopping = null; // a stop that the rig has not confirmed yet
   let posting = false;
 
   async function ask(what, signal) {
@@ -47,8 +47,8 @@
     if (first) push(1);
   }
 
-  // Send the stop until it is taken: over the connection that stands, and by a request of its
-  // own where there is none or it does not answer.
+  // Send the stop until it is confirmed: over the open connection, and by a separate request if
+  // there is none or it does not answer.
   function push(attempt) {
     if (!stopping) return;
     const standing = line && line.readyState === WebSocket.OPEN;
@@ -80,7 +80,7 @@
 
   function resume() {
     confirming = false;
-    ask({ do: "resume", confirmed: true }) // a person said yes to the question
+    ask({ do: "resume", confirmed: true }) // a person confirmed
       .catch((error) => { failed = `resume did not reach the rig (${error.message})`; })
       .finally(draw);
   }
@@ -90,7 +90,7 @@
     draw();
   }
 
-  // A servo that tells nothing cannot be taken hold of where it is.
+  // A servo without feedback cannot be held at its present angle.
   function how() {
     const without_feedback = state.without_feedback;
     if (!without_feedback) return "The torque comes on where the joints are.";
@@ -99,14 +99,14 @@
     return `${who} at full speed.`;
   }
 
-  // Who stopped is asked about as well where it was not here: they may have their hands in it.
+  // Name another browser that stopped the rig: its user may have a hand in the mechanism.
   function question() {
     const other = !state.stopped.includes(`(${state.you})`);
     return other ? `Not stopped here: ${state.stopped}. Is no hand in the mechanism? ${how()}`
       : `Fingers out? ${how()}`;
   }
 
-  // What there is to say, most urgent first: [text, alarm, buttons].
+  // The message, most urgent first: [text, alarm, buttons].
   function saying() {
     if (state.recording) return ["A recording: nothing here moves or stops a rig.", false, []];
     if (state.headless) return ["", false, []];
@@ -138,7 +138,7 @@
     if (stop.firstChild.textContent !== label) stop.firstChild.textContent = label;
     const [text, alarm, buttons] = saying();
     const now = [text, alarm, ...buttons.map((b) => b.textContent)].join("|");
-    if (now === drawn) return; // a button that is being pressed stays where it is
+    if (now === drawn) return; // keep a button that is being pressed
     drawn = now;
     words.hidden = !text;
     words.className = alarm ? "alarm" : "";
@@ -165,7 +165,7 @@
     mine.onclose = () => {
       line = null;
       setTimeout(listen, 500);
-      // A connection that is refused does not say why.
+      // A refused connection has no reason.
       fetch("/rig/stop.js", { cache: "no-store", signal: AbortSignal.timeout(2000) })
         .then((answer) => { why_lost = answer.status === 403 ? NOT_IN : ""; })
         .catch(() => { why_lost = ""; });
@@ -173,7 +173,7 @@
   }
 
   const TEXT = new Set(["text", "search", "number", "password", "email", "url", "tel"]);
-  // By name: what is in a frame is not of this window's classes.
+  // By name: elements of a frame are not instances of this window's classes.
   function typing(where) {
     if (where.isContentEditable) return true;
     if (where.tagName === "TEXTAREA") return !where.readOnly;
@@ -210,7 +210,7 @@
 
   window.rig = { ask, tell };
   listenForKeys(window);
-  document.addEventListener("load", (event) => { // a frame's does not rise to its parents
+  document.addEventListener("load", (event) => { // that of a frame does not bubble
     if (event.target.tagName === "IFRAME") listenForKeys(event.target.contentWindow);
   }, true);
   listen();

@@ -1,7 +1,7 @@
-// The browser's own camera as the eyes of an emulated rig.
+// The browser's webcam as the camera of an emulated rig.
 //
-// Pictures of 640 x 480 go as JPEGs to the door, the next when the last was taken, at most fifteen a
-// second. They end when the button is pressed again, the page is closed or the camera goes.
+// Images of 640 x 480 are sent as JPEGs to the door, each after the last was accepted, at most fifteen
+// a second, until the button is pressed again, the page is closed or the camera is gone.
 
 const EVERY_MS = 1000 / 15;
 const WIDTH = 640, HEIGHT = 480, QUALITY = 0.8;
@@ -15,12 +15,12 @@ let stream = null, socket = null, timer = 0, sentAt = 0;
 /** @param {string} text */
 function say(text) { if (said) said.textContent = text; }
 
-/** Whether this browser may lend its camera to this page: only where the address is secure. */
+/** Whether this page may use the browser's camera: only if the address is secure. */
 export function mayAsk() {
   return window.isSecureContext && Boolean(navigator.mediaDevices?.getUserMedia);
 }
 
-/** Ask for the camera and send its pictures. */
+/** Request the camera and send its images. */
 export async function begin() {
   if (!mayAsk()) { say(ELSEWHERE); return; }
   button.disabled = true;
@@ -66,7 +66,7 @@ export async function begin() {
   say("The head looks through this browser's camera.");
 }
 
-/** Stop the camera; the scene is there again. */
+/** Stop the camera; the rig shows the scene again. */
 export function end() {
   clearTimeout(timer);
   stream?.getTracks().forEach((track) => track.stop());
@@ -78,7 +78,7 @@ export function end() {
 
 if (button) {
   button.addEventListener("click", () => (stream ? end() : begin()));
-  // A real rig has a camera of its own, which is where its eyes are.
+  // A real rig has its own camera at its eyes.
   window.addEventListener("rig-state", (event) => {
     button.hidden = !event.detail.emulated || Boolean(event.detail.recording);
     if (button.hidden && stream) end();

@@ -1,13 +1,13 @@
 // @ts-check
-// The panels of the page: native elements as the rig's side describes them.
+// Panels of the page: native elements, described by the Python side.
 //
-// Over /rig/panels comes {"put": [[number, properties]], "gone": [numbers], "say": [notices]},
-// and images as bytes behind the number of their element; back goes {"set": [number, value]}, and
-// {"seen": [names]} so that what is hidden is not sent. A field that a person is at keeps what the
-// person does until it is left.
+// /rig/panels sends {"put": [[number, properties]], "gone": [numbers], "say": [notices]}, and
+// images as bytes after the number of their element. It receives {"set": [number, value]}, and
+// {"seen": [names]} so that hidden panels are not sent. A field with the focus keeps the user's input
+// until the focus leaves.
 
 /**
- * @typedef {Object} Props What is known of an element; which of it there is depends on its kind.
+ * @typedef {Object} Props Properties of an element; which are present depends on its kind.
  * @property {string} kind
  * @property {string | number} in
  * @property {number} order
@@ -33,7 +33,7 @@
  *
  * @typedef {Object} Part An element on the page.
  * @property {HTMLElement} node
- * @property {HTMLElement} [body] where others are put into it
+ * @property {HTMLElement} [body] container of its children
  * @property {(props: Props, changed: Partial<Props>) => void} show
  * @property {(data: Blob) => void} [paint]
  *
@@ -43,7 +43,7 @@
 import { drawChart } from "./chart.js";
 
 const AGAIN_MS = 500;
-const DRAG_MS = 50; // a slider that is dragged sends so often at most
+const DRAG_MS = 50; // shortest time between values of a dragged slider
 const KEYS_MS = 250;
 const NOTICE_MS = 8000, REFUSED_MS = 14000;
 const NUMBER_BYTES = 4;
@@ -57,7 +57,7 @@ function make(name, props = {}, ...children) {
 }
 
 /**
- * Call the last of many calls, no more often than every so many milliseconds.
+ * Limit the rate of calls; the last one is always made.
  * @param {(value: any) => void} does
  * @param {number} ms
  */
@@ -70,13 +70,13 @@ function seldom(does, ms) {
   };
 }
 
-/** Write a name that may be broken after its dots and underscores. */
+/** Allow line breaks in a name after its dots and underscores. */
 function name(label, text) {
   if (label.textContent === text) return;
   label.replaceChildren(...text.split(/(?<=[._])/).flatMap((part) => [part, make("wbr")]));
 }
 
-/** Where in the window an image is drawn: as large as fits into its element. */
+/** Rectangle of an image in the window, fitted into its element. */
 function drawnBox(image) {
   const box = image.getBoundingClientRect();
   const scale = Math.min(box.width / image.naturalWidth, box.height / image.naturalHeight);
@@ -86,12 +86,12 @@ function drawnBox(image) {
   };
 }
 
-/** A field's own text: whole numbers and decimals without the noise of binary fractions. */
+/** Text of a number, without the noise of binary fractions. */
 function written(value) {
   return typeof value === "number" ? String(Number(value.toPrecision(12))) : String(value);
 }
 
-// --- the kinds of elements --------------------------------------------------------------------
+// --- kinds of elements ------------------------------------------------------------------------
 
 /** @type {Record<string, (id: string, send: Send) => Part>} */
 const KINDS = {
@@ -99,7 +99,7 @@ const KINDS = {
     const node = make("div", { className: "html" });
     return { node, show(props, changed) {
       if (changed.content === undefined) return;
-      node.innerHTML = props.content; // the rig's side has escaped all names in it
+      node.innerHTML = props.content; // the Python side has escaped all names in it
       node.hidden = !props.content;
     } };
   },
@@ -235,7 +235,7 @@ const KINDS = {
         shown();
       }
     });
-    number.addEventListener("change", commit); // by its arrows, or when it is left
+    number.addEventListener("change", commit); // by its arrows, or when the focus leaves
     number.addEventListener("blur", commit);
     number.addEventListener("wheel", () => { number.blur(); }); // scrolling must not move a joint
     const both = make("div", { className: "both" }, range, number);
@@ -306,19 +306,19 @@ const KINDS = {
   },
 };
 
-/** Say more about a control, to the mouse and to a screen reader. */
+/** Add a tooltip to a control, also for screen readers. */
 function describe(node, hint) {
   if (!hint) return;
   node.title = hint;
   node.setAttribute("aria-description", hint);
 }
 
-// --- words that go away -----------------------------------------------------------------------
+// --- notices ----------------------------------------------------------------------------------
 
 /** @type {HTMLElement} */
 let notices;
 
-/** Show words for some seconds; a refusal is read out at once. */
+/** Show a notice for some seconds; a refusal is read out immediately. */
 function say(text, refused) {
   const shut = make("button", { type: "button", textContent: "×" });
   shut.setAttribute("aria-label", "close this message");
@@ -333,7 +333,7 @@ function say(text, refused) {
 // --- the connection ---------------------------------------------------------------------------
 
 /**
- * Fill the page's panels, [data-panel=NAME], and keep them as the rig says.
+ * Fill the page's panels, [data-panel=NAME], and keep them up to date.
  * @param {Document} page
  */
 export function mount(page) {
@@ -356,7 +356,7 @@ export function mount(page) {
   };
   const tellSeen = () => tell({ seen: [...seen] });
 
-  /** Put an element where its order has it among its neighbours. */
+  /** Insert an element by its order among its neighbours. */
   function place(number, node, props) {
     const parent = typeof props.in === "string" ? panels.get(props.in) : known.get(props.in)?.part.body;
     if (!parent) return;
@@ -396,7 +396,7 @@ export function mount(page) {
     const mine = new WebSocket(`${scheme}://${location.host}/rig/panels`);
     mine.binaryType = "arraybuffer";
     line = mine;
-    mine.onopen = () => { // all is sent anew
+    mine.onopen = () => { // everything is sent again
       for (const number of [...known.keys()]) gone(number);
       tellSeen();
     };
@@ -421,7 +421,7 @@ export function mount(page) {
     }
     tellSeen();
   });
-  for (const [name, node] of panels) { // what is in no drawer is always there
+  for (const [name, node] of panels) { // panels outside the drawers are always visible
     if (node.getAttribute("role") === "tabpanel") watcher.observe(node);
     else seen.add(name);
   }
