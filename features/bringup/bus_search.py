@@ -60,7 +60,7 @@ class SearchRound:
     channels: int | None = None
 
     @property
-    def answered(self) -> bool:
+    def has_answer(self) -> bool:
         """Return whether a servo of this kind has answered."""
         return bool(self.found) or self.board is not None
 
@@ -118,7 +118,7 @@ def search(
             looked = SearchRound(kind, baud, board=board, channels=USB_CHANNELS.get(usb))
         else:
             looked = SearchRound(kind, baud, possible=False)
-        met = kind if looked.answered else met
+        met = kind if looked.has_answer else met
         yield looked
 
 

@@ -129,7 +129,7 @@ class _Assignment:
         registers.write_all((self._id,), "status_return_level", kind.family.answer_level)
         if registers.read(self._id, "torque_enable"):
             if not registers.write(self._id, "torque_enable", 0):
-                raise self._refused("let its torque go")
+                raise self._refusal("let its torque go")
             self._done.append("torque 1 -> 0")
         if self._id != servo_id:
             tell(f"id {self._id} -> {servo_id}")
@@ -145,7 +145,7 @@ class _Assignment:
                 f"{self._baud} bit/s: gazerig scan finds it"
             )
         if kind.family.lock is not None and not registers.settle(self._id, kind.family.lock, 1):
-            raise self._refused("close its lock")
+            raise self._refusal("close its lock")
         return SetupResult(self._found, seen, tuple(self._done))
 
     def _change_id(self, servo_id: int) -> None:
@@ -153,7 +153,7 @@ class _Assignment:
         written = self._registers.write(self._id, "id", servo_id)
         # The confirmation may come from either id, or be lost.
         if not written and ping(self._port, self._kind.family, servo_id, self._baud, 2) is None:
-            raise self._refused(f"take the id {servo_id}")
+            raise self._refusal(f"take the id {servo_id}")
         self._done.append(f"id {self._id} -> {servo_id}")
         self._id = servo_id
 
@@ -163,7 +163,7 @@ class _Assignment:
             self._id, "baud_rate", self._kind.family.baud_rates.index(baud)
         )
         if not written and self._registers.refusal:  # a mere silence may be a lost confirmation
-            raise self._refused(f"take {baud} bit/s")
+            raise self._refusal(f"take {baud} bit/s")
         self._done.append(f"baud rate {self._baud} -> {baud} bit/s")
         self._baud = baud
         self._open(baud)
@@ -171,7 +171,7 @@ class _Assignment:
     def _unlock(self) -> None:
         lock = self._kind.family.lock
         if lock is not None and not self._registers.write(self._id, lock, 0):
-            raise self._refused("open its lock")
+            raise self._refusal("open its lock")
 
     def _open(self, baud: int) -> None:
         if not self._port.setBaudRate(baud):
@@ -179,7 +179,7 @@ class _Assignment:
                 f"{self._port.port_name} cannot run at {baud} bit/s: choose another rate"
             )
 
-    def _refused(self, what: str) -> ServoFault:
+    def _refusal(self, what: str) -> ServoFault:
         refusal = self._registers.refusal
         reason = f"error {refusal}" if refusal else "no answer"
         return ServoFault(

@@ -205,13 +205,13 @@ class Monitor:
         self._asked += len(servos)
         self._unanswered += sum(one is None for one in servos.values())
         for pair in self._pairs:
-            one, other = coupled_angles(pair, servos[pair.first], servos[pair.second])
+            one, other = joint_telemetry(pair, servos[pair.first], servos[pair.second])
             servos[pair.first], servos[pair.second] = one, other
         end_s = self._now_s()
         return TelemetrySample(end_s, end_s - start_s, servos, self._asked, self._unanswered)
 
 
-def coupled_angles(
+def joint_telemetry(
     pair: CoupledPair, one: Telemetry | None, other: Telemetry | None
 ) -> tuple[Telemetry | None, Telemetry | None]:
     """Return the telemetry of two coupled servos with the angles of their joints.

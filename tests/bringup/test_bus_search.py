@@ -153,7 +153,7 @@ def test_nobody():
     assert [(one.kind, one.baud) for one in rounds] == [
         ("maestro", 57_600), ("dynamixel", 57_600), ("feetech", 57_600),
     ]  # fmt: skip
-    assert not any(one.answered for one in rounds)
+    assert not any(one.has_answer for one in rounds)
 
 
 def test_all_rates_of_a_kind_are_in_the_plan():
@@ -166,7 +166,7 @@ def test_words_for_kinds():
     assert parse_kinds("feetech") == ("feetech",)
     with pytest.raises(ValueError, match="pca: not all or one of dynamixel, feetech, maestro"):
         parse_kinds("pca")
-    assert not SearchRound("feetech", 9600).answered
+    assert not SearchRound("feetech", 9600).has_answer
 
 
 def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():

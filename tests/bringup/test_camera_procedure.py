@@ -122,7 +122,7 @@ def test_a_head_that_looks_around_finds_its_camera(scene: BoardScene, neck: Move
     assert [step.number for step in steps] == list(range(1, 13))
     views = [step.view for step in steps if step.view is not None]
     assert len(views) == 12 and neck.went == [*angles, (0.0, 0.0, 0.0)]
-    found = camera_on_head(views, scene.lens, 640).mounted(replace(CAMERA))
+    found = camera_on_head(views, scene.lens, 640).camera_params(replace(CAMERA))
     assert found.position_mm == pytest.approx(scene.mount.position_mm, abs=3.0)
     assert found.yaw_deg == pytest.approx(scene.mount.yaw_deg, abs=0.3)
     assert found.pitch_deg == pytest.approx(scene.mount.pitch_deg, abs=0.3)

@@ -86,7 +86,7 @@ def test_a_stale_picture_shows_nobody_and_keys_wait() -> None:
     chosen(made, 1.0, face(1, 1.0))
     assert chosen(made, 2.0, face(1, 1.0), captured_s=1.9 - STALE_S).kind == "rest"
     assert "no face is seen" in (made.press("left", 2.0) or "")
-    assert made.state == initial_calibration({}) and not made.aimed
+    assert made.state == initial_calibration({}) and not made.is_aimed
     assert made.press("end", 2.0) is None and made.state.part is None
 
 
@@ -137,7 +137,7 @@ def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(
         pose = ticks(made, steered, 0.6).pose
         left = angle_between(line_of_sight(pose, True), sub(true, pose.p_world_eye_left_m))
         right = angle_between(line_of_sight(pose, False), sub(true, pose.p_world_eye_right_m))
-        assert steered.aimed and degrees(max(left, right)) < AIMED_DEG
+        assert steered.is_aimed and degrees(max(left, right)) < AIMED_DEG
         steered.press("enter", made.clock.now_s())
         ticks(made, steered, 0.1)
         assert part in steered.state.chosen and steered.state.part != part
@@ -172,6 +172,6 @@ def test_eyes_in_a_saccade_are_not_on_the_part(made: Assembly, steered: FaceStee
     made.robot.start(made.clock)
     tick = ticks(made, steered, 1.7)
     steered.update(tick._replace(gaze=tick.gaze._replace(phase="fixate")))
-    assert steered.aimed
+    assert steered.is_aimed
     steered.update(tick._replace(gaze=tick.gaze._replace(phase="saccade")))
-    assert steered.error_deg == inf and not steered.aimed
+    assert steered.error_deg == inf and not steered.is_aimed

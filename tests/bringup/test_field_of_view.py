@@ -14,7 +14,7 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace
 from gazerig.features.bringup.calibration.camera_calibration import CameraCalibrationRefused
-from gazerig.features.bringup.calibration.field_of_view import LEAST_FRAMES, field_by_face
+from gazerig.features.bringup.calibration.field_of_view import LEAST_FRAMES, estimate_field
 from gazerig.features.bringup.cli.calibrate import camera as command
 from gazerig.robot.cli.main import app
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -37,14 +37,14 @@ def landmarks(field_deg: float, far_m: float, size: float = 1.0, noise_px: float
 @pytest.mark.parametrize("field_deg", [55.0, 69.0, 84.0, 110.0])
 @pytest.mark.parametrize("far_m", [0.6, 1.0])
 def test_the_field_is_found_for_a_face_of_usual_size(field_deg, far_m):
-    found = field_by_face(landmarks(field_deg, far_m), WIDTH, HEIGHT, far_m)
+    found = estimate_field(landmarks(field_deg, far_m), WIDTH, HEIGHT, far_m)
     assert found.horizontal_deg == pytest.approx(field_deg, abs=0.02 * field_deg)
     assert found.moved < 0.05 and found.frames == LEAST_FRAMES + 20
 
 
 @pytest.mark.parametrize("size", [0.92, 1.08])
 def test_faces_of_other_sizes_are_within_what_is_said(size):
-    found = field_by_face(landmarks(84.0, 1.0, size), WIDTH, HEIGHT, 1.0)
+    found = estimate_field(landmarks(84.0, 1.0, size), WIDTH, HEIGHT, 1.0)
     assert found.low_deg - 0.7 <= 84.0 <= found.high_deg + 0.7
     focal = [np.tan(radians(deg) / 2.0) for deg in (found.low_deg, found.horizontal_deg)]
     assert focal[1] / focal[0] == pytest.approx(1.08, abs=1e-6)
@@ -53,11 +53,11 @@ def test_faces_of_other_sizes_are_within_what_is_said(size):
 def test_too_few_frames_motion_and_impossible_lenses_are_refused():
     seen = landmarks(84.0, 1.0)
     with pytest.raises(CameraCalibrationRefused, match="60 are needed"):
-        field_by_face(seen[:20], WIDTH, HEIGHT, 1.0)
+        estimate_field(seen[:20], WIDTH, HEIGHT, 1.0)
     with pytest.raises(CameraCalibrationRefused, match="hold still at 1 m"):
-        field_by_face(seen[:40] + landmarks(84.0, 1.4)[:40], WIDTH, HEIGHT, 1.0)
+        estimate_field(seen[:40] + landmarks(84.0, 1.4)[:40], WIDTH, HEIGHT, 1.0)
     with pytest.raises(CameraCalibrationRefused, match="no such lens"):
-        field_by_face(seen, WIDTH, HEIGHT, 0.05)
+        estimate_field(seen, WIDTH, HEIGHT, 0.05)
 
 
 class Sitter:

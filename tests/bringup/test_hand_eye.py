@@ -55,7 +55,7 @@ def found_in(scene: BoardScene, views: list[NeckView], **params: Any) -> HandEye
 
 def off(found: HandEye, true: CameraParams) -> tuple[float, float]:
     """Return by how many millimetres and degrees it is off."""
-    at = found.mounted(true)
+    at = found.camera_params(true)
     mm = float(np.linalg.norm(np.array(at.position_mm) - true.position_mm))
     angles = (at.yaw_deg - true.yaw_deg, at.pitch_deg - true.pitch_deg, at.roll_deg - true.roll_deg)
     return mm, max(map(abs, angles))
@@ -123,13 +123,15 @@ def test_perfect_sights_give_the_exact_place() -> None:
 
 def test_same_views_same_place() -> None:
     scene = scene_of(0)
-    one, two = (found_in(scene, some_views(scene)).mounted(scene.mount) for _ in range(2))
+    one, two = (found_in(scene, some_views(scene)).camera_params(scene.mount) for _ in range(2))
     assert one == two
 
 
 def test_it_is_written_down_rounded_and_on_the_head() -> None:
     scene = scene_of(0)
-    at = found_in(scene, some_views(scene)).mounted(replace(scene.mount, horizontal_field_deg=70.0))
+    at = found_in(scene, some_views(scene)).camera_params(
+        replace(scene.mount, horizontal_field_deg=70.0)
+    )
     assert at.mount == "head" and at.horizontal_field_deg == 70.0
     assert at.position_mm == tuple(round(mm, 1) for mm in at.position_mm)
 

@@ -19,7 +19,7 @@ from gazerig.features.bringup.telemetry import (
     Monitor,
     Telemetry,
     as_json,
-    coupled_angles,
+    joint_telemetry,
     pulse_telemetry,
     telemetry_of,
 )
@@ -241,11 +241,11 @@ def telemetry(deg: float | None) -> Telemetry:
 
 def test_the_monitor_shows_the_joints_of_coupled_servos() -> None:
     pair = CoupledPair("neck_pitch", "neck_roll", Differential())
-    one, other = coupled_angles(pair, telemetry(25.0), telemetry(5.0))
+    one, other = joint_telemetry(pair, telemetry(25.0), telemetry(5.0))
     assert one is not None and other is not None
     assert (one.goal_deg, other.goal_deg) == pytest.approx((15.0, 10.0))
     assert (one.position_deg, other.position_deg) == pytest.approx((15.0, 10.0))
     assert (one.velocity_deg_s, other.velocity_deg_s) == pytest.approx((15.0, 10.0))
-    one, other = coupled_angles(pair, telemetry(25.0), None)
+    one, other = joint_telemetry(pair, telemetry(25.0), None)
     assert one is not None and other is None and one.position_deg is None
-    assert coupled_angles(pair, None, telemetry(1.0))[0] is None
+    assert joint_telemetry(pair, None, telemetry(1.0))[0] is None

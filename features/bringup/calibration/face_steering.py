@@ -74,7 +74,7 @@ class FaceSteering:
         self._entered_s: float | None = None
 
     @property
-    def aimed(self) -> bool:
+    def is_aimed(self) -> bool:
         """Return whether both eyes are on the part and no key is waiting."""
         return self.face is not None and self._entered_s is None and self.error_deg <= AIMED_DEG
 
@@ -111,7 +111,7 @@ class FaceSteering:
 
     def update(self, tick: Tick) -> str | None:
         """Measure the gaze; return why a waiting Enter was dropped."""
-        self.error_deg = self._off_deg(tick)
+        self.error_deg = self._gaze_error_deg(tick)
         if tick.target.kind != "part" or tick.gaze.phase == "saccade":
             self.error_deg = inf
         if self._entered_s is None:
@@ -122,14 +122,14 @@ class FaceSteering:
             self.error_deg = inf
         elif tick.t_s - self._entered_s > WAIT_S:
             self._entered_s = None
-            off = self._off_deg(tick)
+            off = self._gaze_error_deg(tick)
             return (
                 f"not taken: the eyes are {off:.1f} deg off the point, as far as they can turn; "
                 "come before the robot, nearer to where its head points"
             )
         return None
 
-    def _off_deg(self, tick: Tick) -> float:
+    def _gaze_error_deg(self, tick: Tick) -> float:
         """Return the angle of the gaze from the part, as far as the eyes can meet it."""
         return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
 

@@ -39,7 +39,7 @@ class FaceFieldOfView(NamedTuple):
     moved: float
 
 
-def field_by_face(
+def estimate_field(
     landmarks_px: Sequence[Pixels], width_px: int, height_px: int, distance_m: float
 ) -> FaceFieldOfView:
     """Return the field of view by a face that is seen at a known distance.

@@ -114,7 +114,7 @@ class HandEye:
     position_std_mm: Vec3
     angle_std_deg: Vec3
 
-    def mounted(self, params: CameraParams) -> CameraParams:
+    def camera_params(self, params: CameraParams) -> CameraParams:
         """Return the camera at the place found, rounded to 0.1 mm and 0.01 deg."""
         found = mounted_at(params, self.R_head_camera, self.p_head_camera_m)
         x, y, z = (round(mm, 1) for mm in found.position_mm)
@@ -232,7 +232,7 @@ def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: Han
         np.array((params.lens_error_percent / 100.0, centre_px, centre_px)),
         radians(params.joint_error_deg),
     )
-    starts = sorted(_starts(views, lens), key=lambda found: _off(observations, *found))
+    starts = sorted(_starts(views, lens), key=lambda found: _median_error_px(observations, *found))
     if not starts:
         raise CameraCalibrationRefused(
             "the images of the board do not agree with any place of the camera: see that "
@@ -272,7 +272,7 @@ def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pos
     return found
 
 
-def _off(observations: Observations, camera: Pose, board: Pose) -> float:
+def _median_error_px(observations: Observations, camera: Pose, board: Pose) -> float:
     """Return the usual reprojection error of a start, by which starts are compared."""
     errors = np.abs(observations.errors(first_estimate(observations, camera, board)))
     return float(np.median(np.where(np.isfinite(errors), errors, inf)))

@@ -50,7 +50,7 @@ class Pose(NamedTuple):
         """Return the child's frame in this one's parent."""
         return Pose(self.R @ child.R, self.R @ child.p + self.p)
 
-    def moved(self, step: Floats) -> "Pose":
+    def displace(self, step: Floats) -> "Pose":
         """Turn it about its own axes and shift it along its parent's."""
         return Pose(self.R @ np.asarray(cv2.Rodrigues(step[:3])[0]), self.p + step[3:])
 
@@ -69,11 +69,11 @@ class Estimate(NamedTuple):
     lens_off: Floats
     turns_rad: Floats
 
-    def moved(self, step: Floats) -> "Estimate":
+    def displace(self, step: Floats) -> "Estimate":
         """Return the estimate moved by (15 + 3 views,) numbers."""
         return Estimate(
-            self.camera.moved(step[:6]),
-            self.board.moved(step[6:12]),
+            self.camera.displace(step[:6]),
+            self.board.displace(step[6:12]),
             self.lens_off + step[12:_SHARED],
             self.turns_rad + step[_SHARED:].reshape(-1, 3),
         )
@@ -145,7 +145,7 @@ class Observations(NamedTuple):
         for k in range(_SHARED + 3):
             step = np.zeros(_SHARED + 3 * self.views)
             step[[k] if k < _SHARED else slice(k, None, 3)] = _SMALL
-            more, less = (self.errors(estimate.moved(sign * step)) for sign in (1.0, -1.0))
+            more, less = (self.errors(estimate.displace(sign * step)) for sign in (1.0, -1.0))
             columns.append((more - less) / (2.0 * _SMALL))
         return np.stack(columns[:_SHARED], axis=1), np.stack(columns[_SHARED:], axis=1)
 
@@ -234,14 +234,14 @@ def refine(observations: Observations, estimate: Estimate) -> Fit:
             break
         first, huber = estimate, _huber(_bound(errors) / _CORNER_PX, len(errors))
         found = least_squares(
-            lambda step, first=first: observations.residuals(first.moved(step)),
+            lambda step, first=first: observations.residuals(first.displace(step)),
             np.zeros(_SHARED + 3 * observations.views),
-            lambda step, first=first: observations.jacobian(first.moved(step)),
+            lambda step, first=first: observations.jacobian(first.displace(step)),
             x_scale="jac",
             loss=huber,
             max_nfev=_MOST_STEPS,
         )
-        estimate, cost = estimate.moved(found.x), float(found.cost)
+        estimate, cost = estimate.displace(found.x), float(found.cost)
         if float(np.abs(found.x[:12]).max()) < _SETTLED:
             break
     errors = observations.errors(estimate)

@@ -194,7 +194,7 @@ class HobbyMarker:
     def mark(self, where: str) -> float:
         """Let the user move the joint to a position; return the pulse width in us."""
         self._person.steer(f"move {self.name} {where}, then press Enter", self)
-        return self._arrived()
+        return self._arrive()
 
     def by(self, us: float) -> None:
         """Move the joint by this much."""
@@ -212,13 +212,13 @@ class HobbyMarker:
     def bring(self, place: float) -> float:
         """Move it slowly to a pulse width in us; return the width reached."""
         self._hobby.aim(place)
-        return self._arrived()
+        return self._arrive()
 
     def leave(self, place: float) -> None:
         """Move it slowly to a place at which friction shall hold it."""
         self.bring(place)
 
-    def _arrived(self) -> float:
+    def _arrive(self) -> float:
         at_us = self._hobby.arrive()
         self._tell_events()
         return at_us

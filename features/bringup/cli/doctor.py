@@ -72,7 +72,7 @@ def doctor(
         refuse_packages(model, "doctor")
         tell: Tell = (lambda _: None) if as_json else _print_line
         with rig_ports(model, mock, port) as wired:
-            lines = wired.opened_by()
+            lines = wired.unopened_ports()
             findings = _examine_buses(model, lines, tell)
             if fix:
                 _apply_fixes(model, lines, findings, tell)

@@ -30,10 +30,10 @@ class TerminalJogger(TerminalPerson):
     def steer(self, question: str, servo: JoggableJoint) -> None:
         """Return when the servo has the desired position; see Jogger."""
         say(question)
-        if self._lines.scripted or not sys.stdin.isatty():
-            self._by_lines(question, servo)
+        if self._lines.is_scripted or not sys.stdin.isatty():
+            self._steer_by_lines(question, servo)
         else:
-            self._by_keys(servo)
+            self._steer_by_keys(servo)
 
     def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
         """Return the typed number, Enter is the proposed one; see Jogger."""
@@ -49,7 +49,7 @@ class TerminalJogger(TerminalPerson):
                 return number
             say(f"{line!r} is no number: a number, or Enter for {proposed:g}; q ends")
 
-    def _by_lines(self, question: str, servo: JoggableJoint) -> None:
+    def _steer_by_lines(self, question: str, servo: JoggableJoint) -> None:
         while line := self._line(question, servo.live):
             try:
                 us = float(line)
@@ -62,7 +62,7 @@ class TerminalJogger(TerminalPerson):
             else:
                 servo.to(us)
 
-    def _by_keys(self, servo: JoggableJoint) -> None:
+    def _steer_by_keys(self, servo: JoggableJoint) -> None:
         step = FIRST_STEP
         say(KEYS_HELP)
         with TerminalKeys() as keys:

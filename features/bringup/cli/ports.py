@@ -87,7 +87,7 @@ class RigPorts(NamedTuple):
     paths: Mapping[str, str]
     buses: PtyBuses | None
 
-    def opened_by(self) -> dict[str, BusPort]:
+    def unopened_ports(self) -> dict[str, BusPort]:
         """Return the ports, not opened yet."""
         return {name: port_of(path) for name, path in self.paths.items()}
 

@@ -42,7 +42,7 @@ class Lines:
                 raise SetupError(f"{answers}: is no UTF-8 text; write one answer a line") from None
 
     @property
-    def scripted(self) -> bool:
+    def is_scripted(self) -> bool:
         """Return whether they come from a file."""
         return self._file is not None
 

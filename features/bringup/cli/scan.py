@@ -189,7 +189,7 @@ def _one(
     line = port_of(path)
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
-        if not thorough and not any(one.answered for one in rounds):
+        if not thorough and not any(one.has_answer for one in rounds):
             # Ids that are far apart answer after a long silence; some not a ping to all.
             servos = [row for row in asked if row[0] != "maestro"]
             boards = [one for one in rounds if one.kind == "maestro"]
@@ -198,7 +198,7 @@ def _one(
         line.closePort()
     requested = tuple(dict.fromkeys(row[0] for row in asked))
     _show(rounds, path, requested, as_json)
-    return any(one.answered for one in rounds)
+    return any(one.has_answer for one in rounds)
 
 
 def _search(
@@ -305,7 +305,7 @@ def remarks(
     elif unasked and found:
         yield f"{' and '.join(unasked)} was not searched, as others answered: --kind all searches it too"
     for one in rounds:
-        yield from _odd(one, {rate.baud for rate in rounds if rate.answered})
+        yield from _odd(one, {rate.baud for rate in rounds if rate.has_answer})
     if not found and not boards:
         yield (
             "no servo answers: is the servo supply on? does each servo's LED flash once when it "

@@ -44,7 +44,7 @@ class WantedSetting(NamedTuple):
     least: int | None = None
     most: int | None = None
 
-    def met_by(self, value: int) -> bool:
+    def accepts(self, value: int) -> bool:
         """Return whether a register with this value is as it should be."""
         if self.least is None and self.most is None:
             return value & self.mask == self.value

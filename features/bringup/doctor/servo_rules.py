@@ -245,7 +245,7 @@ def _baud(state: ServoState) -> Iterator[Diagnostic]:
 def _wanted(state: ServoState) -> Iterator[Diagnostic]:
     for wanted in state.checks.wanted:
         value = state.values[wanted.register]
-        if value is None or wanted.met_by(value):
+        if value is None or wanted.accepts(value):
             continue
         right = value & ~wanted.mask | wanted.value & wanted.mask
         fixes = ((wanted.register, right),) if wanted.remedy == FIX else ()

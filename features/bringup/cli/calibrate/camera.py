@@ -36,7 +36,7 @@ from gazerig.features.bringup.calibration.camera_procedure import (
     neck_steps,
 )
 from gazerig.features.bringup.calibration.charuco_page import RULER_MM, write_page
-from gazerig.features.bringup.calibration.field_of_view import SIZE_SPREAD, field_by_face
+from gazerig.features.bringup.calibration.field_of_view import SIZE_SPREAD, estimate_field
 from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
 from gazerig.features.bringup.cli.calibrate.oak import (
     calibration_of_file,
@@ -229,7 +229,7 @@ def _measure_field(
             status(f"face in {len(seen)} of {_FACE_FRAMES} frames")
     finally:
         thread.close()
-    field = field_by_face(seen, *size_px, face_at_m)
+    field = estimate_field(seen, *size_px, face_at_m)
     say(
         f"horizontal field of view {field.horizontal_deg:.1f} deg, between {field.low_deg:.1f} and "
         f"{field.high_deg:.1f} as faces differ in size by {100.0 * SIZE_SPREAD:.0f} %, and so far may "
@@ -251,7 +251,7 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
 
     With it goes the lens that belongs to this place, at the size it was measured on.
     """
-    params, lens = found.mounted(camera), found.lens
+    params, lens = found.camera_params(camera), found.lens
     place = ("position_mm", "yaw_deg", "pitch_deg", "roll_deg")
     return {f"camera.{key}": getattr(params, key) for key in place} | {
         f"camera.lens.{key}": round(getattr(lens, key), 2)

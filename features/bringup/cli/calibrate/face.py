@@ -43,7 +43,7 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
-from gazerig.robot.app.session import way_out
+from gazerig.robot.app.session import prepare_shutdown
 from gazerig.robot.cli.terminal import (
     FAULT,
     RigArgument,
@@ -180,7 +180,7 @@ def _run(
 ) -> LoopCount:
     """Run the robot until the sitting is over."""
     count = LoopCount(0, 0, "fault: unexpected error")
-    with contextlib.ExitStack() as closed_last, way_out(made, say, interrupts) as leaving:
+    with contextlib.ExitStack() as closed_last, prepare_shutdown(made, say, interrupts) as leaving:
         leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
         for note in (*made.notes, *group_events(made.robot.body.bus.events())):
             say(note)
@@ -226,12 +226,12 @@ class _CalibrationSession:
             return why
         if steering.state.part is None:
             return "you" if steering.state.at < len(PART_NAMES_TEXT) else "the last part"
-        if steering.aimed:
+        if steering.is_aimed:
             self._ready_s = now_s
         if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
             what = "no face is seen" if steering.face is None else "the eyes cannot reach it"
             raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or pipe end here")
-        key = self._keys.next(steering.aimed)
+        key = self._keys.next(steering.is_aimed)
         if key is not None:
             self._tell(steering.press(key, now_s))
         return None
