@@ -26,7 +26,7 @@ from gazerig.gaze.oculomotor.params import (
     PursuitParams,  # noqa: E402
 )
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams  # noqa: E402
-from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
+from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalise  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import gaze_parts
@@ -201,7 +201,7 @@ def scanpath() -> None:
     walk = load_walk("nakamoto_tsuruno")
     names = [PART_NAMES[code] for code in walk.order]
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2))
-    matrix = normalised(walk.matrix)
+    matrix = normalise(walk.matrix)
     left.imshow(matrix, cmap="YlOrBr", vmin=0.0, vmax=0.55)
     left.grid(visible=False)
     left.set_xticks(range(8), names, rotation=60, ha="right")

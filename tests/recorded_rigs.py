@@ -7,7 +7,7 @@ from gazerig.config.schema import Rig
 from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.session import leave
+from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
@@ -40,7 +40,7 @@ def recorded(path: Path, rig: Rig, seconds: float) -> Run:
     made.robot.start(made.clock)
     stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
-    leave(made, count, lambda line: None)
+    shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())
     made.close()
     return Run(RunRecording(path), seen)

@@ -9,7 +9,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble, with_options
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.run_rig import run_info
-from gazerig.robot.app.session import leave
+from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording.read import RunRecording
@@ -33,7 +33,7 @@ def test_what_the_planner_chose_is_recorded_and_chosen_again(tmp_path: Path) -> 
     made.robot.start(made.clock)
     stop = recorder.timed(lambda s: "seconds" if s >= 2.7 else None)
     count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
-    leave(made, count, lambda line: None)
+    shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())
     made.close()
     assert {plan.partition(":")[0] for plan in plans} >= {"wait", "guard"}

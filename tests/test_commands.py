@@ -17,7 +17,7 @@ from gazerig.gaze.gesture.expression import Expressions
 from gazerig.gaze.gesture.gesture import GestureParams
 from gazerig.gaze.gesture.gesture_player import GesturePlayer
 from gazerig.gaze.lids.lids import LidParams, Lids
-from gazerig.robot.app.session import leave
+from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.command_checks import check
@@ -144,7 +144,7 @@ def test_a_run_that_ends_stopped_does_not_park(running: Running) -> None:
     running.order(Stop("test"))
     running.go(0.2)
     said: list[str] = []
-    leave(running.made, running.count, said.append)
+    shut_down(running.made, running.count, said.append)
     assert said == ["stopped by seconds: not parked, as it was stopped, torque off"]
 
 

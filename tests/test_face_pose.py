@@ -12,7 +12,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.intrinsics import project
-from gazerig.robot.perception.face_fit import fitted_face, rotation_by
+from gazerig.robot.perception.face_fit import fit_face, rotation_by
 from gazerig.robot.perception.face_pose import FacePose, face_pose
 
 CAMERA = intrinsics_of_view(radians(65.0), 640, 480)
@@ -264,7 +264,7 @@ def test_the_fit_is_the_most_probable_face():
         points = face_m @ cv2.Rodrigues(turn)[0].T + p
         seen = points[:, :2] / points[:, 2:] + rng.normal(0.0, 0.001, (5, 2))
         wanted = most_probable(seen, 0.002)
-        found = fitted_face(tuple(map(tuple, seen.tolist())), 0.002)
+        found = fit_face(tuple(map(tuple, seen.tolist())), 0.002)
         assert found is not None
         R = cv2.Rodrigues(wanted[:3])[0]
         off_deg.append(degrees(angle_between(R, np.array(found.R))))
@@ -277,7 +277,7 @@ def test_the_fit_is_the_most_probable_face():
 def test_without_noise_a_smile_is_no_nod():
     for wider in (-0.15, 0.15, 0.3):
         points = smiling(wider) + (0.0, 0.0, 0.5)
-        found = fitted_face(tuple(map(tuple, (points[:, :2] / points[:, 2:]).tolist())), 0.0005)
+        found = fit_face(tuple(map(tuple, (points[:, :2] / points[:, 2:]).tolist())), 0.0005)
         assert found is not None
         assert abs(degrees(angle_between(np.eye(3), np.array(found.R)))) < 3.5
 

@@ -11,7 +11,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.run_rig import run_info
-from gazerig.robot.app.session import leave
+from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Play
@@ -59,7 +59,7 @@ def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     made.robot.start(made.clock)
     stop = recorder.timed(lambda s: "seconds" if s >= 3.5 else None)
     count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
-    leave(made, count, lambda line: None)
+    shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())
     made.close()
     told = [line for line in events if line.startswith("gesture")]

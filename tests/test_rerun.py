@@ -18,7 +18,7 @@ from gazerig.gaze.types import Percept
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import Resimulation, recorded_rig, rerun
-from gazerig.robot.app.session import leave
+from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
@@ -86,7 +86,7 @@ def recorded(
     robot.start(made.clock)
     stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(robot, made.clock, lambda: made.loop, stop, watch)
-    leave(made, count, lambda line: None)
+    shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())
     made.close()
     return seen

@@ -10,7 +10,7 @@ from present import present
 
 from gazerig.config.load import load, shipped
 from gazerig.gaze.scanpath.models import MarkovWalk
-from gazerig.gaze.scanpath.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised
+from gazerig.gaze.scanpath.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalise
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
@@ -40,7 +40,7 @@ def test_e35_transitions_follow_the_normalised_matrix() -> None:
     parts = drawn(200_000)
     counts = np.zeros((8, 8))
     np.add.at(counts, (parts[:-1], parts[1:]), 1)
-    wanted = normalised(WALK.matrix)
+    wanted = normalise(WALK.matrix)
     assert np.abs(counts / counts.sum(axis=1, keepdims=True) - wanted).max() < 0.02
     assert counts[wanted == 0.0].sum() == 0
 

@@ -7,7 +7,7 @@ import pytest
 
 from gazerig.config.load import load, shipped
 from gazerig.gaze.scanpath.fit import FitParams, PartFixation, fit_walk
-from gazerig.gaze.scanpath.scanpath import ScanpathParams, Walk, markov_walk, normalised
+from gazerig.gaze.scanpath.scanpath import ScanpathParams, Walk, markov_walk, normalise
 from gazerig.gaze.types import PARTS
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
@@ -35,7 +35,7 @@ def dice() -> np.random.Generator:
 @pytest.mark.parametrize("smoothing", ["none", "laplace", "bootstrap"])
 def test_a_known_walk_is_recovered(smoothing: str) -> None:
     fitted = fit_walk(walked(20_000), FitParams(smoothing=smoothing, resamples=200), dice())
-    wanted = normalised(WALK.matrix)
+    wanted = normalise(WALK.matrix)
     for row, counts, truth in zip(fitted.matrix, fitted.counts, wanted, strict=True):
         n = sum(counts)
         for cell, p in zip(row, truth, strict=True):
@@ -52,7 +52,7 @@ def test_a_known_walk_is_recovered(smoothing: str) -> None:
 
 
 def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
-    wanted, held, cells = normalised(WALK.matrix), 0, 0
+    wanted, held, cells = normalise(WALK.matrix), 0, 0
     dwells_held = 0
     for seed in range(18):
         fitted = fit_walk(walked(600, seed), FitParams(smoothing="none", resamples=200), dice())

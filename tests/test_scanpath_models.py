@@ -15,9 +15,9 @@ from gazerig.gaze.scanpath.scanpath import (
     ScanpathParams,
     Walk,
     markov_walk,
-    normalised,
+    merge_refixations,
+    normalise,
     row_sums_note,
-    without_refixations,
 )
 from gazerig.gaze.types import PARTS, Face, Percept, Target, Vec3
 
@@ -177,7 +177,7 @@ def test_the_start_part_can_be_chosen() -> None:
 
 
 def test_whole_visit_merges_refixations() -> None:
-    merged = without_refixations(WALK.matrix)
+    merged = merge_refixations(WALK.matrix)
     assert np.diag(merged).max() == 0.0
     assert merged.sum(axis=1) == pytest.approx(np.ones(8))
     # Proportions between the other parts stay: from N, M to RE as .1 to .3.
@@ -209,7 +209,7 @@ def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
 
 def test_a_part_that_is_never_left_keeps_its_row() -> None:
     rows = (*WALK.matrix[:7], (0.0,) * 7 + (1.0,))
-    assert without_refixations(rows)[7].tolist() == [0.0] * 7 + [1.0]
+    assert merge_refixations(rows)[7].tolist() == [0.0] * 7 + [1.0]
 
 
 def test_row_sums_are_reported_as_printed() -> None:
@@ -218,5 +218,5 @@ def test_row_sums_are_reported_as_printed() -> None:
         "the walk's rows do not all sum to 1 (DN 0.9, FL 0.8, LE 1.1, M 1.1, N 0.9, UP 0.9); "
         "they are normalised"
     )
-    whole = replace(WALK, matrix=tuple(map(tuple, normalised(WALK.matrix).round(4).tolist())))
+    whole = replace(WALK, matrix=tuple(map(tuple, normalise(WALK.matrix).round(4).tolist())))
     assert row_sums_note(whole) is None

@@ -11,7 +11,7 @@ from gazerig.drivers.types import Clothing
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import covariance
 from gazerig.robot.perception.track import LocalisedDetection, Track
-from gazerig.robot.perception.tracker import Tracker, blended
+from gazerig.robot.perception.tracker import Tracker, blend
 
 CAMERA = (0.0, 0.0, 0.2)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -92,7 +92,7 @@ def test_far_apart_is_somebody_else_and_kinds_never_mix() -> None:
 
 def test_blended_rotations_stay_rotations() -> None:
     turned = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    middle = np.array(blended(IDENTITY, turned, 0.5))
+    middle = np.array(blend(IDENTITY, turned, 0.5))
     assert middle @ middle.T == pytest.approx(np.eye(3), abs=1e-12)
     assert np.degrees(np.arctan2(middle[1, 0], middle[0, 0])) == pytest.approx(45.0)
 

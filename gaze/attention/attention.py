@@ -158,7 +158,7 @@ class Attention:
         worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
         made = compare(bodies, worth, state, t_s)
         self._note_gestures(made)
-        if self._unnoticed(made):
+        if self._shows_nothing_salient(made):
             self._reaction.drop()
             seen = [row for row in range(len(made.bodies)) if made.total[row] > -inf]
             places = [vec(made.bodies.p_world_m[row]) for row in seen]
@@ -183,7 +183,7 @@ class Attention:
             return made.target(present, percept.captured_s)
         return self._target and self._target._replace(plan=made.plan)
 
-    def _unnoticed(self, made: TargetComparison) -> bool:
+    def _shows_nothing_salient(self, made: TargetComparison) -> bool:
         """Return whether there are no bodies, or only things of low salience, for idle gaze."""
         best, most = made.best, made.total[made.best]
         if most == -inf or most >= self._params.least_salience:

@@ -179,12 +179,12 @@ class Aversion:
         if self._face is not None and t_s >= self._until_s and leaves:
             self._turn(target, p_world_head_m, t_s)
         if self._away is not None:
-            return self._beside(target, self._away, t_s)
+            return self._away_target(target, self._away, t_s)
         if self._shifts == 0:
             return target
-        return self._passed(target)
+        return self._with_shifts(target)
 
-    def _passed(self, target: Target) -> Target:
+    def _with_shifts(self, target: Target) -> Target:
         """Return a target with the shifts of aversions added, made once for many ticks."""
         last, shift = self._last, target.shift + self._shifts
         if last is None or last[0] is not target or last[1].shift != shift:
@@ -214,7 +214,7 @@ class Aversion:
             self._away = None
             self._shifts += 1
 
-    def _beside(self, target: Target, away: Vec3, t_s: float) -> Target:
+    def _away_target(self, target: Target, away: Vec3, t_s: float) -> Target:
         """Return the target of an aversion."""
         return target._replace(
             p_world_m=away,

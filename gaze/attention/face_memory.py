@@ -65,7 +65,7 @@ class FaceMemory:
             del self._faces[id]
         if lasts_s > 0.0:
             self._record(bodies, captured_s)
-        return self._joined(bodies, seen)
+        return self._join(bodies, seen)
 
     def _record(self, bodies: Bodies, captured_s: float) -> None:
         """Record the faces in view."""
@@ -75,7 +75,7 @@ class FaceMemory:
                 radius_m = float(bodies.radius_m[row])
                 self._faces[bodies.ids[row]] = _Remembered((x, y, z), radius_m, captured_s)
 
-    def _joined(self, bodies: Bodies, seen: frozenset[int]) -> Bodies:
+    def _join(self, bodies: Bodies, seen: frozenset[int]) -> Bodies:
         """Return the bodies and the remembered faces that are not visible."""
         rest = {id: face for id, face in self._faces.items() if id not in seen}
         if not rest:

@@ -68,7 +68,7 @@ class Habituation:
         ids, p_world_m: the bodies in view and their centres, (n, 3)
         attended_id: what has been looked at since the step before; -1 for nothing
         """
-        self._go_on(attended_id, t_s)
+        self._advance(attended_id, t_s)
         habituation = np.ones(len(ids))
         for id, left in self._habituation.items():
             if id in ids:
@@ -81,7 +81,7 @@ class Habituation:
         self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float
     ) -> list[float]:
         """Return the result of ``step`` for few bodies."""
-        self._go_on(attended_id, t_s)
+        self._advance(attended_id, t_s)
         if not self._left:
             return [self._habituation.get(id, 1.0) for id in rows.ids]
         return [
@@ -109,7 +109,7 @@ class Habituation:
         leads = self._shared.step(ids, weights, attended_id, t_s)
         return [floor + (1.0 - floor) * exp(-rate * lead) for lead in leads]
 
-    def _go_on(self, attended_id: int, t_s: float) -> None:
+    def _advance(self, attended_id: int, t_s: float) -> None:
         """Update all factors and the points left to the present time."""
         self._habituate(attended_id, max(0.0, t_s - self._at_s))
         self._at_s = t_s

@@ -187,12 +187,12 @@ class Idle:
             self._now, self._until_s = self._resting(t_s), float("inf")
         elif self._gone is not None and t_s < self._search_until_s:
             self._search(self._gone, t_s, self._rng)
-        elif self._now.kind == "rest" or self._once_more(self._rng):
+        elif self._now.kind == "rest" or self._repeats_glance(self._rng):
             self._glance(t_s, self._rng)
         else:
             self._rest_now(t_s)
 
-    def _once_more(self, rng: np.random.Generator) -> bool:
+    def _repeats_glance(self, rng: np.random.Generator) -> bool:
         """Return whether another glance follows a glance immediately."""
         return self._now.kind == "glance" and rng.random() < self._params.again_share
 
@@ -208,7 +208,7 @@ class Idle:
         """Start a search fixation: first in the direction of the loss, then around."""
         par, first = self._params, self._now.kind != "search"
         rel = sub(gone.p_world_m, self._eye)
-        out = self._way_out(rel, gone.v_world_m_s)
+        out = self._heading(rel, gone.v_world_m_s)
         share = 1.0 if first else float(rng.uniform(-0.2, 1.2))
         # Heads keep about one height: the search for people goes sideways.
         spread = 0.0 if first and out != (0.0, 0.0) else radians(par.search_spread_deg)
@@ -224,7 +224,7 @@ class Idle:
         until_s = t_s + self._time_s(par.search_fixation_ms, rng)
         self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
 
-    def _way_out(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
+    def _heading(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
         """Return the yaw and pitch from the loss towards its heading; 0 for a target at rest."""
         soon = yaw_pitch(add(rel, scale(v_world_m_s, 0.05)))
         now = yaw_pitch(rel)

@@ -263,7 +263,7 @@ class TopDown:
         seen: (n,) which bodies are in view
         """
         rule = self._params.rules[self.behaviour]
-        if self.plans and (planned := self._planned(rule, bodies.ids, seen.tolist())):
+        if self.plans and (planned := self._plan_target(rule, bodies.ids, seen.tolist())):
             return planned
         rows = self._rows(bodies, rule)
         rows = rows[seen[rows]]
@@ -274,7 +274,9 @@ class TopDown:
         if len(rows) == 0 and rule.point_world_m is None:
             return None
         near = self._nearness(bodies, rows, p_world_eye_m)
-        return RuleTarget(rows, near, self._stay, rule.point_world_m, rule.salience, self.behaviour)
+        return RuleTarget(
+            rows, near, self._stay_factor, rule.point_world_m, rule.salience, self.behaviour
+        )
 
     def step_rows(
         self,
@@ -284,11 +286,11 @@ class TopDown:
     ) -> RuleTarget | None:
         """Return the result of ``step`` for few bodies."""
         rule = self._params.rules[self.behaviour]
-        if self.plans and (planned := self._planned(rule, bodies.ids, seen)):
+        if self.plans and (planned := self._plan_target(rule, bodies.ids, seen)):
             return planned
         if rule.point_world_m is not None:
             point = rule.point_world_m
-            return RuleTarget([], [], self._stay, point, rule.salience, self.behaviour)
+            return RuleTarget([], [], self._stay_factor, point, rule.salience, self.behaviour)
         named: Sequence[object] = bodies.kinds if rule.body_id is None else bodies.ids
         wanted = rule.kind if rule.body_id is None else rule.body_id
         rows = [i for i, one in enumerate(named) if one == wanted and seen[i]]
@@ -301,24 +303,26 @@ class TopDown:
             away = [max(dist(bodies.p_world_m[i], p_world_eye_m), 1e-3) for i in rows]
             nearest, power = min(away), self._params.nearness
             near = [(nearest / one) ** power for one in away]
-        return RuleTarget(rows, near, self._stay, None, rule.salience, self.behaviour)
+        return RuleTarget(rows, near, self._stay_factor, None, rule.salience, self.behaviour)
 
-    def _planned(self, rule: Rule, ids: Sequence[int], seen: list[bool]) -> RuleTarget | None:
+    def _plan_target(self, rule: Rule, ids: Sequence[int], seen: list[bool]) -> RuleTarget | None:
         """Return the plan's target, if the rule leaves it to the planner."""
         plan = self._planner.plan
         if rule.look_at == GUARD_TARGET and plan.body_id in ids:
             row = ids.index(plan.body_id)
             if seen[row]:
-                return RuleTarget([row], [1.0], self._stay, None, rule.salience, self.behaviour)
+                return RuleTarget(
+                    [row], [1.0], self._stay_factor, None, rule.salience, self.behaviour
+                )
         if rule.look_at == ATTACK_TARGET and plan.p_world_m is not None:
             return RuleTarget(
-                [], [], self._stay, plan.p_world_m, rule.salience, self.behaviour, ATTACK_TARGET,
+                [], [], self._stay_factor, plan.p_world_m, rule.salience, self.behaviour, ATTACK_TARGET,
                 plan.v_world_m_s,
             )  # fmt: skip
         return None
 
     @property
-    def _stay(self) -> float:
+    def _stay_factor(self) -> float:
         """Return the factor by which the present person is preferred, as if nearer."""
         return float(self._params.stay_with_person**self._params.nearness)
 

@@ -173,13 +173,13 @@ def keys_of(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[
         count: number of repetitions.
     """
     tracks: dict[str, list[tuple[float, float]]] = {}
-    for time_s, values in _repeated(frames, gesture.loop_s, count):
+    for time_s, values in _repeat(frames, gesture.loop_s, count):
         for name, value in values.items():
             tracks.setdefault(name, []).append((time_s, value))
-    return {name: _ended(name, keys, gesture.return_s) for name, keys in tracks.items()}
+    return {name: _end(name, keys, gesture.return_s) for name, keys in tracks.items()}
 
 
-def _repeated(
+def _repeat(
     frames: tuple[KeyFrame, ...], loop_s: tuple[float, float] | None, count: int
 ) -> list[tuple[float, dict[str, float]]]:
     """Return the times and the values of all frames, with those of the loop repeated."""
@@ -193,7 +193,7 @@ def _repeated(
     return [*before, *rounds, *((later_s + t_s, values) for t_s, values in keys if t_s > end_s)]
 
 
-def _ended(name: str, keys: list[tuple[float, float]], return_s: float) -> TrackKeys:
+def _end(name: str, keys: list[tuple[float, float]], return_s: float) -> TrackKeys:
     rest = rest_of(name)
     if keys[-1][1] != rest:
         keys = [*keys, (keys[-1][0] + return_s, rest)]

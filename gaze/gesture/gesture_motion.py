@@ -65,9 +65,9 @@ class GestureMotion:
         ]
         self._keys_s = [np.array(keys.times_s) for keys in tracks.values()]
         self.duration_s = max(curve.duration_s for _, curve in self._curves)
-        self.samples = self._sampled()
+        self.samples = self._sample()
 
-    def _sampled(self) -> MotionSamples:
+    def _sample(self) -> MotionSamples:
         count = min(_MOST_SAMPLES, int(self.duration_s / _SAMPLE_S) + 2)
         even = np.linspace(0.0, self.duration_s, count)
         # The extremes are keys, which evenly spaced samples may miss.

@@ -92,11 +92,13 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
         if len(run):
             # From the stop before the passed keys to the stop after them.
             keys = slice(run[0] - 1, run[-1] + 2)
-            speed[run], acceleration[run] = _passing(position[keys], span[run[0] - 1 : run[-1] + 1])
+            speed[run], acceleration[run] = _states_between(
+                position[keys], span[run[0] - 1 : run[-1] + 1]
+            )
     return speed, acceleration
 
 
-def _passing(position: Floats, span: Floats) -> tuple[Floats, Floats]:
+def _states_between(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     """Return speed and acceleration at the keys between two stops.
 
     Those of least jerk, unless the curve would swing back in between: then the slower of the mean
@@ -143,11 +145,11 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
                 gap = moved + offset
                 gap = gap[(gap >= 0) & (gap < count)]
                 block[gap, :, of] = jumps[:, gap].T
-    gaps(_solved(before, own, behind, -at_zero.reshape(2, count).T[..., None]).T.ravel())
+    gaps(_solve(before, own, behind, -at_zero.reshape(2, count).T[..., None]).T.ravel())
     return speed, acceleration
 
 
-def _solved(before: Floats, own: Floats, behind: Floats, right: Floats) -> Floats:
+def _solve(before: Floats, own: Floats, behind: Floats, right: Floats) -> Floats:
     """Return the solution (n, 2) of a block tridiagonal system by cyclic reduction.
 
     The system is that of a minimum and so positive definite: no pivot is needed.
@@ -164,13 +166,13 @@ def _solved(before: Floats, own: Floats, behind: Floats, right: Floats) -> Float
         zero, one = np.zeros((1, 2, 2)), np.eye(2)[None]
         before, behind = np.concatenate((before, zero)), np.concatenate((behind, zero))
         own, right = np.concatenate((own, one)), np.concatenate((right, np.zeros((1, 2, 1))))
-        return _solved(before, own, behind, right)[:-1]
+        return _solve(before, own, behind, right)[:-1]
     kept, gone = slice(1, None, 2), slice(0, None, 2)
     there = np.concatenate((before[gone], behind[gone], right[gone]), axis=2)
     reduced = np.linalg.solve(own[gone], there)
     by_before, by_behind, by_right = reduced[..., :2], reduced[..., 2:4], reduced[..., 4:]
     a, c = before[kept], behind[kept]
-    inner = _solved(
+    inner = _solve(
         -a @ by_before[:-1],
         own[kept] - a @ by_behind[:-1] - c @ by_before[1:],
         -c @ by_behind[1:],

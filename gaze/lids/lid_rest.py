@@ -21,17 +21,17 @@ _NOTHING: LidPair = (0.0, 0.0)
 def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> LidPair:
     """Return the openings for a vertical gaze, + is up, and a sleepiness of 0..1."""
     share = params.follow_up_share if eye_pitch_deg > 0.0 else 1.0
-    upper = _bounded(params.rest_opening + params.follow_per_deg * share * eye_pitch_deg)
-    lower = _bounded(params.lower_rest_opening - params.lower_follow_per_deg * eye_pitch_deg)
+    upper = _clip(params.rest_opening + params.follow_per_deg * share * eye_pitch_deg)
+    lower = _clip(params.lower_rest_opening - params.lower_follow_per_deg * eye_pitch_deg)
     if sleepiness == 0.0:
         return upper, lower
     return (
-        _bounded(upper * (1.0 - params.sleepy_droop * sleepiness)),
-        _bounded(lower * (1.0 - params.lower_sleepy_rise * sleepiness)),
+        _clip(upper * (1.0 - params.sleepy_droop * sleepiness)),
+        _clip(lower * (1.0 - params.lower_sleepy_rise * sleepiness)),
     )
 
 
-def _bounded(opening: float) -> float:
+def _clip(opening: float) -> float:
     """Return an opening clipped to 0..1."""
     return opening if 0.0 < opening < 1.0 else 1.0 if opening >= 1.0 else 0.0
 
@@ -84,13 +84,13 @@ class LidsAtRest:
         """Return the openings for a vertical gaze."""
         self._pitch_deg = eye_pitch_deg
         wanted = openings(self._params, eye_pitch_deg, self.sleepiness(t_s))
-        self._shown = wanted if self._left == _NOTHING else self._glided(wanted, t_s)
+        self._shown = wanted if self._left == _NOTHING else self._glide(wanted, t_s)
         return self._shown
 
-    def _glided(self, wanted: LidPair, t_s: float) -> LidPair:
+    def _glide(self, wanted: LidPair, t_s: float) -> LidPair:
         """Return openings with the difference that a retune left, which decays in 0.3 s."""
         kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
         upper, lower = self._left
         if kept == 0.0:
             self._left = _NOTHING
-        return _bounded(wanted[0] + kept * upper), _bounded(wanted[1] + kept * lower)
+        return _clip(wanted[0] + kept * upper), _clip(wanted[1] + kept * lower)

@@ -179,9 +179,9 @@ class Lids:
             return tuple.__new__(LidOpenings, (upper, upper, False, lower, lower))
         if self._due(t_s, shift_rad):
             self._begin_blink(t_s)
-        blink = _shut(self._blink, t_s)
+        blink = _closures(self._blink, t_s)
         (left, lower_left), (right, lower_right) = (
-            _more(blink, _shut(wink, t_s)) for wink in self._winks.values()
+            _more(blink, _closures(wink, t_s)) for wink in self._winks.values()
         )
         # Closings come out at 1 and a rounding error just before they are done.
         return LidOpenings(
@@ -275,7 +275,7 @@ class Lids:
         return blink_pause_s(self._params, self._per_min(), length_s, self._rng)
 
 
-def _shut(closing: LidClosure | None, t_s: float) -> LidPair:
+def _closures(closing: LidClosure | None, t_s: float) -> LidPair:
     """Return the closure of the upper and the lower lid by a blink or wink, 0..1."""
     shut = 0.0 if closing is None else closing.at(t_s)
     if closing is None or shut == 0.0:

@@ -199,7 +199,7 @@ class BinocularController:
         target: eye angles that fixate the target as seen, from the present pose of the head
         """
         self.version, self.started = version_of(eyes), True
-        self._turned(R_world_head, t_s)
+        self._rotations(R_world_head, t_s)
         if target is not None:
             self._shift(rotate(R_world_head, version_of(target).ahead))
             self._demand(version_of(target).vergence_rad, t_s)
@@ -214,7 +214,7 @@ class BinocularController:
         closing: whether the error of direction is closed; False leaves it to a saccade
         """
         par, (ahead, vergence) = self._params, self.version
-        turned = self._turned(R_world_head, t_s)
+        turned = self._rotations(R_world_head, t_s)
         if turned is not None:
             held = rotate_back(turned[1], rotate(turned[0], ahead))
             ahead = unit(add(ahead, scale(sub(held, ahead), par.reflex_gain)))
@@ -222,13 +222,13 @@ class BinocularController:
         if target is None:
             self._known = False
             self._velocity = scale(self._velocity, exp(-dt_s / self._fade_s))
-            rate = scale(_clipped(self._velocity, self._max_rad_s), par.velocity_gain)
+            rate = scale(_clip(self._velocity, self._max_rad_s), par.velocity_gain)
         else:
             seen, demand_rad = version_of(target)
             self._follow(rotate(R_world_head, seen), dt_s)
-            rate = scale(_clipped(self._velocity, self._max_rad_s), par.velocity_gain)
+            rate = scale(_clip(self._velocity, self._max_rad_s), par.velocity_gain)
             if closing:
-                error = _clipped(sub(self._smoothed, gaze), self._max_error_rad)
+                error = _clip(sub(self._smoothed, gaze), self._max_error_rad)
                 rate = add(rate, scale(error, par.gain_1_s))
             past_rad = self._demand(demand_rad, t_s)
             if past_rad is not None:
@@ -253,7 +253,7 @@ class BinocularController:
         vergence = self.version.vergence_rad
         return min(half_m / tan(0.5 * vergence), _FARTHEST_M) if vergence > 0.0 else _FARTHEST_M
 
-    def _turned(self, R_world_head: Mat3, t_s: float) -> tuple[Mat3, Mat3] | None:
+    def _rotations(self, R_world_head: Mat3, t_s: float) -> tuple[Mat3, Mat3] | None:
         """Return the head's rotations between which the reflex acts in this period."""
         heads = self._heads
         before = heads[0][1] if heads else None
@@ -290,7 +290,7 @@ class BinocularController:
         self._smoothed = smoothed
 
 
-def _clipped(v: Vec3, most: float) -> Vec3:
+def _clip(v: Vec3, most: float) -> Vec3:
     """Return a vector no longer than ``most``."""
     size = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     return v if size <= most else scale(v, most / size)
@@ -338,13 +338,13 @@ class OppositeAngles:
             return wanted, gaze
         left, right = self._eyes or ((0.0, 0.0), (0.0, 0.0))
         if self._eyes is not None:
-            left, right = negated(left, before, head), negated(right, before, head)
+            left, right = oppose(left, before, head), oppose(right, before, head)
         self._eyes = left, right
         ahead = rotate(R, version_of(self._eyes).ahead)
         return self._eyes, add(view.p_head, scale(ahead, norm(sub(target.p_world_m, view.p_head))))
 
 
-def negated(eye_rad: Angles2, head_before_rad: Angles2, head_rad: Angles2) -> Angles2:
+def oppose(eye_rad: Angles2, head_before_rad: Angles2, head_rad: Angles2) -> Angles2:
     """Return the eye angles of the rule (-x, -y), literally."""
     return (
         eye_rad[0] - (head_rad[0] - head_before_rad[0]),

@@ -162,7 +162,7 @@ class GazePoint:
         shift_rad = None
         trigger, trajectory = self._trigger, self._trajectory
         if self._refixations.offset_rad != _MIDDLE:
-            point = _beside(point, p_head, self._refixations.offset_rad)
+            point = _offset_point(point, p_head, self._refixations.offset_rad)
         if trajectory is None:
             gaze, there = sight(self.point_m, p_head), sight(point, p_head)
             x, y, z = there[0] - gaze[0], there[1] - gaze[1], there[2] - gaze[2]
@@ -223,7 +223,7 @@ class GazePoint:
         return no_nearer(point, p_head, self._params.nearest_m)
 
 
-def _beside(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
+def _offset_point(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
     """Return a point next to another one at its distance, by angles to the left and up."""
     way = sub(point, eye)
     yaw, pitch = yaw_pitch(way)

@@ -164,7 +164,7 @@ class Oculomotor:
         """
         if not self._started:
             self.reset(t_s, state)
-        R_world_head, p_head = self._foreseen_head(state)
+        R_world_head, p_head = self._predict_head(state)
         point, velocity, centre_point, toward = self._now(target, p_head, t_s)
         self._base_rad = base = state.base_rad
         facing = centre = self._geometry.facing(point, base)
@@ -187,13 +187,16 @@ class Oculomotor:
                 target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
             )
         if offset.eyes_rad != NO_OFFSET.eyes_rad:
-            wanted = _turned(wanted[0], offset.eyes_rad), _turned(wanted[1], offset.eyes_rad)
+            wanted = (
+                _add_offset(wanted[0], offset.eyes_rad),
+                _add_offset(wanted[1], offset.eyes_rad),
+            )
         left, right = eyes = self._in_range(wanted)
         limited = () if eyes == wanted else self._limited(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
         if offset.lids != NO_OFFSET.lids:
             lids = lids.scaled(offset.lids)
-        head = self._swayed(head, offset.head_rad, t_s)
+        head = self._add_sway(head, offset.head_rad, t_s)
         phase: Phase = (
             "saccade" if place.jumps
             else "pursue" if norm(velocity) > MOVING_M_S
@@ -278,7 +281,7 @@ class Oculomotor:
                 found.append(Limited(f"head {axis}", facing[i], head[i], _AT_END))
         return tuple(found)
 
-    def _swayed(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
+    def _add_sway(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
         """Return the head's angles with breathing and an offset, clipped to the neck's range."""
         if self._breathing is not None:
             yaw, pitch, roll = self._breathing.step(t_s)
@@ -287,7 +290,7 @@ class Oculomotor:
             return head
         return self._head.in_range((head[0] + offset[0], head[1] + offset[1], head[2] + offset[2]))
 
-    def _foreseen_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
+    def _predict_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Return the head's pose at the time when a present eye command takes effect."""
         lag = self._lag_s
         (yaw, pitch, roll), (yaw_rate, pitch_rate, roll_rate) = state[:2]
@@ -321,7 +324,7 @@ def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:
     return (min(max(eye[0], yaw_low), yaw_high), min(max(eye[1], pitch_low), pitch_high))
 
 
-def _turned(eye: Angles2, offset: Angles2) -> Angles2:
+def _add_offset(eye: Angles2, offset: Angles2) -> Angles2:
     """Return an eye's angles with an offset."""
     return eye[0] + offset[0], eye[1] + offset[1]
 

@@ -105,7 +105,7 @@ class Pursuit:
         """Return error and retinal slip; all points in the world, metres."""
         (x, y, z, _), (to_x, to_y, to_z, near) = sight(gaze, eye), sight(target, eye)
         across = _across((to_x, to_y, to_z), scale(v_target, near))
-        return Slip((to_x - x, to_y - y, to_z - z), sub(across, self._taken(across)))
+        return Slip((to_x - x, to_y - y, to_z - z), sub(across, self._adopted_speed(across)))
 
     def step(
         self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3, dt_s: float, closing: bool = True
@@ -145,7 +145,7 @@ class Pursuit:
             (target[0] - vx * dt_s, target[1] - vy * dt_s, target[2] - vz * dt_s), eye
         )
         rate = 1.0 / dt_s
-        move_x, move_y, move_z = self._taken(
+        move_x, move_y, move_z = self._adopted_speed(
             ((to_x - was_x) * rate, (to_y - was_y) * rate, (to_z - was_z) * rate)
         )
         move_x, move_y, move_z = move_x * dt_s, move_y * dt_s, move_z * dt_s
@@ -176,7 +176,7 @@ class Pursuit:
             eye[2] + z / length * distance,
         )
 
-    def _taken(self, speed_rad_s: Vec3) -> Vec3:
+    def _adopted_speed(self, speed_rad_s: Vec3) -> Vec3:
         """Return the angular velocity that is adopted from a target's."""
         x, y, z = speed_rad_s
         size, gain = sqrt(x * x + y * y + z * z), self._params.velocity_gain

@@ -145,7 +145,7 @@ class TargetPrediction:
         while past[0][0] < at_s - _WINDOWS_S[-1]:
             past.popleft()
         self._bend = self._slope()
-        self.sine = sine = self._recognised(p, at_s)
+        self.sine = sine = self._recognise(p, at_s)
         if sine is not None:
             most_m_s = fastest_rad_s * norm(sub(sine.middle, eye))
             self._share = min(1.0, most_m_s / (sine.w_rad_s * sine.size_m))
@@ -160,17 +160,17 @@ class TargetPrediction:
             return _STILL, self._v
         age_s, known_s = max(0.0, t_s - self._at_s), self._horizon_s
         if age_s <= known_s:
-            return self._moved(age_s), self._speed(age_s)
+            return self._displacement_at(age_s), self._speed(age_s)
         left, speed = exp(-(age_s - known_s) / self._fade_s), self._speed(known_s)
         beyond = scale(speed, self._fade_s * (1.0 - left))
-        return add(self._moved(known_s), beyond), scale(speed, left)
+        return add(self._displacement_at(known_s), beyond), scale(speed, left)
 
     @property
     def to_middle(self) -> Vec3 | None:
         """Return the vector from the target's position in its frame to the middle of its swing."""
         return None if self.sine is None else scale(self.sine.offset(self._at_s), -1.0)
 
-    def _moved(self, age_s: float) -> Vec3:
+    def _displacement_at(self, age_s: float) -> Vec3:
         """Return the displacement an age after the frame."""
         sine = self.sine
         if sine is not None:
@@ -181,7 +181,7 @@ class TargetPrediction:
         more = bent * (age_s - 0.5 * bent)
         (x, y, z), (a, b, c) = self._v, self._bend
         moved = x * age_s + a * more, y * age_s + b * more, z * age_s + c * more
-        return _no_longer(moved, self._fastest_m_s * age_s)
+        return _shorten(moved, self._fastest_m_s * age_s)
 
     def _speed(self, age_s: float) -> Vec3:
         """Return the velocity an age after the frame."""
@@ -192,7 +192,7 @@ class TargetPrediction:
         (x, y, z), (a, b, c) = self._v, self._bend
         speed = x + a * bent, y + b * bent, z + c * bent
         # An extrapolated change of speed does not exceed the present speed, or that of the eyes.
-        return _no_longer(speed, self._most_m_s)
+        return _shorten(speed, self._most_m_s)
 
     def _slope(self) -> Vec3:
         """Return the rate at which the velocity has changed over the last frames."""
@@ -208,7 +208,7 @@ class TargetPrediction:
             x, y, z = x + w * vx, y + w * vy, z + w * vz
         return x / total, y / total, z / total
 
-    def _recognised(self, p: Vec3, at_s: float) -> Sine | None:
+    def _recognise(self, p: Vec3, at_s: float) -> Sine | None:
         """Return the swing of the recent past, None without one."""
         sine = self.sine
         if sine is None:
@@ -228,7 +228,7 @@ class TargetPrediction:
             return sine
         since_s = at_s - window_s
         past = np.array([seen for seen in self._past if seen[0] > since_s])
-        return fitted(past, at_s, _FITS if sine is None else _STILL_FITS)
+        return fit_sine(past, at_s, _FITS if sine is None else _STILL_FITS)
 
     def _has_moved(self, least_m: float) -> bool:
         """Return whether the target's positions span this length along any axis."""
@@ -240,14 +240,14 @@ class TargetPrediction:
         return False
 
 
-def _no_longer(v: Vec3, most: float) -> Vec3:
+def _shorten(v: Vec3, most: float) -> Vec3:
     """Return a vector, shortened if it is longer than a limit."""
     x, y, z = v
     squares = x * x + y * y + z * z
     return v if squares <= most * most else scale(v, most / sqrt(squares))
 
 
-def fitted(past: Floats, at_s: float, limit: float) -> Sine | None:
+def fit_sine(past: Floats, at_s: float, limit: float) -> Sine | None:
     """Return the sine of a window of the past, None if it does not fit.
 
     The frequency comes from the velocity, which changes by -w^2 times the time integral of the

@@ -55,7 +55,7 @@ def rests_s(share: Floats, visit_s: Floats, shift_s: float, shortest_s: float) -
     return rests
 
 
-def shifted(law: str, mean_s: float, sd_s: float, shortest_s: float) -> Draw:
+def shift_dwell(law: str, mean_s: float, sd_s: float, shortest_s: float) -> Draw:
     """Return a dwell law that begins at a shortest time instead of at 0 and keeps the mean.
 
     A mean that leaves nothing above the shortest time is raised by a little.

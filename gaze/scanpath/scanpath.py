@@ -22,7 +22,7 @@ from gazerig.gaze.scanpath.models import (
     ScanpathStep,
     SimpleCycle,
 )
-from gazerig.gaze.scanpath.rest import rests_s, shifted, stationary, visits_s
+from gazerig.gaze.scanpath.rest import rests_s, shift_dwell, stationary, visits_s
 from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
 from gazerig.params import Bounds, Choices
 
@@ -116,24 +116,24 @@ class ScanpathParams:
             )
 
 
-def normalised(matrix: ArrayLike) -> Floats:
+def normalise(matrix: ArrayLike) -> Floats:
     """Return an (n, n) matrix with every row summing to 1."""
     rows = np.asarray(matrix, dtype=float)
     out: Floats = rows / rows.sum(axis=1, keepdims=True)
     return out
 
 
-def without_refixations(matrix: ArrayLike) -> Floats:
+def merge_refixations(matrix: ArrayLike) -> Floats:
     """Return the chain of visits: the same walk with its self-transitions merged.
 
     matrix: (n, n); a part that is never left for another keeps its row
     """
     rows = np.asarray(matrix, dtype=float)
     away = rows * (1.0 - np.eye(len(rows)))
-    return normalised(np.where(away.sum(axis=1, keepdims=True) > 0.0, away, rows))
+    return normalise(np.where(away.sum(axis=1, keepdims=True) > 0.0, away, rows))
 
 
-class _Replaced(NamedTuple):
+class _Replacement(NamedTuple):
     """A replaced target, and the values that it was made of."""
 
     target: Target
@@ -173,8 +173,8 @@ class Scanpath:
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
         self._rng = rng
-        self.looks = _looks(params, walk, rng)
-        self._last: _Replaced | None = None
+        self.looks = _model(params, walk, rng)
+        self._last: _Replacement | None = None
         self.reset(0.0)
 
     def retune(self, params: ScanpathParams, walk: Walk) -> None:
@@ -182,7 +182,7 @@ class Scanpath:
 
         A model that does not know that part begins with its own first look.
         """
-        before, self.looks = self.looks, _looks(params, walk, self._rng)
+        before, self.looks = self.looks, _model(params, walk, self._rng)
         self._last = None
         if not self.looks.go_on(before):
             self._shift += 1
@@ -227,7 +227,7 @@ class Scanpath:
         if last is not None and last.of(target, face, point, self._shift):
             return last.result
         result = _replaced(target, face, look, self._shift)
-        self._last = _Replaced(target, face, point, self._shift, result)
+        self._last = _Replacement(target, face, point, self._shift, result)
         return result
 
     @property
@@ -273,7 +273,7 @@ def _nearest(face: Face, p_world_head_m: Vec3, gaze_world_m: Vec3 | None) -> str
     return PARTS[away.index(min(away))]
 
 
-def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:
+def _model(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:
     """Return the model that the parameters name."""
     match params.model:
         case "simple":
@@ -302,18 +302,18 @@ def steps_and_dwells(params: ScanpathParams, walk: Walk) -> tuple[Floats, list[D
 
     Parts are in the walk's order; the matrix is normalised, rows from.
     """
-    steps = normalised(walk.matrix)
+    steps = normalise(walk.matrix)
     if params.diagonal != "refixation":
-        steps = without_refixations(walk.matrix)
+        steps = merge_refixations(walk.matrix)
     law, floor_s = params.dwell_distribution, params.min_dwell_ms / 1e3
     mean_s = np.array(walk.dwell_mean_s) / params.rate_scale
     sd_s = np.array(walk.dwell_sd_s) / params.rate_scale
     if params.diagonal == "one_rest":
-        visit_s = visits_s(normalised(walk.matrix), mean_s)
+        visit_s = visits_s(normalise(walk.matrix), mean_s)
         mean_s = rests_s(stationary(steps), visit_s, params.shift_ms / 1e3, floor_s)
         sd_s = params.rest_spread * (mean_s - floor_s)
     pairs = zip(mean_s.tolist(), sd_s.tolist(), strict=True)
-    return steps, [shifted(law, mean, sd, floor_s) for mean, sd in pairs]
+    return steps, [shift_dwell(law, mean, sd, floor_s) for mean, sd in pairs]
 
 
 def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:

@@ -18,16 +18,16 @@ from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.robot.app.camera_factory import (
-    lendable,
+    make_lendable,
     placed_camera,
     run_camera,
     sight_of,
 )
 from gazerig.robot.app.gaze_models import (
+    attention_models,
     chooser_of,
-    deciders,
     kinematics_of,
-    movers,
+    motion_models,
     oculomotor,
 )
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
@@ -195,7 +195,7 @@ def assemble(
                 rig, options, scene, sight, wires, random.camera, camera, clock, program,
             )  # fmt: skip
         if options.mock and not options.fast:
-            seen = lendable(
+            seen = make_lendable(
                 seen, rig, clock, lambda: sight.mount.retune(placement.camera(live.rig))
             )
         parts = _components(
@@ -256,8 +256,8 @@ def _components(
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
     tracker = Tracker(rig.tracks)
-    moves = movers(rig)
-    decides = deciders(rig, random.idle)
+    moves = motion_models(rig)
+    decides = attention_models(rig, random.idle)
     animation = Animation(further(rig.joints), animation_tables(rig))
     return Components(
         body=body,

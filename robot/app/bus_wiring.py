@@ -62,7 +62,7 @@ def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
 
     ports: by the name of the bus
     """
-    return _joined([_share(rig, name, ports[name]) for name in bus_names(rig)])
+    return _join([_share(rig, name, ports[name]) for name in bus_names(rig)])
 
 
 def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
@@ -87,7 +87,7 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
             bus = GuardedBus(share.bus, len(share.places), guardian, guarded.index(name))
             share = share._replace(bus=bus)
         shares.append(share)
-    return _joined(shares)
+    return _join(shares)
 
 
 def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
@@ -149,7 +149,7 @@ def has_watchdog(rig: Rig, name: str) -> bool:
     return not can_be_released(rig, name)
 
 
-def _joined(shares: list[BusShare]) -> ServoBus:
+def _join(shares: list[BusShare]) -> ServoBus:
     """Return several buses as one; a single one is returned unchanged."""
     return shares[0].bus if len(shares) == 1 else MultiBus(shares)
 

@@ -54,7 +54,7 @@ from gazerig.robot.model.frames import (
 )
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK, Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
-from gazerig.robot.perception.motion_source import motion_finder, retuned
+from gazerig.robot.perception.motion_source import motion_finder, retune_finder
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -165,11 +165,11 @@ def scene_camera(
         motion = partial(motion_finder, rig.motion, rig.camera.lens, radians(field_deg), turns)
         return drawn_camera(rig, scene, mount, where, rng, clock, own, motion, locate)
     # Imported here: drawing and detection, with OpenCV.
-    from gazerig.robot.app.drawn_motion import MotionOfDrawn
+    from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
-    faces, moves = own.find_faces(rig.detector), MotionOfDrawn(rig.motion)
+    faces, moves = own.find_faces(rig.detector), SyntheticMotionDetector(rig.motion)
     return PixelCamera(drawn, scene, mount, where, faces, rng, moves, locate)
 
 
@@ -201,7 +201,9 @@ def drawn_camera(
     make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
     source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
     if own.detector is not None:
-        return DrawnCamera(watched(rig, own, source(), clock, motion, locate), poses, where)
+        return DrawnCamera(
+            supervise_source(rig, own, source(), clock, motion, locate), poses, where
+        )
     parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
     return DrawnCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), poses, where)
 
@@ -231,7 +233,7 @@ def placed_camera(
     return fixed_mount(rig.camera, kinematics), (note,)
 
 
-def lendable(own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]) -> BorrowedCamera:
+def make_lendable(own: Camera, rig: Rig, clock: Clock, place: Callable[[], None]) -> BorrowedCamera:
     """Return an emulated rig's camera, which a browser's may replace."""
     field_rad = radians(FIELD_DEG)
     detector = partial(face_detector, rig.detector)
@@ -276,7 +278,7 @@ def real_camera(
         return FilmCamera(film, faces, delay_s, motion=motion(), locate=locate, orientation=turned)
     name = options.camera if isinstance(options.camera, str) else None
     if own.detector is not None and (name is None or is_ours(CAMERA, name)):
-        return watched(rig, own, _source(rig, options)(), clock, motion, locate)
+        return supervise_source(rig, own, _source(rig, options)(), clock, motion, locate)
     if name is None or is_ours(CAMERA, name):
         parts = CameraParts(_source(rig, options), detector, motion, locate)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery)
@@ -312,10 +314,10 @@ def program_camera(
         raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
     source = CheckedSource(cast(FrameSource, camera), label)
     turned = UprightSource(source, orientation_of(rig.camera))
-    return GuardedCamera(watched(rig, parts, turned, clock, motion, locate), label)
+    return GuardedCamera(supervise_source(rig, parts, turned, clock, motion, locate), label)
 
 
-def watched(
+def supervise_source(
     rig: Rig,
     parts: ProgramParts,
     source: FrameSource,
@@ -379,15 +381,15 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
             case RoomCamera():
                 return retune_camera(camera.seeing, before, after, placed) if camera.seeing else ""
             case CameraProcess():
-                motion = partial(retuned, after.motion, placed.lens, field_rad)
+                motion = partial(retune_finder, after.motion, placed.lens, field_rad)
                 done = camera.retune(detector, motion if moves else None, locate)
             case CameraThread():  # it uses the program's own detector
-                motion = partial(retuned, after.motion, placed.lens, field_rad)
+                motion = partial(retune_finder, after.motion, placed.lens, field_rad)
                 done = camera.retune(None, motion if moves else None, locate)
             case SceneCamera():  # it computes ideal detections
                 done = locate is None or camera.retune(locate)
             case _:
-                motion = partial(retuned, after.motion, placed.lens, field_rad)
+                motion = partial(retune_finder, after.motion, placed.lens, field_rad)
                 done = _retune_detecting(camera, after, detector, motion if moves else None, locate)
     except SetupError as error:
         return f"the detector is unchanged: {error}"
@@ -402,14 +404,14 @@ def _retune_detecting(
     locate: FrameLocator | None,
 ) -> bool:
     """Change a camera that detects faces in simulated time; others have nothing to change."""
-    from gazerig.robot.app.drawn_motion import retuned_drawn
+    from gazerig.robot.app.drawn_motion import retune_synthetic
     from gazerig.sim_mock.cameras.rendered import PixelCamera
     from gazerig.sim_mock.cameras.video import FilmCamera
 
     if isinstance(camera, FilmCamera):
         return camera.retune(detector, motion, locate)
     if isinstance(camera, PixelCamera):
-        drawn = partial(retuned_drawn, after.motion) if motion is not None else None
+        drawn = partial(retune_synthetic, after.motion) if motion is not None else None
         return camera.retune(detector, drawn, locate)
     return True
 
@@ -426,10 +428,10 @@ def _film(options: RunOptions) -> "VideoFile | CameraReplay":
 
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return a factory of the source of upright frames, for the process that will use it."""
-    return upright(_delivered(rig, options), orientation_of(rig.camera))
+    return upright(_raw_source(rig, options), orientation_of(rig.camera))
 
 
-def _delivered(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
+def _raw_source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return a factory of the source of frames as the camera delivers them."""
     if options.replay is not None:
         return partial(sources.recording, options.replay)

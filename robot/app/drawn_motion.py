@@ -12,7 +12,7 @@ from gazerig.gaze.types import Mat3
 from gazerig.sim_mock.cameras.rendered import Exposure
 
 
-class MotionOfDrawn:
+class SyntheticMotionDetector:
     """Motion detector of drawn frames, whose rotation of the camera is known."""
 
     def __init__(self, params: MotionParams) -> None:
@@ -43,8 +43,8 @@ class MotionOfDrawn:
 FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
 
 
-def retuned_drawn(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
+def retune_synthetic(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
     """Change the parameters of the motion detector of drawn frames."""
-    if isinstance(find, MotionOfDrawn):
+    if isinstance(find, SyntheticMotionDetector):
         find.retune(params)
     return find

@@ -30,7 +30,7 @@ def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
     )
     kinematics = kinematics_of(rig)
     lids = Lids(rig.gaze.lids, lid_rng)
-    return kinematics, oculomotor(rig, kinematics, movers(rig), lids, landing_rng)
+    return kinematics, oculomotor(rig, kinematics, motion_models(rig), lids, landing_rng)
 
 
 def kinematics_of(rig: Rig) -> Kinematics:
@@ -38,7 +38,7 @@ def kinematics_of(rig: Rig) -> Kinematics:
     return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
 
 
-class Deciders(NamedTuple):
+class AttentionModels(NamedTuple):
     """Models of attention."""
 
     field_of_view: FieldOfView
@@ -47,10 +47,10 @@ class Deciders(NamedTuple):
     idle: Idle
 
 
-def deciders(rig: Rig, idle_rng: np.random.Generator) -> Deciders:
+def attention_models(rig: Rig, idle_rng: np.random.Generator) -> AttentionModels:
     """Return the models of attention."""
     gaze = rig.gaze
-    return Deciders(
+    return AttentionModels(
         FieldOfView(gaze.field_of_view),
         BottomUp(gaze.bottom_up),
         TopDown(gaze.top_down),
@@ -58,7 +58,7 @@ def deciders(rig: Rig, idle_rng: np.random.Generator) -> Deciders:
     )
 
 
-class Movers(NamedTuple):
+class MotionModels(NamedTuple):
     """Models of eye and head movements."""
 
     saccade: SaccadeModel
@@ -67,10 +67,10 @@ class Movers(NamedTuple):
     breathing: Breathing
 
 
-def movers(rig: Rig) -> Movers:
+def motion_models(rig: Rig) -> MotionModels:
     """Return the models of eye and head movements."""
     gaze = rig.gaze
-    return Movers(
+    return MotionModels(
         SaccadeModel(gaze.saccade),
         Pursuit(gaze.pursuit),
         HeadModel(gaze.head, *head_limits(rig)),
@@ -81,7 +81,7 @@ def movers(rig: Rig) -> Movers:
 def oculomotor(
     rig: Rig,
     kinematics: Kinematics,
-    moves: Movers,
+    moves: MotionModels,
     lids: Lids,
     landing_rng: np.random.Generator,
 ) -> Oculomotor:

@@ -78,12 +78,12 @@ def write_gesture(
     gesture_name(str(path))
     write_file(path, text, force)
     try:
-        return path, checked(rig, load_gesture(path))
+        return path, fit_to_rig(rig, load_gesture(path))
     except GestureRefused as refused:
         raise SetupError(f"{path} is written, but {rig.name} cannot do it: {refused}") from None
 
 
-def checked(rig: Rig, gesture: Gesture) -> FittedGesture:
+def fit_to_rig(rig: Rig, gesture: Gesture) -> FittedGesture:
     """Return a gesture fitted to a rig, from the middle of its ranges.
 
     Raises:

@@ -151,7 +151,7 @@ class LiveParams:
             gazerig.config.load.ConfigError: the walk that the rig names is invalid.
         """
         command = Tune(tuple(differences(base, rig).items()))
-        self._ready[id(command.changes)] = _ready(command, base, rig)
+        self._ready[id(command.changes)] = _prepare(command, base, rig)
         return command
 
     def __call__(self, command: Tune, t_s: float) -> tuple[str, ...]:
@@ -162,7 +162,7 @@ class LiveParams:
         ready = self._ready.pop(id(command.changes), None)
         if ready is None or ready.changes is not command.changes or ready.base is not self.rig:
             try:
-                ready = _ready(command, self.rig, changed(self.rig, dict(command.changes)))
+                ready = _prepare(command, self.rig, changed(self.rig, dict(command.changes)))
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         said = self._put(ready.rig, ready.walk or self._walk)
@@ -219,7 +219,7 @@ class LiveParams:
         """
         if (new.joints, new.guard) == (old.joints, old.guard):
             return ()
-        parts, joints, before = self.parts, self._lasting(new), self._lasting(old)
+        parts, joints, before = self.parts, self._keep_servos(new), self._keep_servos(old)
         gentle_deg_s = new.guard.soft_start_speed_deg_s
         others = (joints, gentle_deg_s) != (before, old.guard.soft_start_speed_deg_s)
         if others:
@@ -229,9 +229,9 @@ class LiveParams:
             parts.guard.retune(new.guard, limits(joints))
         if not others:
             return ()
-        return _beyond(parts.body.names, limits(joints), parts.body.reach())
+        return _exceeding_joints(parts.body.names, limits(joints), parts.body.reach())
 
-    def _lasting(self, rig: Rig) -> dict[str, JointParams]:
+    def _keep_servos(self, rig: Rig) -> dict[str, JointParams]:
         """Return the joints with the servos that the bus was opened with."""
         return {
             name: _with_servo(rig.joints[name], first, name in self._coupled)
@@ -256,7 +256,7 @@ def _with_servo(joint: JointParams, first: JointParams, coupled: bool) -> JointP
     return replace(joint, **kept)
 
 
-def _ready(command: Tune, base: Rig, rig: Rig) -> _Ready:
+def _prepare(command: Tune, base: Rig, rig: Rig) -> _Ready:
     """Build a checked change, with a new face walk if that has changed.
 
     Raises:
@@ -267,7 +267,7 @@ def _ready(command: Tune, base: Rig, rig: Rig) -> _Ready:
     return _Ready(command.changes, base, rig, walk)
 
 
-def _beyond(
+def _exceeding_joints(
     joints: tuple[str, ...], wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]
 ) -> tuple[str, ...]:
     """Return the joints whose limits exceed the setup of their servos."""

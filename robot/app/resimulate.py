@@ -20,7 +20,7 @@ from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.session import leave
+from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import LoopCount, Tick
 from gazerig.robot.model.frames import CameraMount
@@ -100,7 +100,7 @@ class _Resimulator:
     ) -> None:
         self._joints = joints
         self._on_tick = on_tick
-        self._compared = _Compared()
+        self._compared = _Comparison()
         self._notes: list[str] = []
         self._body: PlaybackBody | None = None
         camera = rig.camera
@@ -140,7 +140,7 @@ class _Resimulator:
         if self._body is not None:
             self._body.stop_playback()
         count = LoopCount(self._compared.ticks, 0, ended or end.stopped_by or "seconds")
-        leave(self._made, count, lambda line: None)
+        shut_down(self._made, count, lambda line: None)
         if ended is not None:
             self._notes.append(f"the new run ended early by {ended}")
         now = self._made.sent_digest()
@@ -205,7 +205,7 @@ class _Resimulator:
         return tick if self._body is None else tick._replace(events=was.events)
 
 
-class _Compared:
+class _Comparison:
     """Two runs, tick by tick."""
 
     def __init__(self) -> None:
@@ -238,7 +238,7 @@ class _Compared:
         )  # fmt: skip
 
 
-class _Decided(NamedTuple):
+class _Decisions(NamedTuple):
     """Decisions of a tick, as text that is equal only if every bit is."""
 
     target: str
@@ -248,13 +248,13 @@ class _Decided(NamedTuple):
     level: str
 
 
-def _decided(tick: Tick) -> _Decided:
+def _decisions(tick: Tick) -> _Decisions:
     gaze = tick.gaze._replace(limited=())  # recorded by later versions only
     # Commands to absent lids have no effect.
     if _LOWER_LIDS.isdisjoint(tick.guard_result.joints):
         gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
     # The wording of the reason may change; its contents are in the pulls.
-    return _Decided(
+    return _Decisions(
         repr(tick.target._replace(why="")),
         repr(gaze),
         repr(tick.desired_rad),
@@ -265,7 +265,7 @@ def _decided(tick: Tick) -> _Decided:
 
 def _difference(was: Tick, now: Tick) -> str:
     """Return the first difference of two ticks, "" if there is none."""
-    pairs = zip(_Decided._fields, _decided(was), _decided(now), strict=True)
+    pairs = zip(_Decisions._fields, _decisions(was), _decisions(now), strict=True)
     name = next((name for name, then, again in pairs if then != again), None)
     return f"{name}: {_short(was, now, name)}" if name is not None else ""
 
@@ -307,7 +307,7 @@ def recorded_rig(recording: RunRecording) -> Rig:
         BadRecording: this version does not know a part of the recorded one.
     """
     with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
-        return _read(recording, _kept(recording.info.config_yaml, Path(folder) / "recorded.yaml"))
+        return _read(recording, _write(recording.info.config_yaml, Path(folder) / "recorded.yaml"))
 
 
 def _rig(
@@ -317,14 +317,14 @@ def _rig(
     if isinstance(rig, str):
         return load_rig(rig, character)
     text = params_text(rig) if rig is not None else recording.info.config_yaml
-    whole = _kept(text, folder / "recorded.yaml")
+    whole = _write(text, folder / "recorded.yaml")
     base = rig if rig is not None else _read(recording, whole)
     found = base
     if character is not None:
         found = load(_character(character), Rig, defaults=(whole,))
     if rig is None and recording.info.gestures_yaml:
         # The files of gestures may have changed since, too.
-        kept = _kept(recording.info.gestures_yaml, folder / "gestures.yaml")
+        kept = _write(recording.info.gestures_yaml, folder / "gestures.yaml")
         (folder / "gestures").mkdir()
         found = replace(found, gesture_files=gesture_files(kept, folder / "gestures"))
     scanpath = found.gaze.scanpath
@@ -332,7 +332,7 @@ def _rig(
     if not same_walk or not recording.info.walk_yaml:
         return found
     # The walk's own file may have changed since, or be on another machine.
-    walk = str(_kept(recording.info.walk_yaml, folder / "walk.yaml"))
+    walk = str(_write(recording.info.walk_yaml, folder / "walk.yaml"))
     return replace(
         found, gaze=replace(found.gaze, scanpath=replace(scanpath, transition_matrix=walk))
     )
@@ -350,7 +350,7 @@ def _read(recording: RunRecording, whole: Path) -> Rig:
         ) from None
 
 
-def _kept(text: str, file: Path) -> Path:
+def _write(text: str, file: Path) -> Path:
     file.write_text(text, encoding="utf-8")
     return file
 

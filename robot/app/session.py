@@ -130,7 +130,7 @@ class Session:
     ) -> None:
         options, made = composed.options, composed.made
         self._options, self._made, self._stopped = options, made, stopped
-        self._say = say = _never_raising(say)
+        self._say = say = _suppress_errors(say)
         self._run_observers = RunObservers(
             made, options, say, status, composed.tuning, composed.recorder, browse=browse
         )
@@ -147,7 +147,7 @@ class Session:
         self._observers = self._all_observers()
         if watch is not None:
             self._observers.add("the program", watch)
-        _ask_all(made.robot, options)
+        _send_initial(made.robot, options)
         self._longest_s = _longest_s(made, options)
         self._interrupts = Interrupts.of(stopped)
 
@@ -216,7 +216,7 @@ class Session:
             with (
                 contextlib.nullcontext() if self._options.fast else SWITCH_INTERVAL,
                 self._interrupts,
-                way_out(made, say, self._interrupts, run_observers.parking) as leaving,
+                prepare_shutdown(made, say, self._interrupts, run_observers.parking) as leaving,
             ):
                 leaving.switch_on(lambda: made.robot.start(made.clock, self._interrupts.refuse))
                 begun = True
@@ -269,7 +269,7 @@ def _observe_scene(
         observers.add("the heat map", face_gaze.update)
 
 
-def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:
+def _suppress_errors(say: Callable[[str], None]) -> Callable[[str], None]:
     """Return ``say`` without its exceptions, so that a failed message ends nothing."""
 
     def tried(line: str) -> None:
@@ -286,7 +286,7 @@ def _longest_s(made: Assembly, options: RunOptions) -> float | None:
     return options.seconds
 
 
-def _ask_all(robot: Robot, options: RunOptions) -> None:
+def _send_initial(robot: Robot, options: RunOptions) -> None:
     """Send the commands that apply from the start of the run."""
     try:
         for menu, choice in options.choices:
@@ -309,19 +309,19 @@ def _draw_heatmap(
     say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
 
 
-def leave(
+def shut_down(
     made: Assembly,
     count: LoopCount,
     say: Callable[[str], None],
     interrupts: Interrupts | None = None,
 ) -> None:
     """Park, switch torque off, close, and report the results: the only end, by power_down.py."""
-    leaving = way_out(made, say, interrupts if interrupts is not None else Interrupts())
+    leaving = prepare_shutdown(made, say, interrupts if interrupts is not None else Interrupts())
     leaving.cause = count.stopped_by
     leaving.leave()
 
 
-def way_out(
+def prepare_shutdown(
     made: Assembly,
     say: Callable[[str], None],
     interrupts: Interrupts,

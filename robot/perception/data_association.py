@@ -207,7 +207,7 @@ def _all_pairs(
     expected: Floats = far + np.log(across_sum * upright_sum * along_sum / exact)
     surprise = ratio * (wide_m / par.gate_sigma) ** 2
     far = aside / (across_sum + surprise) + deep / (along_sum + surprise)
-    hidden = _hidden(t[:, :, 0])[:, None] & ((t[1] != d[1]) | (t[1] == NO_MARK)) & ~alike
+    hidden = _hidden_tracks(t[:, :, 0])[:, None] & ((t[1] != d[1]) | (t[1] == NO_MARK)) & ~alike
     surprise = np.where(hidden, np.minimum(surprise, ratio * (_HIDDEN_M * _HIDDEN_M)), surprise)
     across_sum, along_sum = across_sum + surprise, along_sum + surprise
     bob = np.where(t[14] == inf, inf, ratio * (_BOB_M * _BOB_M))
@@ -228,7 +228,7 @@ def _all_pairs(
     return rows
 
 
-def _hidden(t: Floats) -> NDArray[np.bool_]:
+def _hidden_tracks(t: Floats) -> NDArray[np.bool_]:
     """Return which tracks are expected behind or right next to a nearer one.
 
     A person who is about to be hidden does not appear somewhere else suddenly: that is another
@@ -309,7 +309,7 @@ def _pair_cost(
 
 
 def _is_hidden(k: int, tracks: Sequence[TrackRow]) -> bool:
-    """Return whether track k is expected behind a nearer one; same rules as ``_hidden``."""
+    """Return whether track k is expected behind a nearer one; same rules as ``_hidden_tracks``."""
     _, _, x, y, z, range_m, _, _, radius_m, *_ = tracks[k]
     far_m = _NEARER * range_m
     for i, (_, _, its_x, its_y, its_z, its_m, _, _, its_radius_m, _, _, in_sight, *_) in enumerate(

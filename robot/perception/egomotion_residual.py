@@ -129,7 +129,7 @@ class EgomotionResidual:
             change = cross(sub(turn_rad_s, turn_before), views[id_])
             self._turns[id_].shifts.append((shift, change, t_s - before_s, speed > _TURNS_RAD_S))
         if speed < _STANDS_RAD_S:
-            self._stands(t_s, views, seen)
+            self._settle(t_s, views, seen)
 
     def figures(self) -> ResidualFigures:
         """Return the figures."""
@@ -140,18 +140,18 @@ class EgomotionResidual:
             round(degrees(median(self._speeds)), 3), round(1e3 * late, 2), len(self._speeds)
         )
 
-    def _stands(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
+    def _settle(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
         """Use the turns of things that are at their former positions, and begin new ones."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]
             same = norm(sub(views[id_], turn.view)) < _STILL_RAD
             if same and t_s - turn.since_s <= _LONGEST_S and any(s[3] for s in turn.shifts):
-                self._believe(turn)
+                self._add_turn(turn)
         self._turns = {
             s.id: _Turn(t_s, views[s.id]) for s in seen if norm(s.v_world_m_s) < _STILL_M_S
         }
 
-    def _believe(self, turn: _Turn) -> None:
+    def _add_turn(self, turn: _Turn) -> None:
         """Update the estimate with the apparent motion of one still thing."""
         for shift, change, dt_s, fast in turn.shifts:
             self._shift_by_turn = _FORGET * self._shift_by_turn + dot(shift, change)
@@ -167,7 +167,7 @@ def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
     return ((R[2][1] - R[1][2]) * half, (R[0][2] - R[2][0]) * half, (R[1][0] - R[0][1]) * half)
 
 
-def turned_at_most(before: NeckAngles, after: NeckAngles) -> float:
+def turn_bound(before: NeckAngles, after: NeckAngles) -> float:
     """Return an upper bound of the head's turn between two poses of the neck."""
     (a, b, c), (d, e) = before[0], before[1]
     (f, g, h), (i, j) = after[0], after[1]

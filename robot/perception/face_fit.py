@@ -81,7 +81,7 @@ class _Sums(NamedTuple):
     errors_y: float
 
 
-def fitted_face(seen: Points, noise: float) -> FittedFace | None:
+def fit_face(seen: Points, noise: float) -> FittedFace | None:
     """Return the most probable face, None if the points determine none.
 
     Args:
@@ -104,7 +104,7 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
         0.0,
     )
     width = hypot(ex - cx, ey - cy) / eyes
-    believed = _width_believed(width, variance / (eyes * eyes))
+    believed = _accepted_width(width, variance / (eyes * eyes))
     wider, frontal = 0.0, _FRONTAL_M
     height_weight = variance / (variance + (_MOUTH_HEIGHT_OF_EYES * eyes) ** 2)
     R = rotation_by(turn)
@@ -120,7 +120,7 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
         sy0, sy1, sy2, sy3, sy4 = sums.to_y
         dx = (sums.errors_x - (sx0 * w0 + sx1 * w1 + sx2 * w2 + sx3 * dz + sx4 * dl)) / sums.n_x
         dy = (sums.errors_y - (sy0 * w0 + sy1 * w1 + sy2 * w2 + sy3 * dz + sy4 * dl)) / sums.n_y
-        turn = _turned_on(turn, (w0, w1, w2))
+        turn = _add_turn(turn, (w0, w1, w2))
         R = rotation_by(turn)
         x, y, z, length = x + dx, y + dy, z + dz, length + dl
         if not z > 0.0:  # behind the camera, or not finite
@@ -132,7 +132,7 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
             (1.0 + wider) * width / _mouth_width(frontal, R, (x, y, z), length) - 1.0,
         )
         wider = believed * min(max(wider, _NARROWEST), _WIDEST)
-        frontal = _smiling(wider)
+        frontal = _smile_landmarks(wider)
         moved = max(abs(w0), abs(w1), abs(w2), shift, abs(dl), abs(wider - last))
         if moved * moved < _REMAINS * before:
             return FittedFace(R, (x, y, z), length)
@@ -140,7 +140,7 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
     return None
 
 
-def _width_believed(width: float, variance: float) -> float:
+def _accepted_width(width: float, variance: float) -> float:
     """Return the believed excess of a mouth's width over the usual one.
 
     Args:
@@ -152,7 +152,7 @@ def _width_believed(width: float, variance: float) -> float:
     return _WIDTH_SPREAD**2 / (_WIDTH_SPREAD**2 + unsure)
 
 
-def _smiling(wider: float) -> tuple[Vec3, ...]:
+def _smile_landmarks(wider: float) -> tuple[Vec3, ...]:
     """Return eyes and mouth corners of a frontal face whose mouth is wider by a part of itself."""
     right_eye, left_eye, (_, y, z), _ = _FRONTAL_M
     out = wider * _HALF_MOUTH_M
@@ -184,7 +184,7 @@ def turn_sd_rad(away_m: float, noise: float) -> float:
 
     Args:
         away_m: distance of the face.
-        noise: as in ``fitted_face``.
+        noise: as in ``fit_face``.
     """
     per_rad = _NOSE_OUT_M / away_m
     variance = noise * noise + (_NOISE_OF_EYES * PUPIL_DISTANCE_M / away_m) ** 2
@@ -217,7 +217,7 @@ def nearest_m(R_camera_face: Mat3, p_camera_m: Vec3, length: float) -> float:
     return p_camera_m[2] + min(along)
 
 
-def _turned_on(turn: Vec3, w: Vec3) -> Vec3:
+def _add_turn(turn: Vec3, w: Vec3) -> Vec3:
     """Return the rotation vector after another small turn, to the second order of both."""
     x, y, z = turn
     a, b, c = w

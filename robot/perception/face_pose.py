@@ -24,7 +24,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.angles import compose, cross, dot, norm, rotate_back, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.intrinsics import rays as rays_through
-from gazerig.robot.perception.face_fit import Points, fitted_face, nearest_m, turn_sd_rad
+from gazerig.robot.perception.face_fit import Points, fit_face, nearest_m, turn_sd_rad
 
 # Usual landmark error, without the part that grows with the face.
 _NOISE_PX = 1.0
@@ -58,13 +58,13 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     """
     array = np.asarray(landmarks_px, dtype=np.float64)
     points: list[list[float]] = array.tolist()
-    if array.shape != (5, 2) or not _front_seen(points):
+    if array.shape != (5, 2) or not _shows_front(points):
         return None
     rays = _rays(points, intrinsics)
-    R_face_camera = _facing_camera(rays)
+    R_face_camera = _camera_to_face(rays)
     try:
-        found = fitted_face(
-            _seen_from(R_face_camera, rays),
+        found = fit_face(
+            _project(R_face_camera, rays),
             _NOISE_PX / sqrt(intrinsics.fx_px * intrinsics.fy_px),
         )
     except (ArithmeticError, ValueError):  # points too far from a face to determine a pose
@@ -82,7 +82,7 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     return FacePose(p, R, found.length, turn_sd_rad(norm(p), noise))
 
 
-def _front_seen(points: list[list[float]]) -> bool:
+def _shows_front(points: list[list[float]]) -> bool:
     """Return whether eyes and mouth have the orientation of a face seen from its front.
 
     The sign of a projected triangle's area shows exactly which side of its plane is visible; a
@@ -103,7 +103,7 @@ def _rays(points: list[list[float]], lens: Intrinsics) -> list[Vec3]:
     return [((x - cx) / fx, (y - cy) / fy, 1.0) for x, y in points]
 
 
-def _facing_camera(rays: list[Vec3]) -> Mat3:
+def _camera_to_face(rays: list[Vec3]) -> Mat3:
     """Return the rotation that turns the camera to the face and rolls it until the eyes are level.
 
     In this view, poses near "looks at me" are small rotations wherever the face appears.
@@ -115,7 +115,7 @@ def _facing_camera(rays: list[Vec3]) -> Mat3:
     return x, cross(z, x), z
 
 
-def _seen_from(R_face_camera: Mat3, rays: list[Vec3]) -> Points:
+def _project(R_face_camera: Mat3, rays: list[Vec3]) -> Points:
     """Return the points of rays on the plane z = 1 of the camera turned towards the face."""
     (a, b, c), (d, e, f), (g, h, i) = R_face_camera
     found = []

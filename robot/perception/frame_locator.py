@@ -137,7 +137,7 @@ class FrameLocator:
         faces += [
             self._person(person, found, intrinsics)
             for person in found.people
-            if not any(_is_of(person, face) for face in inside)
+            if not any(_is_face_of(person, face) for face in inside)
         ]
         blobs = found.blobs
         if len(blobs) > _MOST_THINGS:
@@ -166,7 +166,7 @@ class FrameLocator:
         focal_px = sqrt(lens.fx_px * lens.fy_px)
         eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
         far = norm(pose.p_camera_m)
-        measured = self._measured(face, pose, found)
+        measured = self._depth_ratio(face, pose, found)
         share, sd = (
             measured if measured is not None else (1.0, hypot(_SIZE_PX / eyes_px, _SIZE_OF_EYES))
         )
@@ -243,7 +243,7 @@ class FrameLocator:
             return None
         return (z, spread) if spread <= _MOST_SPREAD_M else None
 
-    def _measured(
+    def _depth_ratio(
         self, face: DetectedFace, pose: FacePose, found: Detections
     ) -> tuple[float, float] | None:
         """Return the measured distance over that from the size, and its relative deviation.
@@ -283,7 +283,7 @@ def _lower_face(face: DetectedFace) -> float:
     return mouth / eyes * hypot(x - middle_x, y - middle_y) / tall
 
 
-def _is_of(person: DetectedPerson, face: DetectedFace) -> bool:
+def _is_face_of(person: DetectedPerson, face: DetectedFace) -> bool:
     """Return whether a face belongs to a person."""
     x, y = face.landmarks_px.mean(axis=0).tolist()
     apart = hypot(x - person.head_px[0], y - person.head_px[1])

@@ -53,11 +53,11 @@ class GyroFusion:
             return R_world_camera
         before, R = self._before, R_world_camera
         if before is not None and before[1].epoch == turn.epoch and 0.0 < t_s - before[0] < _GAP_S:
-            R = self._turned_on(t_s, before, R_world_camera, turn)
+            R = self._advance(t_s, before, R_world_camera, turn)
         self._before = t_s, turn, R
         return R
 
-    def _turned_on(
+    def _advance(
         self, t_s: float, before: tuple[float, CameraTurn, Mat3], R_joints: Mat3, turn: CameraTurn
     ) -> Mat3:
         """Return the last orientation, advanced by the gyro and pulled to the joints'."""

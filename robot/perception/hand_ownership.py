@@ -70,7 +70,7 @@ def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int
     for k, (p_face, v_face) in enumerate(faces):
         if _on_head(thing, p_face, p_camera):
             return k
-        if _below(thing, p_face, p_camera) and _goes_along(thing, p_face, v_face, p_camera):
+        if _below(thing, p_face, p_camera) and _moves_along(thing, p_face, v_face, p_camera):
             return k
     return None
 
@@ -101,7 +101,7 @@ def _off(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> tuple[float
     return hypot(x, y), z
 
 
-def _goes_along(
+def _moves_along(
     thing: LocalisedDetection, p_face: Vec3, v_face: Vec3 | None, p_camera: Vec3
 ) -> bool:
     """Return whether a patch moves across the view as the face does; also if unknown."""

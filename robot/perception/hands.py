@@ -76,7 +76,7 @@ _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
 
 
 @dataclass(slots=True)
-class _Moving:
+class _MovingPatch:
     """A patch that may be a hand.
 
     at_s: last time of a hand's motion; p_face: face of its person; frames: number of frames with it
@@ -125,7 +125,7 @@ class _Moving:
             self.nearer += _NEARER_GAIN * (seen - self.nearer)
 
 
-class _Held(NamedTuple):
+class _RestingHand(NamedTuple):
     """A hand at rest, and the time until which it is kept."""
 
     hand: LocalisedDetection
@@ -136,8 +136,8 @@ class Hands:
     """Recognition of moving patches as hands of the people in view."""
 
     def __init__(self) -> None:
-        self._moving: dict[int, _Moving] = {}
-        self._held: dict[int, _Held] = {}
+        self._moving: dict[int, _MovingPatch] = {}
+        self._resting: dict[int, _RestingHand] = {}
         self._palm_mark, self._searched_s = 0, -inf
 
     def named(
@@ -164,18 +164,18 @@ class Hands:
         }
         if palms is not None:
             self._searched_s = t_s
-        free = self._nearest(palms or (), faces, p_camera)
-        found = [self._named(thing, faces, p_camera, t_s, free) for thing in things]
+        free = self._accept_palms(palms or (), faces, p_camera)
+        found = [self._label(thing, faces, p_camera, t_s, free) for thing in things]
         for palm in free:
             self._hold(palm, found, p_camera, t_s)
-        return [*found, *self._at_rest(found, p_camera, t_s)] if self._held else found
+        return [*found, *self._at_rest(found, p_camera, t_s)] if self._resting else found
 
     @property
     def held(self) -> bool:
         """Return whether there are hands at rest."""
-        return bool(self._held)
+        return bool(self._resting)
 
-    def _nearest(
+    def _accept_palms(
         self, palms: Sequence[LocalisedDetection], faces: list[Known], p_camera: Vec3
     ) -> list[LocalisedDetection]:
         """Return the accepted palms, no farther away than the nearest person.
@@ -192,14 +192,14 @@ class Hands:
             on_head = hypot(*_off(there, p_face)) < _HEAD_M
             if _level(palm.p_world_m, p_camera) > far:
                 palm = replace(palm, p_world_m=there)
-            if (palm.confidence >= _SURE and not on_head) or self._known(palm, p_camera):
+            if (palm.confidence >= _SURE and not on_head) or self._is_recent(palm, p_camera):
                 found.append(palm)
         return found
 
-    def _known(self, thing: LocalisedDetection, p_camera: Vec3) -> bool:
+    def _is_recent(self, thing: LocalisedDetection, p_camera: Vec3) -> bool:
         """Return whether something is at the position of a recent hand."""
         hands = [one.hand for one in self._moving.values() if one.frames >= _FRAMES]
-        hands += [one.hand for one in self._held.values()]
+        hands += [one.hand for one in self._resting.values()]
         return any(_apart(thing, hand, p_camera) < _AGAIN_M for hand in hands)
 
     def _hold(
@@ -208,12 +208,12 @@ class Hands:
         """Keep a palm without a patch until the next search, under the number of its hand."""
         if any(_is_at(palm, thing, p_camera) for thing in found if thing.kind == HAND):
             return
-        mark = next((m for m, o in self._held.items() if _is_at(palm, o.hand, p_camera)), None)
+        mark = next((m for m, o in self._resting.items() if _is_at(palm, o.hand, p_camera)), None)
         if mark is None:
             self._palm_mark -= 1
             mark = self._palm_mark
         hand = replace(palm, mark=mark, v_world_m_s=(0.0, 0.0, 0.0))
-        self._held[mark] = _Held(hand, t_s + _PALM_S)
+        self._resting[mark] = _RestingHand(hand, t_s + _PALM_S)
 
     def _at_rest(
         self, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
@@ -222,15 +222,15 @@ class Hands:
         marks = {thing.mark for thing in found}
         # The detector would recognise its own hands again.
         moving = [thing for thing in found if thing.mark in self._moving]
-        self._held = {
+        self._resting = {
             mark: one
-            for mark, one in self._held.items()
+            for mark, one in self._resting.items()
             if mark in marks
             or (t_s <= one.until_s and not _moves_again(one.hand, moving, p_camera))
         }
-        return [one.hand for mark, one in self._held.items() if mark not in marks]
+        return [one.hand for mark, one in self._resting.items() if mark not in marks]
 
-    def _named(
+    def _label(
         self,
         thing: LocalisedDetection,
         faces: list[Known],
@@ -242,22 +242,22 @@ class Hands:
         if thing.kind != UNNAMED or thing.mark is None or not faces:
             return thing
         known = self._moving.get(thing.mark)
-        arm = _owned(thing, faces, p_camera, None if known is None else known.p_face)
+        arm = _arm_of(thing, faces, p_camera, None if known is None else known.p_face)
         if arm is None:
             return thing
         p_face, v_face = arm.face[0], arm.face[1] or (0.0, 0.0, 0.0)
-        speed = _across(arm, v_face, p_camera)
+        speed = _speed_across(arm, v_face, p_camera)
         named = known is not None and known.frames >= _FRAMES
         begins = _BEFORE_HEAD_M_S if hypot(*_off(arm.tip_m, p_face)) < _HEAD_M else _BEGINS_M_S
         # Relative to a walking person, their legs and parts of the trunk are no faster than that.
-        comes = arm.ratio * thing.radius_m >= _ALONE_M and _comes(thing, p_camera)
+        comes = arm.ratio * thing.radius_m >= _ALONE_M and _approaches(thing, p_camera)
         palm = next((one for one in palms if _is_at(one, thing, p_camera)), None)
         if (
             palm is not None
             or comes
             or speed > (_STAYS_M_S if named else max(begins, norm(v_face)))
         ):
-            known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, thing))
+            known = self._moving.setdefault(thing.mark, _MovingPatch(t_s, p_face, thing))
             before_s, known.at_s, known.p_face = known.at_s, t_s, p_face
             if palm is not None:
                 palms.remove(palm)
@@ -280,7 +280,7 @@ class Hands:
         if known is None or known.frames < _FRAMES:
             return thing
         if speed >= _AT_REST_M_S:
-            self._held.pop(thing.mark, None)
+            self._resting.pop(thing.mark, None)
             return known.hand
         # A patch that hardly moves may be the whole person: the hand stays at its last motion, and
         # is kept no longer than a palm if palms are searched.
@@ -288,10 +288,10 @@ class Hands:
         if t_s - self._searched_s < _HELD_S:
             until_s = max(known.at_s, known.palm_s) + _PALM_S
         if t_s > until_s:
-            self._held.pop(thing.mark, None)
+            self._resting.pop(thing.mark, None)
             return thing
         still = replace(known.hand, v_world_m_s=(0.0, 0.0, 0.0))
-        self._held[thing.mark] = _Held(still, until_s)
+        self._resting[thing.mark] = _RestingHand(still, until_s)
         return known.hand if known.at_s == t_s else still
 
     def _is_arm(self, thing: LocalisedDetection, arm: "_Arm", p_camera: Vec3) -> bool:
@@ -299,8 +299,8 @@ class Hands:
         if arm.attached or arm.comes_in:
             return True
         small = arm.ratio * thing.radius_m <= _TOO_LARGE * _ALONE_M
-        return (small and self._known(thing, p_camera)) or any(
-            _is_at(one.hand, thing, p_camera) for mark, one in self._held.items() if mark < 0
+        return (small and self._is_recent(thing, p_camera)) or any(
+            _is_at(one.hand, thing, p_camera) for mark, one in self._resting.items() if mark < 0
         )
 
 
@@ -353,7 +353,7 @@ class _Arm(NamedTuple):
     comes_in: bool
 
 
-def _owned(
+def _arm_of(
     thing: LocalisedDetection, faces: list[Known], p_camera: Vec3, last: Vec3 | None
 ) -> _Arm | None:
     """Return a patch as an arm of its likely person, None without one.
@@ -448,7 +448,7 @@ def _off(p_m: Vec3, p_face: Vec3) -> tuple[float, float]:
     return hypot(x, y), z
 
 
-def _comes(thing: LocalisedDetection, p_camera: Vec3) -> bool:
+def _approaches(thing: LocalisedDetection, p_camera: Vec3) -> bool:
     """Return whether a patch certainly grows as fast as an approaching hand."""
     if thing.v_world_m_s is None:
         return False
@@ -457,7 +457,7 @@ def _comes(thing: LocalisedDetection, p_camera: Vec3) -> bool:
     return closing_m_s > _COMES_1_S * norm(way)
 
 
-def _across(arm: _Arm, v_face: Vec3, p_camera: Vec3) -> float:
+def _speed_across(arm: _Arm, v_face: Vec3, p_camera: Vec3) -> float:
     """Return the speed of a hand across the view, relative to the person."""
     view = unit(sub(arm.tip_m, p_camera))
     other = sub(arm.tip_m_s, v_face)

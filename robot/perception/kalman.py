@@ -139,8 +139,8 @@ class TrackFilter:
         self._unseen_s += dt_s
         self._accel_m_s2 *= exp(-dt_s / _CHANGES_FOR_S)
         accel = max(self._noise.quiet_m_s2, self._accel_m_s2, 0.0 if seen else _UNSEEN_M_S2)
-        self.across = _wandered(_gone_on(self.across, dt_s, kept), accel, dt_s)
-        self.along = _wandered(_gone_on(self.along, dt_s, kept), accel, dt_s)
+        self.across = _add_process_noise(_propagate(self.across, dt_s, kept), accel, dt_s)
+        self.along = _add_process_noise(_propagate(self.along, dt_s, kept), accel, dt_s)
 
     def look_from(self, p_camera_m: Vec3) -> None:
         """Move the camera: part of the component along the view is now across it."""
@@ -152,8 +152,8 @@ class TrackFilter:
         turned = 1.0 - ahead * ahead
         if turned > 0.0:
             a, b = self.across, self.along
-            self.across = _mixed(a, b, 0.5 * turned)
-            self.along = _mixed(b, a, turned)
+            self.across = _interpolate(a, b, 0.5 * turned)
+            self.along = _interpolate(b, a, turned)
 
     def offset(self, p_m: Vec3) -> Offset:
         """Return the offset of a position from the expected one."""
@@ -204,8 +204,8 @@ class TrackFilter:
             before, accel = accel, min(2.0 * accel, most)
             if accel > before:
                 more = sqrt(accel * accel - before * before)
-                self.across = _wandered(self.across, more, self._unseen_s)
-                self.along = _wandered(self.along, more, self._unseen_s)
+                self.across = _add_process_noise(self.across, more, self._unseen_s)
+                self.along = _add_process_noise(self.along, more, self._unseen_s)
             far = aside / (self.across.p + across) + deep / (self.along.p + along)
             if accel >= most or far < _EXPECTED:
                 self._accel_m_s2 = accel
@@ -259,7 +259,7 @@ class TrackFilter:
         angle = aside / range_m
         if angle > _TINY_RAD:
             way = scale(across_m, 1.0 / aside)
-            there, onward = _turned(here, way, angle)
+            there, onward = _turn(here, way, angle)
             v = self.v_m_s
             seen, gone = dot(v, here), dot(v, way)
             self.v_m_s = add(v, add(scale(sub(there, here), seen), scale(sub(onward, way), gone)))
@@ -269,8 +269,8 @@ class TrackFilter:
             range_m = max(NEAREST_M, range_m * exp(step))
             grown = range_m / self.range_m
             self.v_m_s = scale(self.v_m_s, grown)
-            self.across = _scaled(self.across, grown * grown)
-            self.along = _scaled(self.along, grown * grown)
+            self.across = _scale(self.across, grown * grown)
+            self.along = _scale(self.along, grown * grown)
             self.range_m = range_m
         self.p_m = add(self._camera, scale(here, range_m))
 
@@ -284,31 +284,31 @@ def sight(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
     return (x / far, y / far, z / far), max(far, NEAREST_M)
 
 
-def _gone_on(C: Variances, dt_s: float, kept: float) -> Variances:
+def _propagate(C: Variances, dt_s: float, kept: float) -> Variances:
     """Return a covariance after a time, with the share of the velocity that is kept."""
     p, pv, v = C
     both = pv + dt_s * v
     return Variances(p + dt_s * (pv + both), kept * both, kept * kept * v)
 
 
-def _wandered(C: Variances, accel_m_s2: float, dt_s: float) -> Variances:
+def _add_process_noise(C: Variances, accel_m_s2: float, dt_s: float) -> Variances:
     """Return a covariance plus the effect of random acceleration in a time."""
     v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
     return Variances(C.p + v * dt_s * dt_s / 3.0, C.pv + v * dt_s / 2.0, C.v + v)
 
 
-def _mixed(C: Variances, D: Variances, share: float) -> Variances:
+def _interpolate(C: Variances, D: Variances, share: float) -> Variances:
     """Return a covariance interpolated towards another by a share."""
     kept = 1.0 - share
     return Variances(kept * C.p + share * D.p, kept * C.pv + share * D.pv, kept * C.v + share * D.v)
 
 
-def _scaled(C: Variances, factor: float) -> Variances:
+def _scale(C: Variances, factor: float) -> Variances:
     """Return a covariance in larger or smaller units."""
     return Variances(factor * C.p, factor * C.pv, factor * C.v)
 
 
-def _turned(view: Vec3, way: Vec3, angle_rad: float) -> tuple[Vec3, Vec3]:
+def _turn(view: Vec3, way: Vec3, angle_rad: float) -> tuple[Vec3, Vec3]:
     """Return two unit vectors at right angles, the first turned towards the second."""
     c, s = cos(angle_rad), sin(angle_rad)
     return add(scale(view, c), scale(way, s)), sub(scale(way, c), scale(view, s))

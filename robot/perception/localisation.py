@@ -6,7 +6,9 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.perception.track import LocalisedDetection
 
 
-def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> LocalisedDetection:
+def place_in_world(
+    found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3
+) -> LocalisedDetection:
     """Return a detection in the world, by the camera's pose at the exposure."""
     R, v, gaze = found.R_camera_face, found.v_camera_m_s, found.gaze_camera
     fastest, faster, upper = found.fastest_m, found.fastest_m_s, found.upper_m

@@ -49,10 +49,10 @@ class MotionSource:
             return ()
         height, width = shot.image.shape[:2]
         lens = intrinsics_of_lens(self._lens, self._field_rad, width, height, shot.lens)
-        turned = self._turned(shot)
+        turned = self._rotation_since(shot)
         return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
 
-    def _turned(self, shot: Shot) -> Floats | None:
+    def _rotation_since(self, shot: Shot) -> Floats | None:
         """Return R_now_before by the camera's gyro, else by the joints; None if unknown."""
         before, self._before_turn = self._before_turn, shot.turn
         before_s = self._detector.before_s
@@ -70,7 +70,7 @@ def motion_finder(
     return MotionSource(params, lens, field_rad, turns)
 
 
-def retuned(
+def retune_finder(
     params: MotionParams, lens: LensParams | None, field_rad: float, finder: Motion | None
 ) -> Motion | None:
     """Change the parameters of a detector in its own process."""

@@ -21,7 +21,7 @@ OwnParts = Callable[[Mat3, Vec3], Sequence[Capsule]]
 _MARGIN_M = 0.05
 
 
-def own_named(
+def label_own_body(
     things: list[LocalisedDetection], parts: Sequence[Capsule], p_camera: Vec3
 ) -> list[LocalisedDetection]:
     """Return the things, with the kind OWN for those that are the robot's own body.
@@ -36,13 +36,13 @@ def own_named(
         return things
     return [
         replace(thing, kind=OWN)
-        if thing.kind == UNNAMED and any(_is(thing, part, p_camera) for part in seen)
+        if thing.kind == UNNAMED and any(_is_part(thing, part, p_camera) for part in seen)
         else thing
         for thing in things
     ]
 
 
-def _is(thing: LocalisedDetection, part: Capsule, p_camera: Vec3) -> bool:
+def _is_part(thing: LocalisedDetection, part: Capsule, p_camera: Vec3) -> bool:
     """Return whether a thing is a part of the head."""
     way = sub(thing.p_world_m, p_camera)
     hit_m = part.hit_m(p_camera, unit(way))

@@ -22,7 +22,7 @@ from gazerig.robot.perception.egomotion_residual import (
     EgomotionResidual,
     ResidualFigures,
     TrackedPoint,
-    turned_at_most,
+    turn_bound,
     turning_rad_s,
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
@@ -35,9 +35,9 @@ from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
 from gazerig.robot.perception.hands import Hands, Known
 from gazerig.robot.perception.kalman import Variances
-from gazerig.robot.perception.localisation import placed
+from gazerig.robot.perception.localisation import place_in_world
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
-from gazerig.robot.perception.own_body import OwnParts, own_named
+from gazerig.robot.perception.own_body import OwnParts, label_own_body
 from gazerig.robot.perception.track import UNNAMED, LocalisedDetection, Track
 from gazerig.robot.perception.tracker import Tracker
 
@@ -121,12 +121,14 @@ class Perception:
             self._tracks, self._hands = (), Hands()
             self._cuts += 1
         located = self._located(detections)
-        faces = [placed(face, R, p) for face in located.faces]
-        things = [placed(thing, R, p) for thing in located.things]
-        palms = None if located.palms is None else [placed(one, R, p) for one in located.palms]
+        faces = [place_in_world(face, R, p) for face in located.faces]
+        things = [place_in_world(thing, R, p) for thing in located.things]
+        palms = (
+            None if located.palms is None else [place_in_world(one, R, p) for one in located.palms]
+        )
         if things or palms or self._hands.held:
             if self._own_parts is not None:
-                things = own_named(things, self._own_parts(R_head, self._p_head), p)
+                things = label_own_body(things, self._own_parts(R_head, self._p_head), p)
             known = self._known(t_s)
             things = self._hands.named(things, known_faces(faces, known), p, t_s, palms)
             faces, things = without_own_motion(faces, things, known, p)
@@ -207,7 +209,7 @@ class Perception:
             for track in self._tracks
             if track.seen_s == t_s
         ]
-        most_rad_s = turned_at_most(before, after) / (2.0 * _HALF_TURN_S)
+        most_rad_s = turn_bound(before, after) / (2.0 * _HALF_TURN_S)
         self._residual.step(t_s, turn, self._p_camera, seen, most_rad_s)
 
     def _face(self, track: Track) -> Face:

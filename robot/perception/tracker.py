@@ -68,7 +68,7 @@ class Tracker:
     ) -> tuple[Track, ...]:
         """Associate the detections of one frame with the tracks; return the tracks in sight."""
         for track in self._tracks:
-            if not self._remembered(track):
+            if not self._is_remembered(track):
                 track.filter.predict(
                     t_s - track.at_s,
                     track.seen_s == track.at_s,
@@ -87,7 +87,7 @@ class Tracker:
             found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
         }
         # A thing recognised later as a hand is no newcomer: it keeps its number.
-        ids = {t.detection.mark: t.id for t in self._tracks if _became_another(t, renamed)}
+        ids = {t.detection.mark: t.id for t in self._tracks if _is_another_now(t, renamed)}
         for j, detection in enumerate(detections):
             if j not in taken:
                 track = self._begin(detection, p_world_camera_m, t_s)
@@ -97,7 +97,7 @@ class Tracker:
         self._tracks = [
             t
             for t in self._tracks
-            if t_s - t.seen_s <= self._kept_s(t) and not _became_another(t, renamed)
+            if t_s - t.seen_s <= self._kept_s(t) and not _is_another_now(t, renamed)
         ]
         return tuple([t for t in self._tracks if t_s - t.seen_s <= self._coasts_s(t)])
 
@@ -116,7 +116,7 @@ class Tracker:
         par = self._params
         return max(par.forget_ms / 1e3, par.remember_face_s if track.is_person else 0.0)
 
-    def _remembered(self, track: Track) -> bool:
+    def _is_remembered(self, track: Track) -> bool:
         """Return whether a track is out of sight for a long time, so that it is assumed to stay."""
         return track.at_s - track.seen_s > self._params.forget_ms / 1e3
 
@@ -165,7 +165,7 @@ class Tracker:
 
     def _moved_m(self, track: Track) -> float:
         """Return the extra distance that a track may have from its expected position if unseen."""
-        if self._remembered(track):
+        if self._is_remembered(track):
             return 0.0
         return self._params.gate_speed_m_s * (track.at_s - track.seen_s)
 
@@ -195,10 +195,10 @@ class Tracker:
 
     def _update(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
         """Update a track with a detection."""
-        place = sized(track, detection, p_camera)
+        place = correct_distance(track, detection, p_camera)
         covered = _is_covered(track, detection)
         if covered:
-            place = _held(track, detection, place, p_camera)
+            place = _covered_position(track, detection, place, p_camera)
         else:
             track.covered, track.cover_share = 0, 1.0
             _learn_shape(track, detection)
@@ -221,7 +221,7 @@ class Tracker:
             if before is None:
                 track.R_world_face, track.face_length = R, detection.face_length
             else:
-                track.R_world_face = blended(before, R, self._params.turn_gain)
+                track.R_world_face = blend(before, R, self._params.turn_gain)
                 if not covered:
                     track.face_length += gain * (detection.face_length - track.face_length)
         self._learn_size(track, detection, gain)
@@ -250,7 +250,7 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
     return track.at_s - track.covered_s <= _COVERED_S
 
 
-def _held(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) -> Vec3:
+def _covered_position(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) -> Vec3:
     """Return the position of a covered face: at its last distance, corrected for its motion since.
 
     Half of the correction comes from its points and half from its box, whose error is opposite.
@@ -278,7 +278,7 @@ def _learn_shape(track: Track, found: LocalisedDetection) -> None:
         track.lower_var += gain * ((off / track.lower_face) ** 2 - track.lower_var)
 
 
-def _became_another(track: Track, renamed: set[int]) -> bool:
+def _is_another_now(track: Track, renamed: set[int]) -> bool:
     """Return whether the detector's number of a thing now belongs to a known thing."""
     return track.detection.kind == UNNAMED and track.detection.mark in renamed
 
@@ -299,7 +299,7 @@ def _sight(p_m: Vec3, p_camera: Vec3) -> tuple[float, float, float, float]:
     return x, y, z, range_m
 
 
-def sized(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
+def correct_distance(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
     """Return a detection's position with its distance corrected by the learned size of the face."""
     by_face = detection.R_world_face is not None
     if detection.depth_measured or track.depth_s is None or not by_face:
@@ -307,7 +307,7 @@ def sized(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
     return add(p_camera, scale(sub(detection.p_world_m, p_camera), track.face_size))
 
 
-def blended(A: Mat3, B: Mat3, share: float) -> Mat3:
+def blend(A: Mat3, B: Mat3, share: float) -> Mat3:
     """Return the rotation at a share of the path from A to B (columns blended, orthonormalised)."""
     x = unit(_column(A, B, 0, share))
     z = _column(A, B, 2, share)

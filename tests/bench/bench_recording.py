@@ -19,7 +19,7 @@ from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.session import leave
+from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
@@ -69,7 +69,7 @@ def jitter(path: Path, seconds: float) -> None:
             robot, clock, assembly.loop, lambda s: "seconds" if s >= seconds else None, watch
         )
     finally:
-        leave(assembly, count, print)
+        shut_down(assembly, count, print)
         print(recording.close("seconds"))
         assembly.close()
     print(f"overruns: {count.overruns} of {count.ticks} ticks")
@@ -98,7 +98,7 @@ def volume(path: Path, seconds: float) -> None:
     start_s = time.monotonic()
     stop = recording.timed(lambda s: "seconds" if s >= seconds else None)
     count = run(robot, assembly.clock, assembly.loop, stop, recording.record)
-    leave(assembly, count, lambda line: None)
+    shut_down(assembly, count, lambda line: None)
     print(recording.close("seconds", assembly.sent_digest()))
     print(f"recorded in {time.monotonic() - start_s:.1f} s")
     size = path.stat().st_size

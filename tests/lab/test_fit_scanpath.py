@@ -16,7 +16,7 @@ from gazerig.gaze.scanpath.scanpath import (
     ScanpathParams,
     Walk,
     markov_walk,
-    normalised,
+    normalise,
     row_sums_note,
 )
 from gazerig.gaze.types import PARTS
@@ -101,7 +101,7 @@ def test_labelled_fixations_of_a_known_walk_give_it_back(tmp_path: Path) -> None
     out = tmp_path / "mine.yaml"
     report = fit(labelled_csv(tmp_path / "looks.csv", 8000), None, out)
     walk = load(out, Walk)
-    wanted, found = normalised(WALK.matrix), normalised(walk.matrix)
+    wanted, found = normalise(WALK.matrix), normalise(walk.matrix)
     assert "8000 fixations on the face, 0 elsewhere, 7999 transitions" in report
     shares = {"DN": 0.0607, "FL": 0.0842, "LE": 0.0931, "M": 0.0999,
               "N": 0.2217, "FR": 0.0946, "RE": 0.2550, "UP": 0.0907}  # fmt: skip
@@ -124,7 +124,7 @@ def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) 
     out = tmp_path / "mine.yaml"
     report = fit(recording, boxes, out, "none")
     walk = load(out, Walk)
-    wanted, found = normalised(WALK.matrix), normalised(walk.matrix)
+    wanted, found = normalise(WALK.matrix), normalise(walk.matrix)
     for i, share in enumerate((0.0607, 0.0842, 0.0931, 0.0999, 0.2217, 0.0946, 0.2550, 0.0907)):
         n = 1000 * share * 0.85
         assert np.abs(found[i] - wanted[i]).max() < 4.0 * np.sqrt(0.25 / n), PARTS[i]

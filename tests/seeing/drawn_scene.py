@@ -14,7 +14,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
-from gazerig.robot.app.drawn_motion import MotionOfDrawn
+from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.perception import Perception
@@ -101,7 +101,7 @@ def frames(scene: Scene, start_s: float, end_s: float, depth: bool = False) -> I
     field = rig.camera.horizontal_field_deg
     drawn = PixelCameraParams(latency_ms=0.0, depth=depth, horizontal_field_deg=field)
     locate = FrameLocator(None, radians(field))
-    motion = MotionOfDrawn(rig.motion)
+    motion = SyntheticMotionDetector(rig.motion)
     camera = PixelCamera(drawn, later, mount, still, faces, rng, motion, locate)
     perception = Perception(mount, field, Tracker(rig.tracks))
     poses = PoseHistory(_Standing())  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from gazerig.features.world.gl_context import import_mujoco
 from gazerig.features.world.script import Act, LightParams, PersonScript, WorldScript
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.app.drawn_motion import MotionOfDrawn
+from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
@@ -296,7 +296,7 @@ def watch_motion(
     mount = CameraMount(CameraParams(position_mm=tuple(1e3 * one for one in CAMERA_M)))  # type: ignore[arg-type]
     camera = PixelCamera(
         PixelCameraParams(width_px=size_px[0], height_px=size_px[1], latency_ms=0.0), scene, mount, head, _NoFaces(),
-        np.random.default_rng(0), MotionOfDrawn(MotionParams()), view=view,
+        np.random.default_rng(0), SyntheticMotionDetector(MotionParams()), view=view,
     )  # fmt: skip
     hits = waving = beside = count = 0
     before: Floats | None = None

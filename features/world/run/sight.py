@@ -277,12 +277,12 @@ def world_camera(
         return WorldCamera(process, ideal, poses)
     if options.no_pictures:
         return ideal(poses.begin_s)
-    from gazerig.robot.app.drawn_motion import MotionOfDrawn
+    from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
 
     try:
         return world.pixels(
             lambda: poses.state, poses.head, own.find_faces(rig.detector), True,
-            MotionOfDrawn(rig.motion), locate, poses.begin_s,
+            SyntheticMotionDetector(rig.motion), locate, poses.begin_s,
         )  # fmt: skip
     except NoRenderer as error:
         say(no_pictures_message(error))
