@@ -21,6 +21,17 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
 
 
+def calibrate(*words: str) -> Invoked:
+    return invoked("calibrate", *words)
+
+
+def calibrated(*words: str) -> Invoked:
+    """Run a calibration that succeeds."""
+    done = calibrate(*words)
+    assert done.code == 0, done.err
+    return done
+
+
 @pytest.fixture
 def rigs(tmp_path: Path) -> dict[str, str]:
     """Return the paths of rigs of one's own by kind."""
@@ -47,8 +58,7 @@ def bus() -> Iterator[tuple[PtyBus, str]]:
 def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_path: Path) -> None:
     before = rig.read_text("utf-8")
     answers = answers_in(tmp_path, "turn -400", "", "turn 700", "", "turn -290", "", "y")
-    done = invoked("calibrate", str(rig), "--mock", "--joint", "left_eye_pan", "--answers", answers)
-    assert done.code == 0, done.err
+    done = calibrated(str(rig), "--mock", "--joint", "left_eye_pan", "--answers", answers)
     found = load_rig(str(rig)).joints["left_eye_pan"]
     # The emulated stops lie at 1604 and 2492, the hand starts at 2116.
     assert found.sign == -1 and found.zero_step == pytest.approx(2126, abs=12)
@@ -65,8 +75,7 @@ def test_by_motion_needs_no_answer_with_yes(rig: Path) -> None:
     near = {"joints.left_eye_tilt.min_deg": -2.0, "joints.left_eye_tilt.max_deg": 3.0}
     save_rig(rig, near, datetime(2026, 1, 1))
     words = ("--joint", "left_eye_tilt", "--by", "motion", "--margin", "1", "--yes", "--mock")
-    done = invoked("calibrate", str(rig), *words)
-    assert done.code == 0, done.err
+    done = calibrated(str(rig), *words)
     # The emulated stops lie 4 deg beyond the range: -6..7.
     found = load_rig(str(rig)).joints["left_eye_tilt"]
     assert found.max_deg == pytest.approx(5.5, abs=0.5) and found.sign == 1
@@ -78,7 +87,7 @@ def test_a_no_writes_nothing(rig: Path, tmp_path: Path) -> None:
     before = rig.read_bytes()
     answers = answers_in(tmp_path, "", "turn -400", "", "turn 200", "", "n")
     words = ("--joint", "left_eye_tilt", "--mock", "--answers", answers)
-    done = invoked("calibrate", str(rig), *words)
+    done = calibrate(str(rig), *words)
     assert done.code == 0 and "nothing written" in done.err
     assert rig.read_bytes() == before and not list(tmp_path.glob("*.bak-*"))
 
@@ -88,7 +97,7 @@ def test_what_makes_no_calibration_is_refused_and_the_rest_is_kept(
 ) -> None:
     answers = answers_in(tmp_path, "", "", "", "turn 300", "", "turn -600", "", "turn 300", "", "y")
     words = ("--joint", "left_eye_pan", "--joint", "neck_yaw", "--mock", "--answers", answers)
-    done = invoked("calibrate", str(rig), *words)
+    done = calibrate(str(rig), *words)
     assert done.code == 1
     assert "refused: left_eye_pan: only 0.0 deg are between the two ends" in done.err
     assert "not calibrated: left_eye_pan" in done.err
@@ -96,13 +105,12 @@ def test_what_makes_no_calibration_is_refused_and_the_rest_is_kept(
 
 
 def test_a_shipped_rig_is_copied_not_written(tmp_path: Path) -> None:
-    refused = invoked("calibrate", "desk", "--mock")
+    refused = calibrate("desk", "--mock")
     assert refused.code == 2 and "desk.yaml" in refused.err
     out = tmp_path / "copy.yaml"
     answers = answers_in(tmp_path, "turn 300", "", "turn -600", "", "turn 300", "")
     words = ("--joint", "neck_roll", "--answers", answers, "--yes", "--mock", "--out", str(out))
-    done = invoked("calibrate", "desk", *words)
-    assert done.code == 0, done.err
+    calibrated("desk", *words)
     assert load_rig(str(out)).joints["neck_roll"].max_deg > 10.0
 
 
@@ -113,8 +121,7 @@ def test_a_hobby_joint_is_steered_and_its_places_are_written(
     words = ("", "+10", "-10", "", "1600", "", "9", "-170", "", "-6", "", "", "y")
     answers = answers_in(tmp_path, *words)
     path = rigs["maker"]
-    done = invoked("calibrate", path, "--mock", "--joint", "eyes_pan", "--answers", answers)
-    assert done.code == 0, done.err
+    done = calibrated(path, "--mock", "--joint", "eyes_pan", "--answers", answers)
     joint = load_rig(path).joints["eyes_pan"]
     places = dict(joint.transmission_points)
     assert places[0.0] == 1500.0 and places[9.0] == 1600.0 and places[-6.0] == 1430.0
@@ -131,8 +138,7 @@ def test_a_lower_lid_s_ends_are_written_for_that_lid_alone(
     before = load_rig(rigs["maker"]).lid_joints
     answers = answers_in(tmp_path, "", "1480", "", "3", "1560", "", "-5", "", "y")
     words = ("--mock", "--joint", "right_lower_lid", "--more", "0", "--pulses", "1400:1600")
-    done = invoked("calibrate", rigs["maker"], *words, "--answers", answers)
-    assert done.code == 0, done.err
+    calibrated(rigs["maker"], *words, "--answers", answers)
     lids = load_rig(rigs["maker"]).lid_joints
     assert (lids.right_lower_shut_deg, lids.right_lower_open_deg) == (-5.0, 3.0)
     assert lids.left_lower_shut_deg == before.left_lower_shut_deg
@@ -141,10 +147,7 @@ def test_a_lower_lid_s_ends_are_written_for_that_lid_alone(
 
 def test_an_sts_joint_is_calibrated_by_hand(rigs: dict[str, str], tmp_path: Path) -> None:
     answers = answers_in(tmp_path, "turn -150", "", "turn 330", "", "turn -160", "", "y")
-    done = invoked(
-        "calibrate", rigs["feetech"], "--mock", "--joint", "neck_roll", "--answers", answers
-    )
-    assert done.code == 0, done.err
+    calibrated(rigs["feetech"], "--mock", "--joint", "neck_roll", "--answers", answers)
     joint = load_rig(rigs["feetech"]).joints["neck_roll"]
     assert joint.sign == -1 and joint.zero_step == pytest.approx(2068, abs=8)
 
@@ -158,8 +161,7 @@ def test_an_sts_joint_is_calibrated_by_motion(rigs: dict[str, str]) -> None:
     )
     path.write_text(narrow, encoding="utf-8")
     words = ("--mock", "--joint", "neck_roll", "--by", "motion", "--yes", "--margin", "1")
-    done = invoked("calibrate", str(path), *words)
-    assert done.code == 0, done.err
+    done = calibrated(str(path), *words)
     # The emulated stops lie 4 deg beyond the range: -7..8.
     joint = load_rig(str(path)).joints["neck_roll"]
     assert joint.sign == 1 and joint.max_deg == pytest.approx(6.5, abs=0.7)
@@ -169,9 +171,8 @@ def test_an_sts_joint_is_calibrated_by_motion(rigs: dict[str, str]) -> None:
 def test_the_middle_of_an_sts_servo_can_be_set(rigs: dict[str, str], tmp_path: Path) -> None:
     words = ("turn 60", "", "turn 150", "", "turn -320", "", "turn 170", "", "n")
     answers = answers_in(tmp_path, *words)
-    done = invoked("calibrate", rigs["feetech"], "--mock", "--joint", "neck_roll", "--set-middle",
+    done = calibrated(rigs["feetech"], "--mock", "--joint", "neck_roll", "--set-middle",
                "--answers", answers)  # fmt: skip
-    assert done.code == 0, done.err
     assert re.search(r"its place is 2048 now \(offset -?\d+\)", done.err)
 
 
@@ -184,8 +185,7 @@ def test_joints_of_several_buses_are_calibrated_in_one_go(
     answers = answers_in(tmp_path, *hobby, *yaw, *pitch, "y")
     words = ["--joint", "eyes_tilt", "--joint", "neck_yaw", "--joint", "neck_pitch", "--more", "0"]
     words += ["--margin", "1", "--mock", "--answers", answers]
-    done = invoked("calibrate", rigs["mixed"], *words)
-    assert done.code == 0, done.err
+    calibrated(rigs["mixed"], *words)
     joints = load_rig(rigs["mixed"]).joints
     assert len(joints["eyes_tilt"].transmission_points) == 3
     assert joints["neck_yaw"].zero_step is not None and joints["neck_pitch"].sign == -1
@@ -197,7 +197,7 @@ def test_places_on_several_lines_are_refused_before_anything_moves(rigs: dict[st
     line = next(line for line in text.splitlines() if "[-24, 1801]" in line)
     spread = "    transmission_points:\n      - [-24, 1801]\n      - [0, 1510]\n      - [24, 1188]"
     path.write_text(text.replace(line, spread), encoding="utf-8")
-    done = invoked("calibrate", str(path), "--mock", "--joint", "eyes_tilt")
+    done = calibrate(str(path), "--mock", "--joint", "eyes_tilt")
     assert done.code == 2 and "spread over several lines" in done.err
     assert "gets no pulses" not in done.err
 
@@ -225,7 +225,7 @@ def test_what_cannot_be_is_said(
 ) -> None:
     before = Path(rigs[kind]).read_bytes()
     words = tuple(answers_in(tmp_path) if word == "EMPTY" else word for word in words)
-    done = invoked("calibrate", rigs[kind], "--mock", *words)
+    done = calibrate(rigs[kind], "--mock", *words)
     assert done.code == 2 and says in done.err, done.err
     assert Path(rigs[kind]).read_bytes() == before
 
@@ -272,10 +272,6 @@ def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(
 
 
 # --- what is under calibrate, in every spelling
-
-
-def calibrate(*words: str) -> Invoked:
-    return invoked("calibrate", *words)
 
 
 def test_help_lists_all() -> None:
@@ -341,8 +337,7 @@ def test_a_rig_file_named_like_a_command_has_a_path(
 @pytest.mark.parametrize("name", ["board.pdf", "board.png"])
 def test_the_board_is_written(name: str, tmp_path: Path) -> None:
     out = tmp_path / name
-    done = calibrate("board", str(out), "--paper", "letter")
-    assert done.code == 0, done.err
+    done = calibrated("board", str(out), "--paper", "letter")
     assert out.stat().st_size > 4000
     assert "print it at 100 % on letter" in done.out + done.err
 
@@ -354,8 +349,7 @@ def test_a_board_too_large_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_simulated_lens_is_measured_and_shown() -> None:
-    done = calibrate("camera", "--mock", "--what", "lens", "--dry-run")
-    assert done.code == 0, done.err
+    done = calibrated("camera", "--mock", "--what", "lens", "--dry-run")
     assert "camera.lens.fx_px" in done.out + done.err
     assert "reprojection error 0." in done.out + done.err
 

@@ -6,7 +6,6 @@ keeps the old ones, so switching it off and on restores them after a killed prog
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.drivers.errors import BusLost, DriverError, ServoFault, ServoMissing, SetupError
@@ -28,14 +27,6 @@ WATCHDOG_S = 0.3
 """Three readings that were lost in a row must not let it trip."""
 
 LIMITS = ("min_position_limit", "max_position_limit")
-
-
-class ServoCheck(NamedTuple):
-    """Values of a servo before it is calibrated; limits are those of its goals."""
-
-    firmware: int
-    limits: tuple[int, int]
-    homing_offset: int
 
 
 class SingleServo:
@@ -87,7 +78,7 @@ class SingleServo:
         self._guardian = guardian
         self._was: dict[str, int] = {}
 
-    def check(self) -> ServoCheck:
+    def check(self) -> None:
         """Check that it is the right servo, sound, and in position mode.
 
         Raises:
@@ -112,7 +103,6 @@ class SingleServo:
                 remedy = f"find the cause, then gazerig reboot {self._id}"
             names = " and ".join(self._family.name_errors(status))
             raise ServoFault(f"{self.who}: {names}: {remedy}")
-        low, high = (value(name) for name in LIMITS)
         for setting in driving.settings:
             now = value(setting.register)
             if now != setting.of(now):
@@ -127,7 +117,6 @@ class SingleServo:
                 "firmware loses by a whole turn as the torque comes on: set it to 0 "
                 "(--clear-offset), the calibration makes up for it"
             )
-        return ServoCheck(found.firmware, (low, high), offset)
 
     def clear_offset(self) -> int:
         """Set the offset of its position to 0, torque off; return what it was."""
