@@ -180,7 +180,7 @@ def test_save_takes_a_path_from_the_folder_it_is_typed_in(
         # The copy is the rig's file from now on: it is the one that is watched.
         text = other.read_text(encoding="utf-8")
         other.write_text(text.replace("rate_hz: 150", "rate_hz: 160"), encoding="utf-8")
-        assert rig.hears("other.yaml was edited: read again"), rig.log.read_text()
+        assert rig.hears("other.yaml was edited: its values are applied"), rig.log.read_text()
         assert held(RATE) == 160.0
 
 
@@ -287,7 +287,7 @@ def test_a_rig_that_has_just_begun_or_is_held_up_says_so() -> None:
 def test_a_file_edited_by_hand_is_read_again(rig: Running) -> None:
     before = rig.path.read_text(encoding="utf-8")
     rig.path.write_text(before.replace("rate_hz: 200", "rate_hz: 160"), encoding="utf-8")
-    assert rig.hears("my.yaml was edited: read again, in force")
+    assert rig.hears("my.yaml was edited: its values are applied")
     assert held(RATE) == 160.0
     wrong = before.replace("rate_hz: 200.0", "rate_hz: 2e6") + "nonsense: 1\n"
     rig.path.write_text(wrong, encoding="utf-8")

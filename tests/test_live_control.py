@@ -99,7 +99,7 @@ def test_it_listens_and_says_nothing_while_all_is_well(rig: Rig) -> None:
 
 def test_an_edited_file_is_read_again_and_what_changed_is_said(rig: Rig) -> None:
     assert rig.written("second\n") == (
-        f"{rig.path} was edited: read again, in force\ntext = second"
+        f"{rig.path} was edited: its values are applied\ntext = second"
     )
     assert rig.tuning.text == "second\n"
 
@@ -110,7 +110,7 @@ def test_a_wrong_file_is_refused_with_every_fault_and_the_next_good_one_taken(ri
     assert said[0] == f"{rig.path} changed and is refused; the values from before stay:"
     assert [line.rpartition(": ")[2] for line in said[1:]] == ["a is above 1", "unknown key"]
     assert rig.tuning.text == "second\n"
-    assert "in force" in rig.written("third\n")
+    assert "values are applied" in rig.written("third\n")
 
 
 def test_a_file_that_went_away_is_said_and_the_values_stay(rig: Rig) -> None:
@@ -124,13 +124,13 @@ def test_a_file_that_went_away_is_said_and_the_values_stay(rig: Rig) -> None:
 
 def test_a_file_that_says_what_is_in_force_is_no_change(rig: Rig) -> None:
     rig.tuning.text = "second\n"
-    assert "in force already" in rig.written("second\n")
+    assert "without changes" in rig.written("second\n")
 
 
 def test_files_that_cannot_be_named_for_once_are_those_from_before(rig: Rig) -> None:
     rig.tuning.lost = True
     rig.tuning.version += 1
-    assert "in force" in rig.written("second\n")
+    assert "values are applied" in rig.written("second\n")
 
 
 def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
@@ -139,7 +139,7 @@ def test_without_a_socket_it_says_so_and_watches_the_file(folder: Path) -> None:
     rig.live.open()
     try:
         assert rig.said[0].startswith("gazerig ctl set and stop will not find this rig: ")
-        assert "in force" in rig.written("second\n")
+        assert "values are applied" in rig.written("second\n")
     finally:
         rig.live.close()
 

@@ -111,7 +111,7 @@ def test_the_file_edited_by_hand_is_taken_or_refused_whole(run: Run) -> None:
         assert "above 1000" in run.words() and "x: unknown" in run.words()
         assert rig.get(RATE)[RATE] == 150.0
         run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 160.0"))
-        assert run.hears("read again, in force")
+        assert run.hears("its values are applied")
         assert rig.get(RATE)[RATE] == 160.0
         ticks = rig.status()["ticks"]
         time.sleep(0.1)

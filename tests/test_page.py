@@ -184,7 +184,7 @@ def test_page_shows_a_head_that_turns() -> None:
         wait_for(lambda: reads("STOP"), "the page")
         browser.run(f"document.querySelector('#view').src = '/view/?{CLOSE_TO_THE_RIG}'")
         Person(browser).open("Watch")
-        wait_for(lambda: reads("nothing has come from the rig"), "the silence")
+        wait_for(lambda: reads("the rig has sent nothing"), "the silence")
         shown = "document.querySelector('[data-panel=camera] img').naturalWidth"
         camera = browser.ask("Runtime.evaluate", expression=shown)["result"]
         assert camera.get("value") == PICTURE.shape[1]

@@ -205,7 +205,7 @@ def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
     near.takes = False
     try:
         status, _, text = near.post(b"{}")
-        assert status == 503 and "takes nothing" in text
+        assert status == 503 and "accepts no requests" in text
     finally:
         near.takes = True
 

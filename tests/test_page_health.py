@@ -123,7 +123,7 @@ def test_faults_and_silence_are_said_beside_the_joint() -> None:
     assert "left eye tilt<div class='fault'>" in table and "overload &lt;1&gt;" in table
     assert "right eye pan<div class='fault'>" in table and "silent for 1.2 s" in table
     assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9), GAZE_JOINTS)
-    assert "nothing is known" in servo_table(Servos(), ())
+    assert "no data of the servos" in servo_table(Servos(), ())
 
 
 def test_what_was_not_measured_is_a_dash_and_no_zero() -> None:
@@ -227,7 +227,7 @@ def test_panel_takes_snapshots_and_fills_its_tabs(
     again = words_of(widgets)
     assert "51 saccades" not in again and "1 saccade<" in again
     panel.silent()
-    assert "nothing has come from the rig" in panel.silence.content
+    assert "the rig has sent nothing" in panel.silence.content
     panel.update((made(snapshot(0.1)),))
     assert panel.silence.content == ""
 

@@ -154,7 +154,7 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
     clock, beat_s = RealClock(), -inf
     while True:
         if not door.is_open():
-            raise RuntimeError("the page's door has closed by itself")
+            raise RuntimeError("the page's door has closed")
         if clock.now_s() >= beat_s:
             # Started here and sent by the door's thread, so both are alive.
             beat_s = clock.now_s() + _BEAT_S

@@ -235,7 +235,7 @@ class RobotClient:
             raise NoRobotError(f"{which}: {there or 'start one with gazerig run ...'}")
         names = _names(running())
         raise NoRobotError(
-            f"{len(found)} rigs are running: {names}; say which with --pid (pid=...)"
+            f"{len(found)} rigs are running: {names}; choose one with --pid (pid=...)"
         )
 
     def __enter__(self) -> "RobotClient":
@@ -467,7 +467,7 @@ class RobotClient:
         if heartbeat is not None:
             heartbeat.end()
 
-    def stop(self, why: str = "asked for from another program") -> None:
+    def stop(self, why: str = "requested by another program") -> None:
         """Switch the torque off immediately; when this returns, the loop has done it.
 
         Raises:

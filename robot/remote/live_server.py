@@ -110,9 +110,9 @@ class LiveServer:
             return
         lines = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
         if lines:
-            self._say("\n".join([f"{path} was edited: read again, in force", *lines]))
+            self._say("\n".join([f"{path} was edited: its values are applied", *lines]))
         else:
-            self._say(f"{path} was written again: all it says is in force already")
+            self._say(f"{path} was written again without changes")
 
 
 _FIXED = "it is being calibrated: its parameters stay as they are until that is over"
@@ -170,7 +170,7 @@ class _OnlyStops:
             ValueError: it is another command.
         """
         if not isinstance(command, Stop | Resume):
-            raise ValueError("it is being calibrated: besides stop and resume nothing goes")
+            raise ValueError("it is being calibrated: only stop and resume are accepted")
         return self._command(command)
 
     def menus(self) -> dict[str, tuple[str, ...]]:

@@ -263,7 +263,7 @@ class AuthProxy:
     async def _handle(self, asked: dict[str, object] | None, who: str) -> tuple[int, str]:
         """Send a browser's request to the rig; return an HTTP status and the refusal."""
         if asked is None:
-            return 400, "not a JSON object that can be asked for"
+            return 400, "not a valid JSON request"
         if asked.get("do") == "stop":
             try:
                 text = await self._stop.send(f"{asked.get('why', '')!s:.100} ({who})", who)
@@ -274,7 +274,7 @@ class AuthProxy:
             return 429, "too many requests; try again"
         if leads(asked):
             self.browsers.led_by(who)
-        return (204, "") if self._ask(compact(asked)) else (503, "the rig takes nothing now")
+        return (204, "") if self._ask(compact(asked)) else (503, "the rig accepts no requests now")
 
     async def _handle_line(self, request: web.Request) -> web.StreamResponse:
         """Send the state whenever it changes, with heartbeats in between; receive stops.
@@ -385,4 +385,4 @@ class AuthProxy:
         return await self._view.get(request)
 
     async def _nothing(self, request: web.Request) -> web.Response:
-        return web.Response(status=404, text="there is nothing at this address\n", headers=_HEADERS)
+        return web.Response(status=404, text="there is no page at this address\n", headers=_HEADERS)

@@ -76,7 +76,7 @@ def _present_choices(snapshot: Snapshot) -> str:
 
 def _salience_rows(rows: tuple[Salience, ...]) -> str:
     if not rows:
-        return note("nothing is salient: the gaze wanders by itself")
+        return note("nothing is salient: the gaze wanders")
     full = max(_LEAST_FULL, *(_sum(one) for one in rows), rows[0].total)
     bars = "".join(_row(one, full, winner=row == 0) for row, one in enumerate(rows))
     keys = "".join(

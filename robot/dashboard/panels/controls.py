@@ -100,7 +100,7 @@ class LeadPanel:
             order=1,
         )
         self.drag = place.checkbox(_DRAG, value=False, order=2)
-        self.free = place.buttons("", (_FREE,), hint="let go of gaze and joints", order=3)
+        self.free = place.buttons("", (_FREE,), hint="release gaze and joints", order=3)
         self._gizmo = scene.add_transform_controls(
             "/led",
             scale=_TARGET_SCALE,

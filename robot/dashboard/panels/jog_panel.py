@@ -18,7 +18,7 @@ _FOLLOWS_DEG = 0.15
 _FREE_AFTER_S = 0.5
 """Time after which a joint with another desired angle counts as no longer jogged, s."""
 _SAME_DEG = 0.3
-ESTIMATED = "estimated from what was asked for, not measured: the servos tell nothing"
+ESTIMATED = "estimated from the goals, not measured: the servos give no feedback"
 
 
 class JogPanel:
@@ -37,8 +37,8 @@ class JogPanel:
         self._now_s = 0.0
         place.html(
             note(
-                "This moves the joint of the real head: slowly, inside the guard's limits. All "
-                'others are held where they are until you let go with "look freely".'
+                "This moves the joint of the real head slowly, within the guard's limits. All "
+                'others hold their angles until you press "look freely".'
             ),
             order=0,
         )

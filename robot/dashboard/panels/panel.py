@@ -55,7 +55,7 @@ class PanelView:
         self.saccades = statistics.html(order=2)
         self.dwells = statistics.html(order=3)
         heat = watch.section("heat map on the face", is_open=False, order=6)
-        heat.html(note("where on the face the gaze has been; yellow is where it was longest"))
+        heat.html(note("gaze points on the face; yellow has the longest time"))
         self.map = heat.image("heat map: where on a face the gaze has been")
         self.view = watch.section("view", is_open=False, order=7)
         self.layers = self._add_layers(self.view)

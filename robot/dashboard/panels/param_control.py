@@ -27,7 +27,7 @@ def hint(param: Parameter) -> str:
         parts.append("one of " + ", ".join(map(str, param.choices)))
     if param.default is not None or param.optional:  # the shipped rig may have no such joint or bus
         parts.append(f"default {format_value(param, param.default)}{unit}")
-    parts.append(f"in force at the {param.live}")
+    parts.append(f"takes effect at the {param.live}")
     return "; ".join(parts)
 
 

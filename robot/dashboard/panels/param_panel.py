@@ -21,7 +21,7 @@ SAVE, REVERT = "save", "revert to the file"
 NOTHING, UNSAVED, DIFFERENT = "choose a group ...", "what is not saved", "what differs from default"
 
 _OF_TUNING = ":tuning"
-_NO_TAKER = "the rig takes nothing now"
+_NO_TAKER = "the rig accepts no requests now"
 _SAVE: dict[str, object] = {"do": "save", "path": None}
 _REVERT: dict[str, object] = {"do": "revert"}
 
@@ -124,7 +124,7 @@ class ParamPanel:
         self._group = place.choice("group", (NOTHING,), order=2)
         self._found = place.section("parameters", order=3)
         self._rest = place.html(order=4)
-        self._words = place.html(note("nothing to tune has been named yet"), order=0)
+        self._words = place.html(note("no parameters have been received yet"), order=0)
         self._buttons = place.buttons("", (SAVE, REVERT), order=0.5)
         self._file = place.text(
             "save as", on="enter", hint="a new .yaml file in the rig's folder; Enter saves", order=5

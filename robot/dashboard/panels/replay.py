@@ -44,7 +44,7 @@ class ReplayView:
         speeds = tuple(_speed_name(speed) for speed in SPEEDS)
         self.speed = place.choice("speed", speeds, _speed_name(1.0), order=5)
         self.steps = {
-            way: place.buttons(way, MARK_KINDS, hint=f"stand still at the {way} one", order=6)
+            way: place.buttons(way, MARK_KINDS, hint=f"pause at the {way} one", order=6)
             for way in ("previous", "next")
         }
         self.events = place.section("events", order=7).html()

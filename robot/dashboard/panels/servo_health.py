@@ -58,18 +58,18 @@ def servo_table(servos: Servos, joints: tuple[str, ...], estimated: tuple[str, .
     estimated: joints whose servos report nothing
     """
     if not servos.age_s:
-        return note("nothing is known of the servos yet")
+        return note("no data of the servos yet")
     names = ("joint", "&deg;C", "load", "V", "silent")
     head = "".join(f"<th scope='col'>{name}</th>" for name in names)
     rows = "".join(_row(servos, i, name, name in estimated) for i, name in enumerate(joints))
     explained = (
-        "amber: the guard slows the joint down; red: it stands still, or the servo is silent or "
+        "amber: the guard slows the joint down; red: the joint is stopped, or the servo is silent or "
         "at fault. silent: ticks without an answer"
     )
     if estimated:
         explained += (
-            f". {NO_FEEDBACK}: the servo tells nothing, neither where it is nor how it does; a "
-            "joint that jams or a rod that came off is not noticed"
+            f". {NO_FEEDBACK}: the servo reports neither position nor load; a joint that "
+            "jams or a rod that came off is not noticed"
         )
     return (
         f"<div class='scroll'><table><thead><tr>{head}</tr></thead>"

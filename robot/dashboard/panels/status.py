@@ -8,7 +8,7 @@ from gazerig.robot.model.types import Snapshot
 _REASONS_SHOWN = 4
 _STANDS_STILL = {
     "hold": "guard: hold - joints are held where they are",
-    "torque_off": "guard: torque off - joints are let go",
+    "torque_off": "guard: torque off - joints are released",
 }
 OLD_FRAME_S = 0.5
 """Age from which a frame is old, s; the guard stops the neck at three times that."""
@@ -37,10 +37,7 @@ def other_heads(snapshot: Snapshot) -> str:
 
 def silence() -> str:
     """Return a message that the rig sends no data."""
-    return note(
-        "silent: nothing has come from the rig for a second; what is shown is the last that was "
-        "seen"
-    )
+    return note("silent: the rig has sent nothing for a second; the page shows the last data")
 
 
 def group_reasons(reasons: tuple[str, ...]) -> str:

@@ -90,7 +90,7 @@ class PageRequestHandler:
                 return None
             case {"replay": dict(asked)} if self._replay is not None:
                 return self._replay(asked)
-        raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} cannot be asked for here")
+        raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} is not available here")
 
     def _outcome_text(
         self, verb: str, outcome: RequestResult, data: Mapping[str, object]

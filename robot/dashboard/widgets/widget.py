@@ -78,7 +78,7 @@ class Widget:
         Raises:
             ValueError: the input is not valid; the message describes valid input.
         """
-        raise ValueError("nothing can be set there")
+        raise ValueError("it has no value to set")
 
 
 class Html(Widget):
