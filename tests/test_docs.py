@@ -34,7 +34,7 @@ design = pytest.importorskip("gazerig.features.study.design")
 questionnaire = pytest.importorskip("gazerig.features.study.questionnaire")
 HOME = pytest.importorskip("gazerig.features.study.shipped").HOME
 script = pytest.importorskip("gazerig.features.world.script")
-WORLDS = pytest.importorskip("gazerig.features.world").HOME
+WORLDS = script.HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
 

@@ -8,8 +8,3 @@ room, the model for MuJoCo and its physics, the renderer, and the server's part 
 (world_spec.py, serve.py, served_world.py, state_file.py); run/: a run in it, its camera, several
 heads, the world of a recording; worlds/: the shipped YAML files.
 """
-
-from pathlib import Path
-
-HOME = Path(__file__).parent
-"""The folder with ``worlds``."""

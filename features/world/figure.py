@@ -95,14 +95,10 @@ class Figures:
         return found
 
 
-def times(round_s: float) -> Floats:
-    """Return the times of a round's rows, the last at its end or just after."""
-    return np.arange(int(np.ceil(round_s * RATE_HZ)) + 2) / RATE_HZ
-
-
 def _round(figures: Figures) -> Floats:
     script = figures.script
-    t_s = times(script.round_s)
+    # The last row is at the end of the round or just after.
+    t_s = np.arange(int(np.ceil(script.round_s * RATE_HZ)) + 2) / RATE_HZ
     bodies = [
         BodyMotion(script, figures.timelines, name, body, t_s, figures.seed)
         for name, body in figures.measures.items()

@@ -51,13 +51,6 @@ class Base(NamedTuple):
     feet_rad: Floats
 
 
-class _SteppingTime(NamedTuple):
-    """A time within which the feet step."""
-
-    start_s: float
-    end_s: float
-
-
 class _Path:
     """The path of the hips, filled act by act."""
 
@@ -70,7 +63,7 @@ class _Path:
         sitting = start.seat_m is not None
         self.seated = np.full(rows, 1.0 if sitting else 0.0)
         self.seat_m = np.full(rows, start.seat_m if start.seat_m is not None else 0.0)
-        self.stretches: list[_SteppingTime] = []
+        self.stretches: list[tuple[float, float]] = []  # begin and end of steps, s
 
     def add(self, one: TimedAct) -> None:
         """Add an act that moves hips or feet."""
@@ -101,7 +94,7 @@ class _Path:
         self.at = Place(x, y, facing)
         self.way[rows] = self.way[rows] + share[rows, None] * ((x, y) - self.way[rows])
         self.heading[rows] += share[rows] * (facing - self.heading[rows])
-        self.stretches.append(_SteppingTime(start_s, end_s))
+        self.stretches.append((start_s, end_s))
 
     def _walk(self, target: Place, via: Sequence[Place], start_s: float, end_s: float) -> None:
         points = way_points(self.at, target, via, (float(self.way[-1][0]), float(self.way[-1][1])))
@@ -127,7 +120,7 @@ class _Path:
         facing = _nearest(target.facing_rad, float(tangents[-1]))
         self.heading[self.t_s >= arrive_s] = facing
         self.at = target
-        self.stretches.append(_SteppingTime(start_s, end_s))
+        self.stretches.append((start_s, end_s))
 
 
 def base_motion(
@@ -154,8 +147,8 @@ def base_motion(
     way = smooth(path.way, round(_PATH_S * RATE_HZ))
     heading = smooth(path.heading, round(_HEADING_S * RATE_HZ))
     feet = _Feet(t_s, way, heading, body, boxes)
-    for stretch in path.stretches:
-        feet.step(stretch)
+    for start_s, end_s in path.stretches:
+        feet.step(start_s, end_s)
     back = SEAT_AHEAD_M * path.seated[:, None]
     hips = way - back * np.stack((np.cos(heading), np.sin(heading)), axis=1)
     return Base(hips, heading, path.seated, path.seat_m, feet.p_m, feet.yaw_rad)
@@ -175,20 +168,20 @@ class _Feet:
             place, yaw = self._home(foot, 0)
             self.p_m[:, foot, :2], self.yaw_rad[:, foot] = place, yaw
 
-    def step(self, stretch: _SteppingTime) -> None:
+    def step(self, start_s: float, end_s: float) -> None:
         """Move the feet after the hips within a stretch, the outer one first."""
         last = len(self.t_s) - 1
-        begin, end = (min(last, round(s * RATE_HZ)) for s in stretch)
+        begin, end = (min(last, round(s * RATE_HZ)) for s in (start_s, end_s))
         turn = self.heading[end] - self.heading[begin]
         across = self._home(0, end)[0] - self.p_m[begin, 0, :2]
         aside = across @ (-np.sin(self.heading[begin]), np.cos(self.heading[begin]))
         first = 0 if turn + 2.0 * aside > 0.0 else 1
-        count = max(2, ceil((stretch.end_s - stretch.start_s) / _STRIDE_S))
-        each_s = (stretch.end_s - stretch.start_s) / count
+        count = max(2, ceil((end_s - start_s) / _STRIDE_S))
+        each_s = (end_s - start_s) / count
         for k in range(count):
             foot = (first + k) % 2
-            lift_s = stretch.start_s + k * each_s
-            middle_s = lift_s + _MIDDLE * each_s if k < count - 2 else stretch.end_s + 0.6
+            lift_s = start_s + k * each_s
+            middle_s = lift_s + _MIDDLE * each_s if k < count - 2 else end_s + 0.6
             self._move(foot, lift_s, each_s * _SWING_SHARE, min(last, round(middle_s * RATE_HZ)))
 
     def _move(self, foot: int, lift_s: float, swing_s: float, row: int) -> None:

@@ -61,7 +61,10 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
                 continue
         _chosen = backend
         return backend, context, made
-    raise NoRenderer(_message(why))
+    tried = "; ".join(f"{backend}: {reason}" for backend, reason in why.items())
+    packages = " or ".join(_PACKAGES[backend] for backend in why if backend != "glfw")
+    cure = f"apt install {packages}" if packages else _PACKAGES["glfw"]
+    raise NoRenderer(f"no pictures of a world: nothing here can render ({tried}); cure: {cure}")
 
 
 def render_in_calling_thread() -> None:
@@ -147,10 +150,3 @@ def _line(error: Exception) -> str:
         return "its library is not here"  # PyOpenGL's own message names neither
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else f"{text[:157]}..."
-
-
-def _message(why: dict[Backend, str]) -> str:
-    tried = "; ".join(f"{backend}: {reason}" for backend, reason in why.items())
-    packages = " or ".join(_PACKAGES[backend] for backend in why if backend != "glfw")
-    cure = f"apt install {packages}" if packages else _PACKAGES["glfw"]
-    return f"no pictures of a world: nothing here can render ({tried}); cure: {cure}"

@@ -1,10 +1,9 @@
 """A world's people and its other heads, in the frame of one of its heads."""
 
 from collections.abc import Callable, Sequence
-from math import atan2, hypot
 from typing import NamedTuple
 
-from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub
+from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub, yaw_pitch
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing
 
@@ -63,12 +62,12 @@ class HeadsScene:
             ahead = rotate(rotation((yaw, pitch, 0.0)), (1.0, 0.0, 0.0))
             hand = None if person.hand is None else own.point(person.hand)
             found.append(
-                ScenePerson(own.point(person.p_world_face_m), _angles(own.way(ahead)), hand)
+                ScenePerson(own.point(person.p_world_face_m), yaw_pitch(own.way(ahead)), hand)
             )
         for face in self._faces:
             R, nose_m = face()
             ahead = rotate(R, (1.0, 0.0, 0.0))
-            found.append(ScenePerson(own.point(nose_m), _angles(own.way(ahead)), None))
+            found.append(ScenePerson(own.point(nose_m), yaw_pitch(own.way(ahead)), None))
         return tuple(found)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
@@ -79,8 +78,3 @@ class HeadsScene:
     def events(self) -> tuple[Event, ...]:
         """Return the events before the first head; nothing is expected of the other heads."""
         return self._scene.events() if self._first else ()
-
-
-def _angles(ahead: Vec3) -> tuple[float, float]:
-    x, y, z = ahead
-    return atan2(y, x), atan2(z, hypot(x, y))

@@ -146,7 +146,9 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
         names = [rig.prefix + name for name in rig.stops_rad]
         missing = [name for name in names if spec.joint(name) is None]
         if not missing:
-            _free_joints(spec, names)
+            for actuator in tuple(spec.actuators):  # servos turn these joints instead
+                if actuator.target in names:
+                    spec.delete(actuator)
             return rig.prefix
         if len(missing) < len(names):
             raise SetupError(
@@ -166,13 +168,6 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
     where = {"site": frame} if isinstance(frame, mujoco.MjsSite) else {"frame": frame}
     spec.attach(head, prefix=rig.prefix or FIRST, **where)
     return rig.prefix or FIRST
-
-
-def _free_joints(spec: Any, joints: Sequence[str]) -> None:
-    """Remove the actuators of a user's head at joints that servos turn."""
-    for actuator in tuple(spec.actuators):
-        if actuator.target in joints:
-            spec.delete(actuator)
 
 
 def _mount(spec: Any, rig: RigInWorld, path: Path) -> Any:

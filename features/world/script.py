@@ -8,9 +8,13 @@ Place frame: the world's, with the neck base of the (first) head as its origin, 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from gazerig.params import Bounds
+
+HOME = Path(__file__).parent
+"""The folder with ``worlds``, the shipped scripts."""
 
 
 @dataclass(frozen=True)

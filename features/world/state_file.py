@@ -40,7 +40,11 @@ class StateWriter:
     """
 
     def __init__(self, path: Path, size: int) -> None:
-        self._numbers = _mapped(path, size)
+        with path.open("xb+") as file:
+            file.truncate(8 * (_HEADER + 2 * (size + 2)))
+            whole = mmap.mmap(file.fileno(), 0)
+        self._numbers: Floats = np.frombuffer(whole, np.float64)
+        self._numbers[1] = size
         self._rows = self._numbers[_HEADER:].reshape(2, size + 2)
         self._count = 0
 
@@ -88,14 +92,3 @@ class StateReader:
             if self.count <= count:
                 return HostState(float(row[0]), float(row[1]), row[2:])
         return None
-
-
-def _mapped(path: Path, size: int) -> Floats:
-    """Return the numbers of a new file for states of ``size`` coordinates."""
-    length = _HEADER + 2 * (size + 2)
-    with path.open("xb+") as file:
-        file.truncate(8 * length)
-        whole = mmap.mmap(file.fileno(), 0)
-    numbers: Floats = np.frombuffer(whole, np.float64)
-    numbers[1] = size
-    return numbers

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from math import atan2, hypot
+from math import atan2
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from gazerig.features.world.figure import SIDES, Figures
 from gazerig.features.world.motions import FIST_M, OUT_S
 from gazerig.features.world.rotations import rotation_matrix
 from gazerig.features.world.timeline import HEAD_M, TimedAct
+from gazerig.gaze.angles import yaw_pitch
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.sim_mock.scenes.boxing import HALF_FIELD_RAD
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
@@ -158,13 +159,12 @@ class WorldScene:
 
     def _person(self, name: str, t_s: float) -> ScenePerson:
         R = self._R(f"{name}/head", t_s)
-        x, y, z = R[:, 0].tolist()
         nose = self._nose(name, t_s)
         hand = None
         if not self.figures.script.people[name].gloves:
             hands = (self._hand(name, side, t_s) for side in SIDES)
             hand = next((one for one in hands if one[2] > nose[2] - _RAISED_M), None)
-        return ScenePerson(nose, (atan2(y, x), atan2(z, hypot(x, y))), hand)
+        return ScenePerson(nose, yaw_pitch(_vec(R[:, 0])), hand)
 
     def _spin(self, segment: str, middle: Vec3, t_s: float) -> float:
         """Return the rotation rate about the line of sight, clockwise as seen from the robot."""

@@ -41,9 +41,14 @@ from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view  # noq
 from gazerig.drivers.types import FaceDetector  # noqa: E402
 from gazerig.drivers.vision.face.detector import face_detector  # noqa: E402
 from gazerig.drivers.vision.face.params import FaceDetectorParams  # noqa: E402
-from gazerig.features.world import HOME  # noqa: E402
 from gazerig.features.world.figure import Figures  # noqa: E402
-from gazerig.features.world.script import Act, PersonScript, PlaceScript, WorldScript  # noqa: E402
+from gazerig.features.world.script import (  # noqa: E402
+    HOME,  # noqa: E402
+    Act,
+    PersonScript,
+    PlaceScript,
+    WorldScript,
+)
 from gazerig.features.world.world_scene import WorldScene  # noqa: E402
 from gazerig.gaze.angles import compose, rotation  # noqa: E402
 from gazerig.gaze.types import Mat3  # noqa: E402

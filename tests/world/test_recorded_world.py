@@ -12,11 +12,10 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 from gazerig.config.load import load, shipped, shipped_names
 from gazerig.config.text import params_text
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world import HOME
 from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.run.head_group import compose_group
 from gazerig.features.world.run.recorded_world import recorded_shapes, world_info
-from gazerig.features.world.script import WorldScript
+from gazerig.features.world.script import HOME, WorldScript
 from gazerig.features.world.shapes import ShapesFrom, SpecShapes
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import compose, run

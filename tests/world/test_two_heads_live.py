@@ -23,8 +23,8 @@ from gazerig.config.load import shipped
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.run.head_group import HeadGroup, compose_group
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.heads_together import RobotGroup
 from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.robot_group import RobotGroup
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Resume, Stop
 from gazerig.robot.model.stop_latch import MIN_HOLD_S, MIN_RESUME_GAP_S

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from gazerig.config.load import load, shipped
 from gazerig.config.shipped import shipped_names
-from gazerig.features.world import HOME
-from gazerig.features.world.script import WorldScript
+from gazerig.features.world.script import HOME, WorldScript
 from gazerig.features.world.script_faults import CHECKS
 
 WORLDS = shipped_names("worlds", HOME)

@@ -21,9 +21,9 @@ from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
-from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop_timing import BUSY_SHARE
+from gazerig.robot.control.robot_group import NamedRobot
 from gazerig.robot.control.tick import Tick
 
 _SHORTEST_S = 3.0

@@ -32,9 +32,8 @@ from gazerig.config.load import ConfigError, ConfigFault, load, shipped
 from gazerig.config.schema import load_rig, rig_path
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.extras import extra_hint
-from gazerig.features.world import HOME
 from gazerig.features.world.figure import Figures
-from gazerig.features.world.script import Fault, WorldCameraParams, WorldScript
+from gazerig.features.world.script import HOME, Fault, WorldCameraParams, WorldScript
 from gazerig.features.world.script_faults import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec

@@ -273,7 +273,13 @@ def world_camera(
     if isinstance(poses, WorldPoses):
         process = None
         if not options.no_pictures:
-            process = _process(rig, world, poses, locate, clock, turns)
+            field_rad = radians(world.camera.horizontal_field_deg)
+            motion = partial(motion_finder, rig.motion, world.camera.lens, field_rad, turns)
+            source: Callable[[], FrameSource] = partial(
+                DrawnSource, partial(served_pixels, world, poses), poses
+            )
+            parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
+            process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
         return WorldCamera(process, ideal, poses)
     if options.no_pictures:
         return ideal(poses.begin_s)
@@ -287,21 +293,3 @@ def world_camera(
     except NoRenderer as error:
         say(no_pictures_message(error))
         return ideal(poses.begin_s)
-
-
-def _process(
-    rig: Rig,
-    world: RenderedWorld,
-    poses: WorldPoses,
-    locate: Locate,
-    clock: Clock,
-    turns: PoseBuffer | None,
-) -> CameraProcess:
-    """Return the process that renders the world of another process and detects."""
-    camera = world.camera
-    field_rad = radians(camera.horizontal_field_deg)
-    motion = partial(motion_finder, rig.motion, camera.lens, field_rad, turns)
-    make = partial(served_pixels, world, poses)
-    source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
-    parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
-    return CameraProcess(parts, clock.now_s, rig.camera_recovery)
