@@ -30,7 +30,7 @@ def recorded(path: Path, rig: Rig, seconds: float) -> Run:
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)
     recorder.open()
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:
@@ -38,7 +38,7 @@ def recorded(path: Path, rig: Rig, seconds: float) -> Run:
         seen.append(tick)
 
     made.robot.start(made.clock)
-    stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
     shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())

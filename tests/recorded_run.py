@@ -22,7 +22,7 @@ STARTED = "2026-01-31T23:59:59.250000+00:00"
 
 def assembly(recorder: Recorder | None = None) -> Assembly:
     options = RunOptions(mock=True, fast=True, seed=7, scene="visitor")
-    recorded = Substitutes(body=recorder.recorded) if recorder is not None else RIGS_OWN
+    recorded = Substitutes(body=recorder.wrap_body) if recorder is not None else RIGS_OWN
     return assemble(load_rig("desk"), options, recorded)
 
 
@@ -70,7 +70,7 @@ def record(
 
     made.robot.start(made.clock)
     goals = made.robot._executor.commanded_rad
-    stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, made.loop, stop, watch)
     made.robot.stop()
     said = recorder.close(count.stopped_by, made.sent_digest())

@@ -39,10 +39,10 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
         started_utc="2026-01-31T23:59:59+00:00", scene="visitor", mock=True, fast=True,
     )  # fmt: skip
     recorder = Recorder(path, info, patient=True)
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     recorder.open()
     made.robot.start(made.clock)
-    stop = recorder.timed(lambda s: "seconds" if s >= seconds else None)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds else None)
     try:
         run(made.robot, made.clock, made.loop, stop, recorder.record)
         made.robot.stop()

@@ -23,7 +23,7 @@ def test_what_the_planner_chose_is_recorded_and_chosen_again(tmp_path: Path) -> 
     rig = with_options(load_rig("desk"), options)
     recorder = Recorder(tmp_path / "run.mcap", run_info(rig, options), patient=True)
     recorder.open()
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     plans: list[str] = []
 
     def watch(tick: Tick) -> None:
@@ -31,7 +31,7 @@ def test_what_the_planner_chose_is_recorded_and_chosen_again(tmp_path: Path) -> 
         plans.append(tick.target.plan)
 
     made.robot.start(made.clock)
-    stop = recorder.timed(lambda s: "seconds" if s >= 2.7 else None)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= 2.7 else None)
     count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
     shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())

@@ -48,7 +48,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecording, li
     recorder = Recorder(path, info, patient=True)
     recorder.open()
     options = RunOptions(mock=True, fast=True, seed=3, scene="visitor")
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:
@@ -58,7 +58,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecording, li
             made.robot.command(command)
 
     made.robot.start(made.clock)
-    stop = recorder.timed(lambda s: "seconds" if s >= 2.0 - 1e-9 else None)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= 2.0 - 1e-9 else None)
     run(made.robot, made.clock, lambda: made.loop, stop, watch)
     made.robot.stop()
     recorder.close("seconds", made.sent_digest())

@@ -45,7 +45,7 @@ def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     recorder = Recorder(path, run_info(rig, options), patient=True)
     recorder.open()
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     events: list[str] = []
 
     numbers = itertools.count(1)
@@ -57,7 +57,7 @@ def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
             made.robot.command(play)
 
     made.robot.start(made.clock)
-    stop = recorder.timed(lambda s: "seconds" if s >= 3.5 else None)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= 3.5 else None)
     count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
     shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())

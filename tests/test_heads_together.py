@@ -4,8 +4,8 @@ from typing import cast
 
 import pytest
 
-from gazerig.robot.control.heads_together import NamedRobot, RobotGroup
 from gazerig.robot.control.loop import Robot
+from gazerig.robot.control.robot_group import NamedRobot, RobotGroup
 from gazerig.robot.model.commands import Command, Renew, Resume, Stop
 from gazerig.robot.model.reply import CommandReply, Ticket
 

@@ -39,10 +39,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     recorder = Recorder(path, info, patient=True)
     recorder.open()
     options = RunOptions(mock=True, fast=True, seed=0, scene="face-to-face")
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     made.robot.start(made.clock)
     try:
-        over = recorder.timed(lambda s: "seconds" if s > 2.0 else None)
+        over = recorder.wrap_stop(lambda s: "seconds" if s > 2.0 else None)
         run(made.robot, made.clock, made.loop, over, recorder.record)
     finally:
         made.robot.stop()

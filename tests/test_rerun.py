@@ -71,7 +71,7 @@ def recorded(
     recorder = Recorder(path, info, patient=True)
     recorder.open()
     options = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
     robot = made.robot
     seen: list[Tick] = []
 
@@ -84,7 +84,7 @@ def recorded(
 
     made.clock.sleep_until(start_s)
     robot.start(made.clock)
-    stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(robot, made.clock, lambda: made.loop, stop, watch)
     shut_down(made, count, lambda line: None)
     recorder.close(count.stopped_by, made.sent_digest())

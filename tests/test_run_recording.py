@@ -157,8 +157,8 @@ def test_pictures_come_at_their_rate_with_their_exposure(recorded: Recorded) -> 
 
 def test_no_pictures_where_none_are_asked_for(recorded: Recorded) -> None:
     found = with_picture(recorded.ticks[0], 0).detections
-    assert not FramePicker(0.0).picks(found)
-    assert FramePicker(2.0).picks(found)
+    assert not FramePicker(0.0).is_due(found)
+    assert FramePicker(2.0).is_due(found)
 
 
 def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
@@ -167,7 +167,7 @@ def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
     return [
         at_s
         for number, at_s in enumerate(times_s, 1)
-        if picker.picks(Detections(at_s, number, 2, 2, image=picture))
+        if picker.is_due(Detections(at_s, number, 2, 2, image=picture))
     ]
 
 
@@ -186,10 +186,10 @@ def test_frames_whose_times_are_rounded_are_picked_at_the_rate(rate_hz: float, e
 
 def test_a_tick_without_an_image_is_no_frame() -> None:
     picker, picture = FramePicker(5.0), np.zeros((2, 2, 3), np.uint8)
-    assert not picker.picks(None)
-    assert not picker.picks(Detections(0.0, 1, 2, 2))
-    assert picker.picks(Detections(0.01, 2, 2, 2, image=picture))
-    assert not picker.picks(Detections(0.01, 2, 2, 2, image=picture))
+    assert not picker.is_due(None)
+    assert not picker.is_due(Detections(0.0, 1, 2, 2))
+    assert picker.is_due(Detections(0.01, 2, 2, 2, image=picture))
+    assert not picker.is_due(Detections(0.01, 2, 2, 2, image=picture))
 
 
 def test_pictures_are_not_more_than_were_asked_for() -> None:

@@ -29,7 +29,7 @@ def rig(path: Path) -> None:
     assert recorder._link is not None and recorder._link._process is not None
     print(recorder._link._process.pid, flush=True)
     options = RunOptions(mock=True, fast=True, seed=0, scene="visitor")
-    made = assemble(load_rig("desk"), options, Substitutes(body=recorder.recorded))
+    made = assemble(load_rig("desk"), options, Substitutes(body=recorder.wrap_body))
     made.robot.start(made.clock)
     wall = RealClock()
     start_s = wall.now_s()

@@ -48,8 +48,8 @@ from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import GuardedChooser, TargetChooser
 from gazerig.robot.control.gesture_choices import GestureChoices
-from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.loop import Robot
+from gazerig.robot.control.robot_group import NamedRobot
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.coupling_params import pairs_of

@@ -17,10 +17,10 @@ from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.control.heads_together import RobotGroup
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, failure_text
+from gazerig.robot.control.robot_group import RobotGroup
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
@@ -210,7 +210,7 @@ class RunObservers:
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Return the loop's ``stop`` as the recording needs it."""
-        return self._recorder.timed(stop) if self._recorder is not None else stop
+        return self._recorder.wrap_stop(stop) if self._recorder is not None else stop
 
     def open_files(self) -> None:
         """Create the output files, before anything moves.

@@ -74,7 +74,7 @@ def compose(
 
         info = run_info(rig, options, () if room is None else room.stands)
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
-        substitutes = substitutes._replace(body=recorder.recorded)
+        substitutes = substitutes._replace(body=recorder.wrap_body)
     made = assemble(rig, options, substitutes, room)
     names = (options.rig, options.character, options.profile)
     return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)

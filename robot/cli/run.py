@@ -24,7 +24,7 @@ from gazerig.robot.cli.terminal import (
     status,
     tidied_up,
 )
-from gazerig.robot.control.joint_faults import JointFault, named
+from gazerig.robot.control.joint_faults import JointFault, joints_text
 
 if TYPE_CHECKING:
     from gazerig.robot.app.surroundings import GroupRun
@@ -142,7 +142,7 @@ def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
         for reason, count in reasons.items():
             key = reason, count["times"], round(count["seconds"], 1)
             alike.setdefault(key, []).append(joint)
-    held = [str(JointFault(named(joints), *key)) for key, joints in alike.items()]
+    held = [str(JointFault(joints_text(joints), *key)) for key, joints in alike.items()]
     if held:
         from gazerig.robot.control.loop_timing import BUSY_SHARE  # with NumPy
 

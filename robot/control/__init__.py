@@ -1,1 +1,1 @@
-"""The control loop: one tick after the other, from a percept to goals on the bus."""
+"""The control loop: from a percept to goals on the bus in every tick."""

@@ -165,7 +165,11 @@ class GestureChoices:
         )
 
     def drop(self) -> str:
-        """Drop the present gesture, as its joints are controlled or off; return its name."""
+        """Drop the present gesture, as a client holds its joints or the torque is off.
+
+        Returns:
+            The name of the gesture, "" if there was none.
+        """
         name = self._player.playing
         self._player.reset()
         if name:

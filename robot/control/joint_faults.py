@@ -51,7 +51,7 @@ class _OpenFault:
         self.reported = False
 
 
-def named(joints: Sequence[str], count: int = 0) -> str:
+def joints_text(joints: Sequence[str], count: int = 0) -> str:
     """Return joints as text, at most three by name.
 
     Args:
@@ -102,7 +102,7 @@ class JointFaults:
                 text = f"{key[1]}: over after {seconds:.1f} s"
                 lines.setdefault((running.last_s, text), []).append(key[0])
         for (t_s, text), joints in lines.items():
-            who = named(joints, len(guard_result.joints))
+            who = joints_text(joints, len(guard_result.joints))
             self._report(f"{t_s - self._first_s:.2f} s: {who}: {text}")
 
     def close(self) -> None:

@@ -1,1 +1,1 @@
-"""Recordings of runs: every tick with what it knew and decided, in one file."""
+"""Recordings of runs: the inputs and decisions of every tick, in one file."""

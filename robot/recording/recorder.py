@@ -50,7 +50,7 @@ class FramePicker:
         self._due_s = -inf
         self._number = 0
 
-    def picks(self, found: Detections | None) -> bool:
+    def is_due(self, found: Detections | None) -> bool:
         """Return whether the frame is new and due."""
         if found is None or found.number == self._number:
             return False
@@ -135,19 +135,19 @@ class Recorder:
         os.replace(self._temporary, self._target)
         self._temporary = None
 
-    def recorded(self, body: Body) -> Body:
+    def wrap_body(self, body: Body) -> Body:
         """Return a body that wraps a robot's and records its readings."""
         self._health = body.bus.health
         return JointRecorder(body, self._body_records.append)
 
-    def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
+    def wrap_stop(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Return a loop's ``stop`` that records the time since the loop started."""
 
-        def noted(seconds: float) -> str | None:
+        def record_time(seconds: float) -> str | None:
             self._seconds = seconds
             return stop(seconds)
 
-        return noted
+        return record_time
 
     def record_world(self, world: WorldInfo) -> None:
         """Record the simulated world of the run; call it once, after ``open``."""
@@ -159,7 +159,7 @@ class Recorder:
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0
         self._last_s = tick.t_s
         self.stream.append(tick, dt_s, before)
-        if self._frames.picks(tick.detections):
+        if self._frames.is_due(tick.detections):
             self._post_frame(tick.detections)
         if tick.t_s - self._checked_s >= _HEALTH_S:
             self._checked_s = tick.t_s

@@ -12,9 +12,8 @@ from typing import Literal, NamedTuple
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import GuardResult, JointAngles, JointState
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.collisions import Collisions
-from gazerig.robot.safety.guard_verdict import findings, passed, standstill
 from gazerig.robot.safety.health import JointHealth
 from gazerig.robot.safety.late_ticks import LateTicks
 from gazerig.robot.safety.limit_change import LimitChange
@@ -23,6 +22,7 @@ from gazerig.robot.safety.stall_detector import StallDetector
 
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9
+_LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "torque_off")
 
 
 class _Hold(NamedTuple):
@@ -49,7 +49,7 @@ class Guard:
         limits: One limit per joint.
         joints: The joints' names.
         reach: Returns the ranges and speeds that the servos themselves keep, which apply in
-            addition to changed limits; None if they keep any.
+            addition to changed limits; None for servos without limits of their own.
         period_s: Nominal time between ticks. Motion missed by a late tick is not made up for.
 
     Raises:
@@ -74,7 +74,7 @@ class Guard:
         self._change = LimitChange(self._motion, limits, reach)
         self._limits = self._motion.limits
         self._short: dict[int, tuple[int, str]] = {}
-        self._findings = findings(self._short, joints)
+        self._findings = _findings(self._short, joints)
         self._health = JointHealth(params.health, limits)
         self._stuck = StallDetector(params.stall, len(limits))
         self._collisions = Collisions(
@@ -167,7 +167,7 @@ class Guard:
             self._rearm(joints)
         since_s = t_s - self._t_s
         if not (since_s > 0.0 and isfinite(since_s)):
-            return standstill(tuple(self._motion.command), desired_rad, self._names)
+            return _standstill(tuple(self._motion.command), desired_rad, self._names)
         self._t_s = t_s
         if self._change.waiting or self._change.outside:
             self._calm = False
@@ -215,9 +215,9 @@ class Guard:
                 short[i] = outcome
         self._calm = followed
         if followed:
-            return passed(desired_rad, self._names)
+            return _passed(desired_rad, self._names)
         if short != self._short:  # findings last for many ticks
-            self._short, self._findings = short, findings(short, self._names)
+            self._short, self._findings = short, _findings(short, self._names)
         level, reasons, why, critical = self._findings
         return GuardResult(tuple(command), level, reasons, desired_rad, why, critical, self._names)
 
@@ -396,3 +396,47 @@ class Guard:
             return "after a late tick"
         fast = abs(target - began) > limit.speed_rad_s * dt_s
         return self._health.why[i] or ("too fast" if fast else "too hard")
+
+
+def _standstill(
+    command: JointAngles, desired_rad: JointAngles, joints: tuple[str, ...]
+) -> GuardResult:
+    """Return the result of a tick without motion, as no time has passed."""
+    reasons = ("all: time stands still",)
+    why = ("time stands still",) * len(command)
+    return GuardResult(command, "hold", reasons, desired_rad, why, reasons, joints)
+
+
+def _passed(desired_rad: JointAngles, joints: tuple[str, ...]) -> GuardResult:
+    """Return the result of a tick in which every joint follows its desired angle."""
+    # Avoids the call of the class's constructor, a Python function.
+    return tuple.__new__(GuardResult, (desired_rad, "ok", (), desired_rad, (), (), joints))
+
+
+class _Findings(NamedTuple):
+    """The guard's findings for all joints, in the fields of ``GuardResult``."""
+
+    level: Level
+    reasons: tuple[str, ...]
+    why: tuple[str, ...]
+    critical_reasons: tuple[str, ...]
+
+
+def _findings(short: dict[int, tuple[int, str]], joints: tuple[str, ...]) -> _Findings:
+    """Return the findings for all joints; the level is that of the worst joint.
+
+    Args:
+        short: Rank, 1 (limited) to 3 (torque_off), and reason by the number of each joint that
+            does not follow.
+        joints: Names of all joints.
+    """
+    if not short:
+        return _Findings("ok", (), (), ())
+    worst = max(rank for rank, _ in short.values())
+    reasons = {i: f"{joints[i]}: {reason}" for i, (_, reason) in short.items()}
+    return _Findings(
+        _LEVELS[worst],
+        tuple(reasons.values()),
+        tuple([short[i][1] if i in short else "" for i in range(len(joints))]),
+        tuple([reasons[i] for i in reasons if short[i][0] == worst]),
+    )

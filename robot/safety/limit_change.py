@@ -18,8 +18,8 @@ class LimitChange:
     Args:
         motion: Limiter with the present limits.
         wanted: One limit per joint.
-        reach: Returns the ranges and speeds that the servos themselves keep; None if they
-            keep any.
+        reach: Returns the ranges and speeds that the servos themselves keep; None for servos
+            without limits of their own.
     """
 
     def __init__(

@@ -73,7 +73,7 @@ class Bench:
     """A rig that runs in a thread of this process, as gazerig run does."""
 
     def __init__(self, page: bool, recorder: Recorder | None = None) -> None:
-        substitutes = Substitutes(body=recorder.recorded) if recorder is not None else RIGS_OWN
+        substitutes = Substitutes(body=recorder.wrap_body) if recorder is not None else RIGS_OWN
         asked = RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         self.made = made = assemble(load_rig("desk"), asked, substitutes)
         robot = made.robot

@@ -29,7 +29,7 @@ from gazerig.robot.recording.run_info import RunInfo, versions
 def made(fast: bool, recording: Recorder) -> Assembly:
     """Assemble the desk rig with emulated servos before a simulated visitor."""
     options = RunOptions(mock=True, fast=fast, seed=0, scene="visitor")
-    return assemble(load_rig("desk"), options, Substitutes(body=recording.recorded))
+    return assemble(load_rig("desk"), options, Substitutes(body=recording.wrap_body))
 
 
 def recorder(path: Path, fast: bool) -> Recorder:
@@ -96,7 +96,7 @@ def volume(path: Path, seconds: float) -> None:
     recording.open()
     robot.start(assembly.clock)
     start_s = time.monotonic()
-    stop = recording.timed(lambda s: "seconds" if s >= seconds else None)
+    stop = recording.wrap_stop(lambda s: "seconds" if s >= seconds else None)
     count = run(robot, assembly.clock, assembly.loop, stop, recording.record)
     shut_down(assembly, count, lambda line: None)
     print(recording.close("seconds", assembly.sent_digest()))

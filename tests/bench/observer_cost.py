@@ -96,7 +96,7 @@ def show(seconds: float) -> None:
     """Measure and print all."""
     with tempfile.TemporaryDirectory() as folder:
         recorder = recorder_at(Path(folder) / "run.mcap")
-        substitutes = Substitutes(body=recorder.recorded)
+        substitutes = Substitutes(body=recorder.wrap_body)
         asked = RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         made = assemble(load_rig("desk"), asked, substitutes)
         tuning = ParamStore(made.live, made.robot.command, "desk")
