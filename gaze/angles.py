@@ -188,6 +188,12 @@ def rotate_back(R: Mat3, v: Vec3) -> Vec3:
     return (a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z)
 
 
+def transpose(R: Mat3) -> Mat3:
+    """Return the transpose of a matrix: the inverse of a rotation."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    return (a, d, g), (b, e, h), (c, f, i)
+
+
 def compose(A: Mat3, B: Mat3) -> Mat3:
     """Return A B."""
     (a, b, c), (d, e, f), (g, h, i) = B

@@ -9,10 +9,9 @@ import pytest
 from gaze_trace_rig import AT_ONCE, EXACT, HUMAN, Rig, still
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale, sub, unit
+from gazerig.gaze.oculomotor.gaze_point import Refixations, endpoint
 from gazerig.gaze.oculomotor.params import OculomotorParams
-from gazerig.gaze.oculomotor.refixation import Refixations
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
-from gazerig.gaze.oculomotor.saccade_endpoint import endpoint
 from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
 from gazerig.gaze.types import Target, Vec3
 

@@ -25,7 +25,8 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.perception.gyro_fusion import GyroFusion, rotation_vector, turned_by
+from gazerig.robot.perception.face_fit import rotation_by
+from gazerig.robot.perception.gyro_fusion import GyroFusion, rotation_vector
 from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
@@ -67,7 +68,7 @@ class Base:
         return found
 
     def truth(self, t_s):
-        return compose(OPTICAL, turned_by(tuple(np.radians(self.angle_deg(t_s)))))
+        return compose(OPTICAL, rotation_by(tuple(np.radians(self.angle_deg(t_s)))))
 
 
 def shaken(t):
@@ -114,7 +115,7 @@ def test_joints_that_tell_late_and_in_steps_are_corrected():
 
     def late(t):  # 20 ms late, in steps of .35 deg
         angle = round(swinging(max(0.0, t - 0.02))[1] / 0.35) * 0.35
-        return compose(OPTICAL, turned_by((0.0, radians(angle), 0.0)))
+        return compose(OPTICAL, rotation_by((0.0, radians(angle), 0.0)))
 
     alone, both = errors(Base(swinging, 6.0), 6.0, late)
     assert np.sqrt((alone**2).mean()) > 0.5
@@ -143,7 +144,7 @@ def test_gyro_is_tried_again_after_a_minute_and_told_no_second_time():
     for k in range(round(200 * HZ)):
         t = k / HZ
         turning = t < 5.0 or t > 150.0  # carried about, at rest, carried again
-        turn = CameraTurn(1, rows(turned_by((0.0, 0.2 * k * turning, 0.0))))
+        turn = CameraTurn(1, rows(rotation_by((0.0, 0.2 * k * turning, 0.0))))
         R = fusion.orientation(t, OPTICAL, turn)
         if 70.0 < t < 149.0:
             assert R is not OPTICAL and apart_deg(R, OPTICAL) < 1.0
@@ -176,8 +177,8 @@ def test_without_a_gyro_nothing_changes():
 
 def test_gap_another_epoch_and_time_that_runs_back_begin_with_the_joints():
     fusion = GyroFusion(lambda line: None)
-    half = rows(turned_by((0.05, 0.0, 0.0)))
-    whole = rows(turned_by((0.1, 0.0, 0.0)))
+    half = rows(rotation_by((0.05, 0.0, 0.0)))
+    whole = rows(rotation_by((0.1, 0.0, 0.0)))
     for later_s, epoch in ((0.6, 1), (1 / HZ, 2), (0.0, 1), (-1.0, 1)):
         fusion.orientation(5.0, OPTICAL, CameraTurn(1, half))
         assert fusion.orientation(5.0 + later_s, OPTICAL, CameraTurn(epoch, whole)) == OPTICAL
@@ -187,7 +188,7 @@ def test_gap_another_epoch_and_time_that_runs_back_begin_with_the_joints():
 
 def test_rotation_vectors_there_and_back():
     for vector in ((0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.3, -1.2, 0.5), (0.0, 2.9, 0.0)):
-        assert rotation_vector(turned_by(vector)) == pytest.approx(vector, abs=1e-9)
+        assert rotation_vector(rotation_by(vector)) == pytest.approx(vector, abs=1e-9)
 
 
 WIDTH, HEIGHT = 640, 400
@@ -207,7 +208,7 @@ def wander_deg(gyro):
     places = []
     for k in range(1, 120):
         t = k / HZ
-        R = turned_by(tuple(np.radians(shaken(t))))
+        R = rotation_by(tuple(np.radians(shaken(t))))
         seen = (LANDMARKS_FACE_M @ frontal.T + (0.2, 0.1, 2.0)) @ np.array(R)
         points = project(seen, LENS)
         (x, y), (right, bottom) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
@@ -289,7 +290,7 @@ class Spinning:
 
     def latest(self, now_s: float) -> Detections:
         number = int(now_s * HZ)
-        turn = CameraTurn(1, rows(turned_by((0.0, number * 0.1, 0.0))))
+        turn = CameraTurn(1, rows(rotation_by((0.0, number * 0.1, 0.0))))
         return Detections(number / HZ, number, WIDTH, HEIGHT, turn=turn)
 
     def events(self) -> tuple[str, ...]:
@@ -313,7 +314,7 @@ def test_turn_that_is_no_rotation_ends_the_camera_of_a_program_alone():
 
 
 def test_recording_keeps_the_turn():
-    turn = CameraTurn(7, rows(turned_by((0.1, -0.2, 0.3))))
+    turn = CameraTurn(7, rows(rotation_by((0.1, -0.2, 0.3))))
     shot = Shot(1.0, 1, np.zeros((4, 6, 3), np.uint8), turn=turn)
     messages = dict(fmt.encode_shot(shot, None))
     found = fmt.decode_turn(messages[fmt.TURN])

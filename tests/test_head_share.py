@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.gaze.angles import angle_between, direction
-from gazerig.gaze.oculomotor.head import HeadModel
-from gazerig.gaze.oculomotor.head_share import HeadShare
+from gazerig.gaze.oculomotor.head import HeadModel, HeadShare
 from gazerig.gaze.oculomotor.params import HeadParams
 from gazerig.gaze.types import Angles2, Floats, Target
 from gazerig.robot.analysis.human_norms import STAHL_FREE_DEG, STAHL_SLOPE

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from gazerig.gaze.lids.blink_profile import closure
+from gazerig.gaze.lids.blink import closure
 from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.params import declarations
 

@@ -8,7 +8,7 @@ import pytest
 from desk import GAZE_JOINTS, LIDS
 from gaze_trace_rig import EXACT
 
-from gazerig.gaze.lids.blink_statistics import blink_pause_s
+from gazerig.gaze.lids.blink import blink_pause_s
 from gazerig.gaze.lids.lids import LidMode, LidParams, Lids, Side
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor

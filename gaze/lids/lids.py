@@ -12,10 +12,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.lids.blink_profile import LidClosure, closure
-from gazerig.gaze.lids.blink_statistics import (
+from gazerig.gaze.lids.blink import (
+    LidClosure,
     blink_depth,
     blink_pause_s,
+    closure,
     evoked_offset_s,
     evokes_blink,
     is_double_blink,

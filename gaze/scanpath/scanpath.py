@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gazerig.gaze.angles import add, angle_between, sub
-from gazerig.gaze.scanpath.dwell import LAWS, Draw
+from gazerig.gaze.scanpath.dwell import LAWS, Draw, rests_s, shift_dwell, stationary, visits_s
 from gazerig.gaze.scanpath.models import (
     FaceTracking,
     MarkovWalk,
@@ -22,7 +22,6 @@ from gazerig.gaze.scanpath.models import (
     ScanpathStep,
     SimpleCycle,
 )
-from gazerig.gaze.scanpath.rest import rests_s, shift_dwell, stationary, visits_s
 from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
 from gazerig.params import Bounds, Choices
 

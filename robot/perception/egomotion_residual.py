@@ -17,7 +17,7 @@ from math import degrees, inf
 from statistics import median
 from typing import NamedTuple
 
-from gazerig.gaze.angles import compose, cross, dot, norm, sub, unit
+from gazerig.gaze.angles import compose, cross, dot, norm, sub, transpose, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.frames import NeckAngles
 
@@ -162,7 +162,7 @@ class EgomotionResidual:
 
 def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
     """Return the angular velocity that turns one orientation into another, for small turns."""
-    R = compose(R_after, transposed(R_before))
+    R = compose(R_after, transpose(R_before))
     half = 0.5 / dt_s
     return ((R[2][1] - R[1][2]) * half, (R[0][2] - R[2][0]) * half, (R[1][0] - R[0][1]) * half)
 
@@ -172,12 +172,3 @@ def turn_bound(before: NeckAngles, after: NeckAngles) -> float:
     (a, b, c), (d, e) = before[0], before[1]
     (f, g, h), (i, j) = after[0], after[1]
     return abs(f - a) + abs(g - b) + abs(h - c) + abs(i - d) + abs(j - e)
-
-
-def transposed(R: Mat3) -> Mat3:
-    """Return the inverse of a rotation."""
-    return (
-        (R[0][0], R[1][0], R[2][0]),
-        (R[0][1], R[1][1], R[2][1]),
-        (R[0][2], R[1][2], R[2][2]),
-    )

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.gaze.angles import compose, cross, dot, norm, rotate_back, scale, sub, unit
+from gazerig.gaze.angles import compose, cross, dot, norm, rotate_back, scale, sub, transpose, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.intrinsics import rays as rays_through
 from gazerig.robot.perception.face_fit import Points, fit_face, nearest_m, turn_sd_rad
@@ -72,7 +72,7 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     if found is None:
         return None
     p = rotate_back(R_face_camera, found.p_m)
-    R = compose(_transposed(R_face_camera), _face_axes(found.R))
+    R = compose(transpose(R_face_camera), _face_axes(found.R))
     outwards = (R[0][0], R[1][0], R[2][0])
     if dot(outwards, p) > -cos(_MOST_TURNED_RAD) * norm(p):
         return None
@@ -123,11 +123,6 @@ def _project(R_face_camera: Mat3, rays: list[Vec3]) -> Points:
         z = g * x + h * y + i
         found.append(((a * x + b * y + c) / z, (d * x + e * y + f) / z))
     return tuple(found)
-
-
-def _transposed(R: Mat3) -> Mat3:
-    (a, b, c), (d, e, f), (g, h, i) = R
-    return (a, d, g), (b, e, h), (c, f, i)
 
 
 def _face_axes(R: Mat3) -> Mat3:

@@ -6,11 +6,12 @@ turns from the gyro and, over about a second, follows the joints. Pure.
 """
 
 from collections.abc import Callable
-from math import acos, cos, exp, inf, radians, sin
+from math import acos, exp, inf, radians, sin
 
 from gazerig.drivers.types import CameraTurn
-from gazerig.gaze.angles import compose, norm, scale
+from gazerig.gaze.angles import compose, norm, scale, transpose
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.perception.face_fit import rotation_by
 
 _SETTLE_S = 1.0
 """In this time a difference between gyro and joints falls to a third."""
@@ -62,13 +63,13 @@ class GyroFusion:
     ) -> Mat3:
         """Return the last orientation, advanced by the gyro and pulled to the joints'."""
         before_s, before_turn, R_before = before
-        step = compose(_transposed(before_turn.R_start_camera), turn.R_start_camera)
+        step = compose(transpose(before_turn.R_start_camera), turn.R_start_camera)
         R = compose(R_before, step)
-        off = rotation_vector(compose(_transposed(R), R_joints))
+        off = rotation_vector(compose(transpose(R), R_joints))
         if norm(off) > _MOST_RAD:
             self._disagree(t_s)
             return R_joints
-        return compose(R, turned_by(scale(off, 1.0 - exp((before_s - t_s) / _SETTLE_S))))
+        return compose(R, rotation_by(scale(off, 1.0 - exp((before_s - t_s) / _SETTLE_S))))
 
     def _disagree(self, t_s: float) -> None:
         """Count disagreements of gyro and joints; after several, ignore the gyro for a while.
@@ -94,23 +95,3 @@ def rotation_vector(R: Mat3) -> Vec3:
     angle = acos(min(1.0, max(-1.0, 0.5 * (a + e + i - 1.0))))
     share = 0.5 if angle < 1e-6 else 0.5 * angle / sin(angle) if sin(angle) > 1e-6 else 0.0
     return share * (h - f), share * (c - g), share * (d - b)
-
-
-def turned_by(vector: Vec3) -> Mat3:
-    """Return the rotation about a vector by its length in radians (Rodrigues' formula)."""
-    angle = norm(vector)
-    if angle < 1e-12:
-        return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    x, y, z = scale(vector, 1.0 / angle)
-    s, v = sin(angle), 1.0 - cos(angle)
-    c = cos(angle)
-    return (
-        (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
-        (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
-        (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
-    )
-
-
-def _transposed(R: Mat3) -> Mat3:
-    (a, b, c), (d, e, f), (g, h, i) = R
-    return ((a, d, g), (b, e, h), (c, f, i))

@@ -1,7 +1,7 @@
 """Perception: detections and the head's pose at their capture time give a percept in the world.
 
 Faces and moving things are localised in the world by the camera's pose at the exposure, not by its
-present one (localisation). Motion of a person's own body is separated from that of other things
+present one. Motion of a person's own body is separated from that of other things
 (hand_ownership). A tracker gives all of them identities and velocities.
 """
 
@@ -35,10 +35,9 @@ from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
 from gazerig.robot.perception.hands import Hands, Known
 from gazerig.robot.perception.kalman import Variances
-from gazerig.robot.perception.localisation import place_in_world
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.own_body import OwnParts, label_own_body
-from gazerig.robot.perception.track import UNNAMED, LocalisedDetection, Track
+from gazerig.robot.perception.track import UNNAMED, LocalisedDetection, Track, place_in_world
 from gazerig.robot.perception.tracker import Tracker
 
 # The head's turn at a capture is taken over this time before and after it.

@@ -77,7 +77,7 @@ MUTANTS = (
            "an eye that was left aside is relieved with a jerk", ("head", "oculomotor", "oculomotor_limits")),
     Mutant("gaze/oculomotor/saccade.py", "return 0.38 - 0.24 * min(1.0, max(0.0, over))", "return 0.38",
            "large saccades are not skewed", ("saccade",)),
-    Mutant("gaze/lids/blink_statistics.py", "between = 60.0 / per_min - length_s",
+    Mutant("gaze/lids/blink.py", "between = 60.0 / per_min - length_s",
            "between = 60.0 / per_min", "the blink itself is not part of its interval", ("lids",)),
     Mutant("gaze/lids/lids.py", 'return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min',
            "return par.blinks_per_min", "a conversation does not change the rate of blinks", ("lids",)),
@@ -92,7 +92,7 @@ MUTANTS = (
     # ---- scanpath
     Mutant("gaze/scanpath/scanpath.py", "np.array(walk.dwell_mean_s) / params.rate_scale",
            "np.array(walk.dwell_mean_s)", "rate_scale does nothing", ("scanpath_dwell", "scanpath")),
-    Mutant("gaze/scanpath/rest.py", "rests: Floats = shortest_s + np.maximum(least, low * above)",
+    Mutant("gaze/scanpath/dwell.py", "rests: Floats = shortest_s + np.maximum(least, low * above)",
            "rests: Floats = shortest_s + np.maximum(least, above)",
            "what short parts gain is not taken from the others", ("scanpath",)),
     Mutant("gaze/scanpath/scanpath.py", "return PARTS[away.index(min(away))]", "return PARTS[0]",
