@@ -33,7 +33,7 @@ OWNERS = {
     ),
     "orjson": ("robot.recording.",),
     "matplotlib": ("features.lab.report.plotting",),
-    "pyarrow": ("features.lab.sweep.table",),
+    "pyarrow": ("features.lab.sweep.outcome",),
     "jinja2": (
         "features.lab.report.",
         "features.study.report.",

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.analysis.multiplicity import correct_p_values
+from gazerig.features.lab.report.statistics import correct_p_values
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
 from gazerig.features.study.measures import Measure, measures
 from gazerig.features.study.participation import Participation

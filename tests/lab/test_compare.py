@@ -10,12 +10,11 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import params_text, walk_text
-from gazerig.features.lab.analysis.multiplicity import correct_p_values
 from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import chance, compare, differences_of
-from gazerig.features.lab.report.run_header import RunHeader
-from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
+from gazerig.features.lab.report.page import RunHeader
+from gazerig.features.lab.report.statistics import MeasuredValue, correct_p_values, mean, median
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions

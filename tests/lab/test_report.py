@@ -21,11 +21,10 @@ from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import differences_of
 from gazerig.features.lab.report.compare_page import compare_page
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
-from gazerig.features.lab.report.page import band_text, gauge, report_page
+from gazerig.features.lab.report.page import RunHeader, band_text, gauge, report_page
 from gazerig.features.lab.report.plotting import COLOURS, Shown, png
 from gazerig.features.lab.report.reference_walk import published_walk, rig_walk
 from gazerig.features.lab.report.report import DRAWINGS, findings_of, measure_run, report_of
-from gazerig.features.lab.report.run_header import RunHeader
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
     judge,

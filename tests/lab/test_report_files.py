@@ -11,10 +11,9 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.eye_tracker_csv import read_recording
 from gazerig.features.lab.report.files import files_of, write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
-from gazerig.features.lab.report.page import Figure, report_page
+from gazerig.features.lab.report.page import Figure, RunHeader, report_page
 from gazerig.features.lab.report.plotting import COLOURS, Shown, png
 from gazerig.features.lab.report.report import DRAWINGS, findings_of
-from gazerig.features.lab.report.run_header import RunHeader
 
 
 def test_a_pipe_is_no_eye_tracker_recording(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import compare
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.joint_basis import JointBasis
-from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.page import RunHeader
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.recording.export_csv import columns
@@ -50,7 +50,8 @@ def quiet(words: str, share: float) -> None:
 @pytest.mark.usefixtures("unlaid_figures")
 def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
     out = tmp_path / "six.html"
-    made = build.report(maker.ticks, RunHeader("six"), out, quiet)
+    about = RunHeader("six")
+    made = build.report_of(build.read(maker.ticks, about, quiet), about, out, quiet)
     rows = {row["key"]: row for row in json.loads(made.data.read_text())}
     assert {row["basis"] for row in rows.values()} == {"estimated"}
     page = unescape(out.read_text(encoding="utf-8"))

@@ -24,11 +24,17 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import Axis, Point, grid, latin_hypercube
-from gazerig.features.lab.sweep.outcome import OUTSIDE, Outcome, figures_of, grade
+from gazerig.features.lab.sweep.outcome import (
+    OUTSIDE,
+    Outcome,
+    figures_of,
+    grade,
+    rows_of,
+    write_tables,
+)
 from gazerig.features.lab.sweep.response import most_responsive
 from gazerig.features.lab.sweep.response_figure import response_png
 from gazerig.features.lab.sweep.run_store import RUNS, run_store
-from gazerig.features.lab.sweep.table import rows_of, write_tables
 from gazerig.features.lab.sweep.worker import figures_at
 from gazerig.features.lab.sweep.worker_pool import Job, SweepInterrupted, WorkerPool
 from gazerig.robot.app.options import RunOptions

@@ -11,10 +11,8 @@ from command_line import invoked
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.sweep.axes import Axis, Point
-from gazerig.features.lab.sweep.fit import counted_measures, fit, trial_of
+from gazerig.features.lab.sweep.fit import counted_measures, fit, search, snippet_of, trial_of
 from gazerig.features.lab.sweep.outcome import Outcome
-from gazerig.features.lab.sweep.search import search
-from gazerig.features.lab.sweep.snippet import snippet_of
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.app.options import RunOptions
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from scipy import stats
 
-from gazerig.features.lab.analysis.multiplicity import Correction, correct_p_values
+from gazerig.features.lab.report.statistics import Correction, correct_p_values
 from gazerig.features.study.statistics import effects, ranks
 from gazerig.features.study.statistics.contingency import chi_square, counts_of
 from gazerig.features.study.statistics.reliability import cronbachs_alpha

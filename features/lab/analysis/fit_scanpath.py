@@ -2,7 +2,6 @@
 
 from math import isnan
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,13 +27,6 @@ from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PART_NAMES, PARTS
 
 
-class _Source(NamedTuple):
-    """The fixations of a recording, and a description of their source."""
-
-    fixations: tuple[PartFixation, ...]
-    notes: tuple[str, ...]
-
-
 def fit(
     recording: Path,
     parts: PartBoxes | None,
@@ -57,16 +49,16 @@ def fit(
     if out.resolve() == recording.resolve():
         raise SetupError(f"{out}: is the recording itself; give another file to write to")
     refuse_existing(out, force=force)
-    source = _source(recording, parts)
+    fixations, notes = _fixations(recording, parts)
     params = FitParams(smoothing=smoothing)
     try:
-        fitted = fit_walk(source.fixations, params, np.random.default_rng(seed))
+        fitted = fit_walk(fixations, params, np.random.default_rng(seed))
         _walk(fitted)
     except ValueError as error:
         raise SetupError(f"{recording}: {error}") from None
-    text = walk_yaml(fitted, params, (_one_line(recording.name), *source.notes, f"seed {seed}"))
+    text = walk_yaml(fitted, params, (_one_line(recording.name), *notes, f"seed {seed}"))
     write_file(out, text, force)
-    return _report(fitted, params, recording, source.notes, out)
+    return _report(fitted, params, recording, notes, out)
 
 
 def walk_yaml(fitted: WalkFit, params: FitParams, about: tuple[str, ...]) -> str:
@@ -117,13 +109,15 @@ def walk_yaml(fitted: WalkFit, params: FitParams, about: tuple[str, ...]) -> str
     return "\n".join(lines) + "\n"
 
 
-def _source(recording: Path, parts: PartBoxes | None) -> _Source:
-    """Read the recording and find its fixations."""
+def _fixations(
+    recording: Path, parts: PartBoxes | None
+) -> tuple[tuple[PartFixation, ...], tuple[str, ...]]:
+    """Return the fixations of a recording, and a description of their source."""
     read = read_recording(recording)
     try:
         if not isinstance(read, Samples):
             found = labelled_fixations(read, parts)
-            return _Source(found, (f"{len(found)} fixations from a table; {read.note}",))
+            return found, (f"{len(found)} fixations from a table; {read.note}",)
         if parts is None:
             raise SetupError("gaze samples need the rectangles of the face's parts (--parts)")
         params = FixationParams()
@@ -133,15 +127,12 @@ def _source(recording: Path, parts: PartBoxes | None) -> _Source:
     seconds = float(read.time_s[-1] - read.time_s[0])
     lost = sum(map(isnan, read.x.tolist()))
     rate = 1.0 / float(np.median(np.diff(read.time_s)))
-    return _Source(
-        found,
-        (
-            f"{len(read.x)} samples at {rate:.0f} Hz over {seconds:.1f} s,"
-            f" {100.0 * lost / len(read.x):.1f} % lost; {read.note}",
-            f"{len(found)} fixations by dispersion up to"
-            f" {params.dispersion * usual_side(parts):g} (width plus height),"
-            f" {params.shortest_ms:g} ms or longer",
-        ),
+    return found, (
+        f"{len(read.x)} samples at {rate:.0f} Hz over {seconds:.1f} s,"
+        f" {100.0 * lost / len(read.x):.1f} % lost; {read.note}",
+        f"{len(found)} fixations by dispersion up to"
+        f" {params.dispersion * usual_side(parts):g} (width plus height),"
+        f" {params.shortest_ms:g} ms or longer",
     )
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gazerig.config.rig import Rig
     from gazerig.features.lab.report.gaze_trace import GazeTrace
     from gazerig.features.lab.report.heads import MutualGazeReport
-    from gazerig.features.lab.report.run_header import RunHeader
+    from gazerig.features.lab.report.page import RunHeader
     from gazerig.features.lab.report.statistics import MeasureResult
     from gazerig.gaze.scanpath.scanpath import Walk
     from gazerig.robot.app.options import RunOptions
@@ -70,7 +70,8 @@ def report(
         from gazerig.features.lab.report.page import banner
         from gazerig.features.lab.report.report import FIGURE_KEYS, report_of
 
-        target = page_file(out or _default_page(file, scene))
+        default = Path(f"report-{scene}.html") if file is None else file.with_suffix(".html")
+        target = page_file(out or default)
         refuse_foreign(files_of(target, FIGURE_KEYS), force)
         with progress_bar() as tell:
             if file is not None:
@@ -211,7 +212,7 @@ def _simulate_run(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeT
 
 def _recording_header(recording: "RunRecording", name: str) -> "RunHeader":
     """Describe a recorded run."""
-    from gazerig.features.lab.report.run_header import RunHeader
+    from gazerig.features.lab.report.page import RunHeader
 
     info = recording.info
     known = (
@@ -265,8 +266,8 @@ def _run_header(
     walk: "Walk",
 ) -> "RunHeader":
     """Return a run's description with the style of its gaze."""
+    from gazerig.features.lab.report.page import RunHeader
     from gazerig.features.lab.report.reference_walk import rig_walk
-    from gazerig.features.lab.report.run_header import RunHeader
 
     gaze = rig.gaze
     styles = (
@@ -310,7 +311,3 @@ def page_file(out: Path) -> Path:
         return out
     # Not with_suffix: the part after the dot of "evening-0.5" is not a suffix.
     return out.with_name(f"{out.name}.html")
-
-
-def _default_page(file: Path | None, scene: str | None) -> Path:
-    return file.with_suffix(".html") if file is not None else Path(f"report-{scene}.html")

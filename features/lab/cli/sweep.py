@@ -4,16 +4,15 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gazerig.config.export import suggestion
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.features.lab.cli import sweep_options as own
 from gazerig.robot.analysis.norm_bands import BY_KEY
-from gazerig.robot.app.options import DEFAULT_SCENE, RunOptions
+from gazerig.robot.app.options import BUSES, DEFAULT_SCENE, RunOptions
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.rig_command import RigCommand
@@ -25,6 +24,54 @@ if TYPE_CHECKING:
     from gazerig.features.lab.sweep.fit import SweepFit
     from gazerig.features.lab.sweep.outcome import Outcome
     from gazerig.features.lab.sweep.sweep import Progress, Sweep, SweepSpec
+
+
+_MOST_SEEDS, _MOST_POINTS, _MOST_JOBS = 10_000, 100_000, 512
+
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUES",
+        help="A key of the rig's YAML and what it takes: LOW:HIGH:STEPS or A,B,C; with --samples "
+        "or --fit also LOW:HIGH. Repeat it for more keys.",
+    ),
+]
+Seeds = Annotated[
+    int, typer.Option(min=1, max=_MOST_SEEDS, help="Runs at each point, each with a seed.")
+]
+FirstSeed = Annotated[int, typer.Option(min=0, help="The first of them, and of the samples.")]
+Seconds = Annotated[
+    float | None, typer.Option(min=0.1, help="Length of a run; default: the scene's round.")
+]
+Samples = Annotated[
+    int | None,
+    typer.Option(
+        min=2,
+        max=_MOST_POINTS,
+        help="A Latin hypercube of N points instead of a grid; with --fit, points to try (60).",
+    ),
+]
+Fit = Annotated[
+    bool,
+    typer.Option(
+        "--fit", help="Search for the values with the fewest measures outside people's bands."
+    ),
+]
+Out = Annotated[
+    Path | None, typer.Option(help="Folder; default: sweep-RIG-SCENE or fit-RIG-SCENE.")
+]
+Jobs = Annotated[
+    int | None, typer.Option(min=1, max=_MOST_JOBS, help="Processes; default: one a processor.")
+]
+Show = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="MEASURE", help="Draw this one; default: those that respond most. Repeatable."
+    ),
+]
+Bus = Annotated[str, typer.Option(help=f"Servos: {' or '.join(BUSES)}.")]
+
 
 app = typer.Typer(add_completion=False)
 
@@ -40,17 +87,17 @@ _DEFAULT_POINTS = 60
 @app.command(cls=RigCommand)
 def sweep(
     rig: RigArgument = "desk",
-    setting: own.Settings = None,
+    setting: Settings = None,
     scene: options.Scene = DEFAULT_SCENE,
-    seeds: own.Seeds = 4,
-    seed: own.FirstSeed = 0,
-    seconds: own.Seconds = None,
-    samples: own.Samples = None,
-    fit: own.Fit = False,
-    out: own.Out = None,
-    jobs: own.Jobs = None,
-    show: own.Show = None,
-    bus: own.Bus = "emulated",
+    seeds: Seeds = 4,
+    seed: FirstSeed = 0,
+    seconds: Seconds = None,
+    samples: Samples = None,
+    fit: Fit = False,
+    out: Out = None,
+    jobs: Jobs = None,
+    show: Show = None,
+    bus: Bus = "emulated",
     profile: options.Profile = None,
     character: options.Character = None,
     rules: options.Rules = None,
@@ -135,8 +182,7 @@ def _search_best(
 ) -> "list[Outcome]":
     """Search for the best point; write it as YAML, with the table and picture of all runs."""
     from gazerig.config.parameters import value_of
-    from gazerig.features.lab.sweep.fit import fit
-    from gazerig.features.lab.sweep.snippet import SNIPPET, snippet_of
+    from gazerig.features.lab.sweep.fit import SNIPPET, fit, snippet_of
 
     count, seed = int(str(spec.search["fit"])), int(str(spec.search["seed"]))
     start = {axis.key: value_of(spec.rig, axis.key) for axis in spec.axes}
@@ -180,8 +226,8 @@ def _write(
     spec: "SweepSpec", folder: Path, outcomes: "Sequence[Outcome]", shown: Sequence[str]
 ) -> None:
     """Write table and figure, and print their paths."""
+    from gazerig.features.lab.sweep.outcome import write_tables
     from gazerig.features.lab.sweep.response_figure import PICTURE, response_png
-    from gazerig.features.lab.sweep.table import write_tables
 
     files = [*write_tables(folder, outcomes)]
     if not all(one.failed for one in outcomes):

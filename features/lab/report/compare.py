@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.features.lab.analysis.multiplicity import correct_p_values
 from gazerig.features.lab.report.compare_page import (
     MeasureDifference,
     Word,
@@ -25,10 +24,17 @@ from gazerig.features.lab.report.compare_page import (
 )
 from gazerig.features.lab.report.files import write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.page import RunHeader
 from gazerig.features.lab.report.plotting import COLOURS, Shown
 from gazerig.features.lab.report.report import Progress, draw_figures, measure_run, read
-from gazerig.features.lab.report.run_header import RunHeader
-from gazerig.features.lab.report.statistics import MeasuredValue, bootstrap, figure, figures, judge
+from gazerig.features.lab.report.statistics import (
+    MeasuredValue,
+    bootstrap,
+    correct_p_values,
+    figure,
+    figures,
+    judge,
+)
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.control.tick import Tick

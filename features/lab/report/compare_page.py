@@ -5,11 +5,17 @@ from math import isfinite
 from typing import Literal, NamedTuple
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.page import Figure, banner, left_out, line_of, render, with_unit
-from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.page import (
+    Figure,
+    RunHeader,
+    banner,
+    left_out,
+    line_of,
+    render,
+    with_unit,
+)
 from gazerig.features.lab.report.statistics import MeasureResult, number
 from gazerig.robot.analysis.norm_bands import GROUPS
-from gazerig.robot.control.feedback_basis import Basis
 
 Word = Literal["more than chance", "may be chance", "too few events"]
 
@@ -106,7 +112,7 @@ def compare_page(
             tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
             tuple(p for p in figures if p.drawing.group == group),
             _left_out(abouts, runs, group),
-            tuple(_basis(run.joints.basis(group)) for run in runs),
+            tuple(run.joints.basis(group) for run in runs),
         )
         for group in GROUPS
     )
@@ -154,10 +160,6 @@ def _left_out(
             if why not in both
         ),
     )
-
-
-def _basis(basis: Basis) -> str:
-    return "" if basis == "measured" else f" ({basis})"
 
 
 def _facts(

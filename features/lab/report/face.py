@@ -110,8 +110,7 @@ def density(rows: Floats) -> Floats:
     on_grid = (z >= 0) & (z < len(_Z_M)) & (y >= 0) & (y < len(_Y_M))
     cells = z[on_grid] * len(_Y_M) + y[on_grid]
     time = np.bincount(cells, rows[on_grid, 2], len(_Z_M) * len(_Y_M))
-    bell_z, bell_y = _bells()
-    out: Floats = bell_z @ time.reshape(len(_Z_M), len(_Y_M)) @ bell_y
+    out: Floats = _bell("z") @ time.reshape(len(_Z_M), len(_Y_M)) @ _bell("y")
     return out
 
 
@@ -222,10 +221,8 @@ def _cells(places: Floats, centres: Floats) -> NDArray[np.intp]:
 
 
 @cache
-def _bells() -> tuple[Floats, Floats]:
-    return _bell(_Z_M), _bell(_Y_M)
-
-
-def _bell(centres: Floats) -> Floats:
+def _bell(axis: str) -> Floats:
+    """Return the weights (n, n) that spread time over the cells of an axis; computed once."""
+    centres = _Z_M if axis == "z" else _Y_M
     out: Floats = np.exp(-0.5 * ((centres[:, None] - centres[None]) / _SPREAD_M) ** 2)
     return out

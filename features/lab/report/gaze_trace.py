@@ -228,10 +228,11 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
     off_deg = nan
     if face is not None:
         since_s = min(max(0.0, tick.t_s - face[1]), _LONGEST_FORESEEN_S)
-        off_deg = _face_angle_deg(face[0], head)
+        R = face[0].R_world_face
+        ahead = R[0][0], R[1][0], R[2][0]
+        off_deg = degrees(angle_between(ahead, sub(head, face[0].p_world_m)))
         gaze_at = _on_plane(face[0], since_s, head, way)
         if target.kind == "face":
-            R = face[0].R_world_face
             on_left = on_face(left, sight_left, point, R) or on_left
             on_right = on_face(right, sight_right, point, R) or on_right
     eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
@@ -280,12 +281,6 @@ def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
     centre = add(found.p_world_m, scale(found.v_world_m_s, since_s))
     seen = beside_m(way, sub(centre, tick.pose.p_world_head_m)) <= NEAR_FACE_M
     return (found, captured_s), seen
-
-
-def _face_angle_deg(face: Face, head: Vec3) -> float:
-    """Return the angle of a face away from the robot's."""
-    R = face.R_world_face
-    return degrees(angle_between((R[0][0], R[1][0], R[2][0]), sub(head, face.p_world_m)))
 
 
 def _on_plane(face: Face, since_s: float, head: Vec3, way: Vec3) -> tuple[float, float]:

@@ -61,10 +61,6 @@ _BLINKS = (
 )  # fmt: skip
 
 
-def _no_neck(joints: JointBasis) -> bool:
-    return not joints.has("neck_yaw", "neck_pitch", "neck_roll")
-
-
 def _eyes_estimated(joints: JointBasis) -> bool:
     return any("eye" in name for name in joints.estimated) and all(
         name in joints.estimated for name in joints.names if "eye" in name
@@ -74,7 +70,7 @@ def _eyes_estimated(joints: JointBasis) -> bool:
 _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     (
         (*_HEAD_PART, "head_roll", "vor"),
-        _no_neck,
+        lambda joints: not joints.has("neck_yaw", "neck_pitch", "neck_roll"),
         "This rig has no neck, so it has no head movement.",
     ),
     (

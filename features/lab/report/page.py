@@ -3,6 +3,7 @@
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -13,10 +14,30 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.plotting import Drawing
-from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.reference_walk import ReferenceWalk
 from gazerig.features.lab.report.statistics import MeasureResult, number
 from gazerig.robot.analysis.norm_bands import BANDS, GROUPS, NormBand
 from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
+
+
+@dataclass(frozen=True)
+class RunHeader:
+    """A run's name and circumstances.
+
+    name: short, for figures; facts: (what, value) rows of the page's head
+    styles: e.g. "saccade min_jerk", "scanpath markov": which notes of the bands apply
+    model: the configured walk over faces, None for another scanpath model
+    warnings: e.g. that the recording is incomplete
+    duration_s: length of the run, None if unknown before it is read
+    """
+
+    name: str
+    facts: tuple[tuple[str, str], ...] = ()
+    styles: frozenset[str] = field(default_factory=frozenset)
+    model: ReferenceWalk | None = None
+    warnings: tuple[str, ...] = ()
+    duration_s: float | None = None
+
 
 _CLASSES = {
     "pass": "pass", "uncertain": "uncertain", "outside": "outside", "too few events": "few",

@@ -70,11 +70,6 @@ class Drawing(NamedTuple):
     size_in: tuple[float, float] = (8.4, 3.8)
 
 
-def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
-    """Return the caption of a figure of these runs."""
-    return drawing.caption.replace("{measured}", basis_text(runs, drawing.group))
-
-
 def basis_text(runs: Sequence[Shown], group: str) -> str:
     """Return the basis of several runs together, e.g. "measured or estimated"."""
     return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))

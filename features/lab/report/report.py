@@ -17,16 +17,14 @@ from gazerig.features.lab.report import (
     figures_saccades,
     landing,
     pursuit,
-    reactions,
     rests,
     saccades,
 )
 from gazerig.features.lab.report.files import write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.heads import MutualGazeReport
-from gazerig.features.lab.report.page import Figure, report_page
-from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, caption_of, png
-from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.page import Figure, RunHeader, report_page
+from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, basis_text, png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
 from gazerig.robot.analysis.norm_bands import BY_KEY, applies
 from gazerig.robot.control.tick import Tick
@@ -56,20 +54,6 @@ class Report(NamedTuple):
     data: Path
 
 
-def report(
-    ticks: Iterable[Tick], about: RunHeader, out: Path, progress: Progress, force: bool = False
-) -> Report:
-    """Write one HTML page, a PNG a figure, and the numbers as JSON; return the findings.
-
-    out: the page to write; the PNGs go into the folder NAME_figures of the same parent
-    force: replace existing files
-
-    Raises:
-        SetupError: a file cannot be written.
-    """
-    return report_of(read(ticks, about, progress), about, out, progress, force)
-
-
 def report_of(
     run: GazeTrace,
     about: RunHeader,
@@ -78,8 +62,10 @@ def report_of(
     force: bool = False,
     gaze: MutualGazeReport | None = None,
 ) -> Report:
-    """Write the report of a trace; see ``report``.
+    """Write one HTML page, a PNG a figure, and the numbers as JSON; return the findings.
 
+    out: the page to write; the PNGs go into the folder NAME_figures of the same parent
+    force: replace existing files
     gaze: mutual gaze of this head and another one, None without another head
 
     Raises:
@@ -118,7 +104,7 @@ def measure_run(run: GazeTrace) -> tuple[MeasuredValue, ...]:
     each = (
         saccades.measures(run), landing.measures(run), rests.measures(run), face.measures(run),
         eye_head.measures(run), pursuit.measures(run), blinks.measures(run),
-        eye_contact.measures(run), reactions.measures(run),
+        eye_contact.measures(run), saccades.reaction_measures(run),
     )  # fmt: skip
     return tuple(
         m
@@ -140,7 +126,9 @@ def draw_figures(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...
         progress(DRAWING, count / len(DRAWINGS))
         able = [shown for shown in runs if not shown.run.joints.left_out(drawing.key)]
         if able:
-            figures.append(Figure(drawing, png(drawing, able), caption_of(drawing, able)))
+            basis = basis_text(able, drawing.group)
+            caption = drawing.caption.replace("{measured}", basis)
+            figures.append(Figure(drawing, png(drawing, able), caption))
     progress(DRAWING, 1.0)
     return tuple(figures)
 

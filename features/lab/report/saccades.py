@@ -1,5 +1,7 @@
 """Saccades of a run and the human main sequence."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace
@@ -18,6 +20,9 @@ LEAST_DEG = 1.0
 
 _SMALL_PEAK_DEG, _SMALL_DURATION_DEG = 8.0, 12.0
 _SOON_S, _PAUSE_S = 0.1, 2.0
+
+EXPRESS_MS = 120.0
+"""Faster reactions are express saccades."""
 
 
 def table(run: GazeTrace) -> Floats:
@@ -46,54 +51,41 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     seen, asked = table(run), commanded_table(run)
     every = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG]
     unasked = np.array([s.commanded is None for s in every], dtype=float)
+    onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
     skew = seen[:, 3] - human.peak_at(seen[:, 0])
     return [
-        *(_peak(key, seen, asked, *ends) for key, ends in _PEAKS),
-        *(_duration(key, seen, asked, *ends) for key, ends in _DURATIONS),
+        *(_share_inside(seen, asked, *curves) for curves in _CURVES),
         MeasuredValue("skew", skew, median),
         MeasuredValue("below_15", (seen[:, 0] < 15.0).astype(float), mean),
-        MeasuredValue("rate", _intervals(run), one_over_mean),
+        MeasuredValue("rate", np.diff(onsets), one_over_mean),
         MeasuredValue("too_soon", (_pauses(run) < _SOON_S).astype(float), mean),
         MeasuredValue("unasked", unasked, mean),
         MeasuredValue("rest_error", rest_errors(run), median),
     ]
 
 
-_PEAKS = (("peak_small", (LEAST_DEG, _SMALL_PEAK_DEG)), ("peak_large", (_SMALL_PEAK_DEG, 999.0)))
-_DURATIONS = (
-    ("duration_small", (LEAST_DEG, _SMALL_DURATION_DEG)),
-    ("duration_large", (_SMALL_DURATION_DEG, 999.0)),
+_CURVES = (
+    ("peak_small", LEAST_DEG, _SMALL_PEAK_DEG, 2, human.slowest_peak, human.fastest_peak),
+    ("peak_large", _SMALL_PEAK_DEG, 999.0, 2, human.slowest_peak, human.fastest_peak),
+    ("duration_small", LEAST_DEG, _SMALL_DURATION_DEG, 1, human.shortest_ms, human.longest_ms),
+    ("duration_large", _SMALL_DURATION_DEG, 999.0, 1, human.shortest_ms, human.longest_ms),
 )
+"""Measures by human curves: key, smallest and largest amplitude in deg, column, lower and upper
+curve over amplitudes."""
 
 
-def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> MeasuredValue:
-    """Return whether each peak speed is between the human curves."""
-
-    def inside(rows: Floats) -> Floats:
-        a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
-        fits = (a[:, 2] >= human.slowest_peak(a[:, 0])) & (a[:, 2] <= human.fastest_peak(a[:, 0]))
-        return fits.astype(float)
-
-    return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
-
-
-def _duration(
-    key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float
-) -> MeasuredValue:
-    """Return whether each duration is between the human lines."""
+def _share_inside(
+    seen: Floats, asked: Floats, key: str, low_deg: float, high_deg: float, column: int,
+    lower: Callable[[Floats], Floats], upper: Callable[[Floats], Floats],
+) -> MeasuredValue:  # fmt: skip
+    """Return whether a column of each saccade is between two human curves."""
 
     def inside(rows: Floats) -> Floats:
         a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
-        fits = (a[:, 1] >= human.shortest_ms(a[:, 0])) & (a[:, 1] <= human.longest_ms(a[:, 0]))
+        fits = (a[:, column] >= lower(a[:, 0])) & (a[:, column] <= upper(a[:, 0]))
         return fits.astype(float)
 
     return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
-
-
-def _intervals(run: GazeTrace) -> Floats:
-    """Return seconds from each commanded saccade to the next."""
-    onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
-    return np.diff(onsets)
 
 
 def _pauses(run: GazeTrace) -> Floats:
@@ -111,3 +103,12 @@ def rest_errors(run: GazeTrace) -> Floats:
     off = 0.5 * (run.column("off_left") + run.column("off_right"))
     parts = [off[run.between(f.start_s + 0.04, f.end_s)] for f in run.fixations]
     return np.array([np.median(part) for part in parts if len(part)])
+
+
+def reaction_measures(run: GazeTrace) -> list[MeasuredValue]:
+    """Return the measures of reactions: latency of the gaze to things that come into view."""
+    latency_ms = np.array([1e3 * reaction.latency_s for reaction in run.reactions])
+    return [
+        MeasuredValue("reaction", latency_ms, median),
+        MeasuredValue("express", (latency_ms < EXPRESS_MS).astype(float), mean),
+    ]

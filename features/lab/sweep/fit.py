@@ -9,11 +9,53 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from gazerig.config.parameters import differences, flattened
+from gazerig.config.schema import load_rig
+from gazerig.config.text import changes_text
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.sweep.axes import Axis, Point
+from gazerig.features.lab.sweep.axes import Axis, Point, latin_shares, point_at
 from gazerig.features.lab.sweep.outcome import REPORT, VERDICT, Outcome, grade
-from gazerig.features.lab.sweep.search import search
+from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
+from gazerig.robot.app.options import RunOptions
+
+Scores = Callable[[Sequence[Point]], Sequence[float]]
+"""Returns the score of each point; the search minimises it."""
+
+_LEAST = 8
+
+
+def search(scores: Scores, axes: Sequence[Axis], start: Point, count: int, seed: int) -> None:
+    """Search for the lowest score by differential evolution (Storn & Price 1997).
+
+    Begins with a Latin hypercube, and ``start`` if it is on the axes.
+
+    Args:
+        scores: called for whole generations.
+        axes: parameters to vary.
+        start: an initial point.
+        count: approximate number of points, at least two generations.
+        seed: of the search.
+    """
+    from scipy.optimize import differential_evolution  # half a second of processor
+
+    members = max(_LEAST, 2 * len(axes))
+    rng = np.random.default_rng(seed)
+    first = latin_shares(len(axes), members, rng)
+    if all(axis.has(start[axis.key]) for axis in axes):
+        first[0] = [axis.share(start[axis.key]) for axis in axes]
+
+    def many(columns: Floats) -> Floats:
+        points = [point_at(axes, shares) for shares in np.atleast_2d(columns.T)]
+        return np.array(scores(points))
+
+    differential_evolution(
+        many, [(0.0, 1.0)] * len(axes), init=first, maxiter=max(1, round(count / members) - 1),
+        vectorized=True, updating="deferred", polish=False, tol=0.0, rng=rng,
+    )  # fmt: skip
+
 
 Runner = Callable[[Sequence[Point]], Sequence[Sequence[Outcome]]]
 """Runs points; returns the outcomes of each, one for each seed."""
@@ -124,3 +166,19 @@ def _measure_grade(outcome: Outcome, key: str) -> float:
 
 def _key(point: Point) -> str:
     return json.dumps(point)
+
+
+SNIPPET = "best.yaml"
+
+
+def snippet_of(options: RunOptions, point: Point) -> str:
+    """Return the values of a point as YAML that ``gazerig run RIG --character FILE`` takes.
+
+    A run has only one character, so the changes of the runs' own character are included.
+    """
+    changes = dict(point)
+    if options.character is not None:
+        plain = load_rig(options.rig, None, options.profile)
+        whole = load_rig(options.rig, options.character, options.profile)
+        changes = flattened(whole, differences(plain, whole)) | changes
+    return changes_text(changes)

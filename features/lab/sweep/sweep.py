@@ -47,7 +47,10 @@ class SweepSpec:
         return {
             "gazerig": gazerig.__version__,
             "options": {**options, "seed": None},
-            "set": {axis.key: _levels(axis) for axis in self.axes},
+            "set": {
+                axis.key: f"{axis.low:g}:{axis.high:g}" if axis.is_range else list(axis.values)
+                for axis in self.axes
+            },
             "seeds": list(self.seeds),
             "search": dict(self.search),
             "rig": plain(self.rig),
@@ -116,8 +119,3 @@ def open_sweep(
         WorkerPool(spec.job, jobs or processors(), stopped) as pool,
     ):
         yield Sweep(spec.seeds, store, pool)
-
-
-def _levels(axis: Axis) -> object:
-    """Return the values of an axis as JSON."""
-    return f"{axis.low:g}:{axis.high:g}" if axis.is_range else list(axis.values)
