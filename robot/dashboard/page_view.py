@@ -174,7 +174,11 @@ class PageView:
     def _draw(self) -> None:
         if self._newest is not None:
             self._viewpoints.fit(self._newest)
-            self._show_world()
+            # A simulated world draws its room and people; detections are then only marked.
+            if self._world_now is not None:
+                self._world.show(*self._world_now)
+            self._head.on_table = self._world_now is not None
+            self._people.mark_only(self._world_now is not None)
             layers = self._panel.layers
             self._head.show(self._newest, sight=layers.sight, camera=layers.camera)
             self._people.show(self._newest, parts=layers.parts)
@@ -188,14 +192,6 @@ class PageView:
         if self._image is not None:
             self._panel.show_image(self._image)
         self._newest = self._jpeg = self._image = None
-
-    def _show_world(self) -> None:
-        """Draw the simulated room and people; detections of the rig are only marked."""
-        there = self._world_now is not None
-        if self._world_now is not None:
-            self._world.show(*self._world_now)
-        self._head.on_table = there
-        self._people.mark_only(there)
 
     def silent(self) -> None:
         """Show that no data arrives any more, with the last data."""

@@ -1,6 +1,7 @@
 """Panels that show the rig: camera, reasons, traces, statistics and health."""
 
 from collections.abc import Callable
+from functools import partial
 from math import inf
 
 import cv2
@@ -149,7 +150,7 @@ class PanelView:
         layers = OverlayChoices()
         for order, (name, says) in enumerate(OverlayChoices.NAMES.items()):
             box = place.checkbox(says, getattr(layers, name), order=order)
-            box.on_change(_setter(layers, name))
+            box.on_change(partial(_set_layer, layers, name))
         depth = place.checkbox("depth instead of the camera image", value=False, order=99)
         depth.on_change(lambda on, _: self.depth(on))
         return layers
@@ -165,8 +166,5 @@ def estimation_note(snapshot: Snapshot) -> str:
     )
 
 
-def _setter(layers: OverlayChoices, name: str) -> Callable[[bool, str], None]:
-    def put(wanted: bool, client: str) -> None:
-        setattr(layers, name, wanted)
-
-    return put
+def _set_layer(layers: OverlayChoices, name: str, is_on: bool, client: str) -> None:
+    setattr(layers, name, is_on)

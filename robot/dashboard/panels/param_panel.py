@@ -116,10 +116,7 @@ class ParamPanel:
         self._unsaved: frozenset[str] = frozenset()
         self._controls: dict[str, ParamControl] = {}
         self._unanswered = self._known = 0
-        self._build(place.own(client))
-        self._listen()
-
-    def _build(self, place: Container) -> None:
+        place = place.own(client)
         self._find = place.text("find", on="key", hint="words of a key or its meaning", order=1)
         self._group = place.choice("group", (NOTHING,), order=2)
         self._found = place.section("parameters", order=3)
@@ -129,8 +126,6 @@ class ParamPanel:
         self._file = place.text(
             "save as", on="enter", hint="a new .yaml file in the rig's folder; Enter saves", order=5
         )
-
-    def _listen(self) -> None:
         self._find.on_change(lambda text, _: self._show_chosen())
         self._group.on_change(lambda group, _: self._choose())
         self._buttons.on_press(lambda button, _: self._ask(_SAVE if button == SAVE else _REVERT))

@@ -5,6 +5,7 @@ returns, so that every browser shows the same.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from html import escape
 from typing import Any
 
@@ -49,22 +50,16 @@ class ReplayView:
         }
         self.events = place.section("events", order=7).html()
         self._playing = False
-        self._listen()
-
-    def _listen(self) -> None:
         self.slider.on_change(self._seek)
         self.play.on_press(lambda _, client: self._ask(client, {"play": not self._playing}))
         self.speed.on_change(
             lambda speed, client: self._ask(client, {"speed": float(speed.removesuffix("x"))})
         )
         for way, group in self.steps.items():
-            group.on_press(self._stepper(way))
+            group.on_press(partial(self._step, way))
 
-    def _stepper(self, way: str) -> Callable[[str, str], None]:
-        def step(kind: str, client: str) -> None:
-            self._ask(client, {"step": f"{way} {kind}"})
-
-        return step
+    def _step(self, way: str, kind: str, client: str) -> None:
+        self._ask(client, {"step": f"{way} {kind}"})
 
     def _seek(self, at_s: float, client: str) -> None:
         self._asked_s = at_s
@@ -87,17 +82,14 @@ class ReplayView:
         if self._asked_s is None or sought_s == self._asked_s:
             self._asked_s = None
             self.slider.value = min(round(at_s, 3), self._duration_s)
-        self._show_playing(bool(state["playing"]), float(state["speed"]))
+        if state["playing"] != self._playing:
+            self._playing = bool(state["playing"])
+            self.play.options = (_PAUSE if self._playing else _PLAY,)
+        speed = _speed_name(float(state["speed"]))
+        if speed in self.speed.options:
+            self.speed.value = speed
         self.place.content = position_text(at_s, self._duration_s, self._playing)
         self.events.content = event_list(self._events, at_s)
-
-    def _show_playing(self, playing: bool, speed: float) -> None:
-        if playing != self._playing:
-            self._playing = playing
-            self.play.options = (_PAUSE if playing else _PLAY,)
-        name = _speed_name(speed)
-        if name in self.speed.options:
-            self.speed.value = name
 
 
 def strip(marks: Mapping[str, Sequence[int]]) -> str:
