@@ -5,8 +5,7 @@ from math import degrees, isfinite
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.manual_control import ManualControl
-from gazerig.features.bringup.move_result import MoveResult, Step
+from gazerig.features.bringup.manual_control import ManualControl, MoveResult, Step
 from gazerig.gaze.angles import angle_between, norm, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor

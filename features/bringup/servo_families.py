@@ -1,4 +1,7 @@
-"""The kinds of smart servos, each as bring-up deals with it: the only place that names makes."""
+"""The kinds of smart servos, one value a kind: the only module of bring-up that names makes.
+
+Boards of hobby servos, whose channels do not answer, are not among them.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -2,6 +2,7 @@
 
 A bus watchdog is fed by it, as by every packet. Of a Maestro only pulse widths are read and never
 its errors: reading them clears them, and the program that moves the servos would miss them.
+A bus that is opened for moving sets its servos up, which is a write; a monitor only reads.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.bringup.look_at import GazeResult, ends_reached, gaze_text, look_at
-from gazerig.features.bringup.manual_control import JogParams, ManualControl, duration_s
-from gazerig.features.bringup.move_result import Step
+from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, duration_s
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.gaze_models import gaze_parts

@@ -1,4 +1,7 @@
-"""A joint behind a push rod: marked places in, its linkage and range out. Pure.
+"""A joint behind a push rod: a person marks places and reads angles; linkage and range result.
+
+A hobby servo is moved by steps of its pulse width, as no sensor measures its position; a servo
+that reports its position is turned by hand. Nothing is printed or written here.
 
 Positions are in the unit of the servo's model (steps, or us of pulse width), angles in
 degrees at the joint.

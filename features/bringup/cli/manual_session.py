@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 import typer
 
 from gazerig.config.rig import Rig
-from gazerig.features.bringup.manual_control import JogParams, ManualControl, park_slowly
-from gazerig.features.bringup.move_result import Step
+from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, park_slowly
 from gazerig.features.bringup.servo_families import KINDS
 from gazerig.robot.app.bus_wiring import (
     bus_names,

@@ -20,8 +20,14 @@ from gazerig.features.bringup.look_at import (
     look_at,
     refuse_not_finite,
 )
-from gazerig.features.bringup.manual_control import JogParams, ManualControl, refuse_beyond
-from gazerig.features.bringup.move_result import PASSING, MoveResult, Step
+from gazerig.features.bringup.manual_control import (
+    PASSING,
+    JogParams,
+    ManualControl,
+    MoveResult,
+    Step,
+    refuse_beyond,
+)
 from gazerig.robot.app.rig_limits import lid_ends, limits
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
