@@ -1,4 +1,4 @@
-"""How long a sweep of 64 runs takes on two processes, against one after the other.
+"""Duration of a sweep of 64 runs on two processes, and of the same runs one after the other.
 
     PYTHONPATH=.links python tests/lab/bench_sweep.py [--runs N] [--seconds S] [--bus BUS]
 

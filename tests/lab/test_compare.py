@@ -1,4 +1,4 @@
-"""Two runs side by side: what differs is found, what is chance is not, and the page says so."""
+"""Comparison of two runs: real differences are found, chance is not, and the page shows both."""
 
 import json
 from html import unescape
@@ -66,7 +66,7 @@ def test_too_few_events_tell_nothing() -> None:
 
 def test_dealing_out_again_gives_the_chance_of_a_known_case() -> None:
     a, b = MeasuredValue("visit", np.zeros(4), mean), MeasuredValue("visit", np.ones(4), mean)
-    # of the 70 ways to deal 8 events out, 2 are as extreme
+    # of the 70 deals of 8 events, 2 are as extreme
     assert chance(a, b, np.random.default_rng(0)) == pytest.approx(2 / 70, abs=0.012)
     assert chance(a, a, np.random.default_rng(0)) == 1.0
 

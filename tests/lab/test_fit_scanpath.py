@@ -119,7 +119,7 @@ def test_labelled_fixations_of_a_known_walk_give_it_back(tmp_path: Path) -> None
 
 
 def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) -> None:
-    # Looks of a fifth of a second: shorter ones than 60 ms no detector can be asked for.
+    # Looks of a fifth of a second: a detector needs at least 60 ms.
     recording = as_csv(tmp_path / "gaze.csv", samples(boxes, walked(1000, 2, 0.2), 3))
     out = tmp_path / "mine.yaml"
     report = fit(recording, boxes, out, "none")

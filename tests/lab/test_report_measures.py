@@ -1,4 +1,4 @@
-"""What the report measures of landings, rests, gains, blinks and reactions, on made-up truth."""
+"""Measures of landings, rests, gains, blinks and reactions, from synthetic traces."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -104,7 +104,7 @@ def looked(*looks_s: tuple[float, float]) -> GazeTrace:
 
 @pytest.mark.parametrize("cut", [(0.0, 6.0), (22.0, 31.0)], ids=["begins", "ends"])
 def test_a_look_that_the_run_cuts_off_is_no_whole_bout(cut: tuple[float, float]) -> None:
-    """How long it would have lasted is not known, only that it was at least so long."""
+    """Its full length is unknown; only a lower bound is known."""
     found = {m.key: m for m in eye_contact.measures(looked((10.0, 12.0), (15.0, 19.0), cut))}
     for key in ("bout_none", "bout_talk", "bout_listen"):
         assert sorted(found[key].rows) == pytest.approx([2.0, 4.0], abs=0.02)

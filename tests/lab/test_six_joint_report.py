@@ -1,4 +1,4 @@
-"""Reports of a rig of six hobby servos without a neck say what is estimated."""
+"""Reports of a rig of six hobby servos without a neck mark estimated results."""
 
 import json
 from html import unescape

@@ -110,7 +110,7 @@ def test_values_that_the_rig_allows_nowhere_are_refused_before_anything_runs() -
 def test_a_rule_between_two_parameters_refuses_only_what_no_point_allows() -> None:
     axes = read(f"{LOW}=0.2,1.5", f"{HIGH}=1.0,2.0")
     points = grid(axes)
-    check_points(RIG, axes, points)  # 1.5 and 1.0 exclude each other: those runs say so
+    check_points(RIG, axes, points)  # 1.5 and 1.0 exclude each other: their runs report it
     axes = read(f"{LOW}=2.5,3.0", f"{HIGH}=1.0,2.0")
     with pytest.raises(ConfigError, match="max_salience must be above min_salience"):
         check_points(RIG, axes, grid(axes))

@@ -1,4 +1,4 @@
-"""Servos in a world with physics beside the same ones alone: python tests/world/bench_plant.py
+"""Servos in a world with physics compared with the same alone: python tests/world/bench_plant.py
 
 Prints, as Markdown:
 - the same moves of servos with mechanics of their own and in a world: overshoot, time until within
@@ -52,7 +52,7 @@ Goal = Callable[[float], float]
 class Move(NamedTuple):
     """A motion to be compared.
 
-    ends_deg: where it is to come to rest; None: it does not
+    ends_deg: final position; None: the servo does not come to rest
     """
 
     name: str

@@ -1,9 +1,9 @@
-"""What a world's pictures cost and what the detectors find in them: bench_world.py [--quick]
+"""Cost of a world's pictures, and detections in them: bench_world.py [--quick]
 
-Processor time of a picture by renderer, size and what it shows; of lens, exposure and rolling
-shutter; faces found by distance, yaw, detector and look, how near their landmarks and poses are to
-the truth; what the motion detector finds in a room where nothing moves and when somebody waves;
-how far the gaze is off the true faces in a whole run, from servo bytes to pictures and back.
+Processor time of a picture by renderer, size and content, and of lens, exposure and rolling
+shutter; faces found by distance, yaw, detector and look, with the errors of their landmarks and
+poses; detections of motion in an idle room and of a person who waves; error of the gaze from the
+true faces in a whole run, from servo bytes to pictures and back.
 Milliseconds are processor time, the least of some rounds. YuNet takes part where its file is
 (--yunet FILE). MUJOCO_GL chooses the renderer.
 """
@@ -148,7 +148,7 @@ def lens_costs(args: argparse.Namespace) -> None:
 
 
 def _one_person() -> "WorldPicture":
-    """Return a room with one person who stands at 1.2 m and does nothing."""
+    """Return a room with one person who is at 1.2 m and does nothing."""
     script = WorldScript({"p": PersonScript("there")}, places={"there": PlaceScript(1.2, 0.0)})
     return _played(script)
 
@@ -237,7 +237,7 @@ def _detectors(yunet: Path) -> dict[str, FaceDetector]:
 
 
 def motion(args: argparse.Namespace) -> None:
-    """Print what the motion detector finds in an empty room, and of somebody who waves."""
+    """Print detections of motion in an empty room, and of a person who waves."""
     from gazerig.features.world.renderer import RendererParams
 
     seconds = 4.0 if args.quick else 12.0
@@ -290,7 +290,7 @@ def scripts(args: argparse.Namespace) -> None:
 
 
 class _Seen(NamedTuple):
-    """A face: where it is in the picture; plain: near, in the picture and hardly turned away."""
+    """A face: its place in the picture; plain: near, in the picture and hardly turned away."""
 
     place_px: np.ndarray
     away_m: float

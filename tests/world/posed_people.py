@@ -106,7 +106,7 @@ class PosedPeople:
         return np.array(turn), p
 
     def landmarks_px(self, pose: Pose) -> Floats:
-        """Return where the five landmarks truly are."""
+        """Return the true positions of the five landmarks."""
         R, p = self.face(pose)
         size = self.figures.measures[f"p{pose.look}"].head_scale
         marks = size * LANDMARKS_FACE_M @ R.T + p
@@ -117,7 +117,7 @@ class PosedPeople:
         return PUPIL_DISTANCE_M * self.lens.fx_px / pose.away_m
 
     def gather(self, count: int) -> None:
-        """Put the first so many people before the camera, side by side; the others away."""
+        """Put the first ``count`` people before the camera, side by side; the others away."""
         self._gathered = count
 
     def draw(self) -> ImageArray:
@@ -155,7 +155,7 @@ class PosedPeople:
             data.mocap_quat[number] = R.as_quat(scalar_first=True)
 
     def _moved(self, pose: Pose, t_s: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return where the head's joint goes and where it is, and how head and body are turned."""
+        """Return position of the head's joint, target position, and turns of head and body."""
         name = f"p{pose.look}"
         found = self.figures.segments(t_s)
         R_face, p_face = self.face(pose)
@@ -172,7 +172,7 @@ def _matrix(quat: Floats) -> Floats:
 
 
 class Found(NamedTuple):
-    """How near a detected face is to the truth.
+    """Error of a detected face.
 
     off_px: (5, 2) of its landmarks; yaw_rad, pitch_rad: of the face, None without a pose
     """
@@ -244,7 +244,7 @@ def mean_abs_deg(values: Sequence[float | None]) -> float:
 
 
 def _within(box_px: tuple[float, float, float, float] | None, place_px: Floats) -> bool:
-    """Return whether a place is in the box of a blob, or hardly beside it."""
+    """Return whether a place is in the box of a blob, or just outside it."""
     if box_px is None:
         return False
     x, y, width, height = box_px
@@ -272,7 +272,7 @@ def watch_motion(
     Args:
         script: of one person, called p, who may wave.
         seconds: how long.
-        turn: 0 for a head that stands, 1 for one that swings 20 deg to either side in 2 s.
+        turn: 0 for a head at rest, 1 for a head that swings 20 deg to either side in 2 s.
         params: of the renderer.
         size_px: of the pictures.
 

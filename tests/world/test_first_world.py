@@ -1,4 +1,4 @@
-"""What ``make run`` shows where a world can be rendered, and where it cannot."""
+"""Choice of ``make run`` if a world can be rendered, and if it cannot."""
 
 import pytest
 

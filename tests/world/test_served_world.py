@@ -107,7 +107,7 @@ def test_without_pictures_detections_are_those_of_the_same_people(
     seen = camera(host, error)
     seen.open()
     assert (("egl: it is missing" in " ".join(seen.events())) is True) == (error is not None)
-    assert seen.latest(host.t_s) is None  # nobody has begun
+    assert seen.latest(host.t_s) is None  # the script has not begun
     host.serve(0.02, heard=True)
     found = seen.latest(host.t_s + 0.2)
     assert seen.start_s == host.poses.begin_s

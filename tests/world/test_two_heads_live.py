@@ -93,7 +93,7 @@ def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
         elif seen and not first.stopped and not other.stopped:
             seen.append((False, False))
             asked.request("the test")
-        # A head that was starved stopped later, and refuses: whoever asked has to ask again.
+        # A late head may have stopped later and refuse: then the request must be repeated.
         if len(seen) == 1 and tick.t_s - asked_s[-1] > MIN_RESUME_GAP_S:
             asked_s.append(tick.t_s)
             together.command(Resume("a test"))
@@ -153,7 +153,7 @@ def running(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     with Branch(gazerig(*COMMAND), stderr=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stderr is not None
-        assert "two-heads" in process.stderr.readline()  # said with the first tick
+        assert "two-heads" in process.stderr.readline()  # printed with the first tick
         time.sleep(1.0)
         yield process
         process.kill()

@@ -1,4 +1,4 @@
-"""Every act of a person moves what it says, while it lasts, and leaves the rest alone."""
+"""Every act of a person moves its own segments, during its time, and no others."""
 
 from functools import cache
 from typing import get_args
@@ -14,7 +14,7 @@ from gazerig.gaze.types import Floats
 AT_S = 3.0
 ROUND_S = 18.0
 
-# What is done, by whom of the two, and the segments that it moves most.
+# The act, the person who does it, and the segments that it moves most.
 CASES: dict[str, tuple[Act, ...]] = {
     "walk": (Act(AT_S, "walk", "front"), Act(9.0, "walk", "behind")),
     "step": (Act(AT_S, "step", ahead_m=0.3), Act(6.0, "step", ahead_m=-0.3)),
@@ -56,7 +56,7 @@ def still_m(t_s: float, cup: bool) -> Floats:
 
 
 def moved_m(acts: tuple[Act, ...], *, cup: bool = False) -> dict[str, float]:
-    """Return how far each segment of anna is from where it is without the acts, at most."""
+    """Return the largest distance of each segment of anna from its position without the acts."""
     one = figures(acts, cup=cup)
     found = dict.fromkeys(SEGMENTS, 0.0)
     for t_s in np.arange(AT_S, AT_S + 4.0, 0.05).tolist():

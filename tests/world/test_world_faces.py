@@ -1,4 +1,4 @@
-"""Both detectors find the faces of a world's people; nothing moves in a room where nobody does."""
+"""Both detectors find the faces of a world's people; an idle room has no motion."""
 
 from collections.abc import Iterator
 from math import radians
@@ -45,7 +45,7 @@ def test_faces_of_all_looks_are_found_where_they_are(people: PosedPeople, kind: 
 
 
 def test_a_posed_face_has_its_landmarks_where_the_picture_has_them(people: PosedPeople) -> None:
-    """The iris is darker than the white beside it, where the truth says that the pupils are."""
+    """The iris is darker than the white next to it, at the true places of the pupils."""
     pose = next(poses((5,), (0.7,), (0,), 1))._replace(t_s=0.2, yaw=0.0, pitch=0.0, roll=0.0)
     image = people.show(pose).mean(axis=2)
     for x, y in people.landmarks_px(pose)[:2]:

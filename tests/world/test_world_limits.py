@@ -87,7 +87,7 @@ def test_files_that_are_included_count_too(tmp_path: Path) -> None:
     with pytest.raises(SetupError, match=r"more\.xml: size: memory='9T'"):
         world_model(None, [], world(tmp_path, "<include file='more.xml'/>"))
     ring = world(tmp_path, "<include file='own.xml'/>")
-    refuse_excessive(ring)  # MuJoCo says what is wrong with it
+    refuse_excessive(ring)  # MuJoCo reports the fault itself
 
 
 def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def _world_file(folder: Path, inside: str) -> Path:
 
 
 def test_a_users_world_carries_the_head_at_its_site(tmp_path: Path) -> None:
-    """The site says where the neck base stands."""
+    """The site is the place of the neck base."""
     path = _world_file(tmp_path, '<site name="gazerig" pos="1 2 3"/>')
     model = world_model(None, [rig_in_world(load_rig("desk"), looks=False)], path)
     data = mujoco.MjData(model.mj)
@@ -124,7 +124,7 @@ UNUSABLE = (
 
 @pytest.mark.parametrize(("text", "why"), UNUSABLE)
 def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path: Path, text: str, why: str) -> None:
-    """What MuJoCo says of it follows."""
+    """MuJoCo's own message follows."""
     path = tmp_path / "own.xml"
     path.write_text(text)
     with pytest.raises(SetupError, match=rf"own\.xml: MuJoCo cannot {why}") as found:

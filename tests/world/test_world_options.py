@@ -1,4 +1,4 @@
-"""What can be asked of a world on the command line, and what is refused in one line."""
+"""Options of a world on the command line, and refusals in one line."""
 
 import importlib.util
 from dataclasses import fields, replace

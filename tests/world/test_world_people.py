@@ -326,7 +326,7 @@ def test_a_head_does_not_turn_to_what_is_behind_it() -> None:
 
 
 def test_only_a_hand_before_the_camera_is_to_be_looked_at() -> None:
-    """One that reaches for what lies on the floor is below the picture all the time."""
+    """A hand that reaches for a thing on the floor is below the picture all the time."""
     found = {}
     for name, height_m in (("level", 1.0), ("floor", 0.2)):
         script = WorldScript(

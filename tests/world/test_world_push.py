@@ -1,4 +1,4 @@
-"""A head that is pushed gives way within its torque limits and comes back; registers show it."""
+"""A pushed head yields within its torque limits and returns; registers show it."""
 
 from math import degrees, radians
 from pathlib import Path
@@ -46,7 +46,7 @@ def test_a_push_shows_in_the_registers_and_the_head_comes_back() -> None:
     bench.world.push("head", (0.0, 10.0, 0.0), 0.4)
     bench.pass_ms(300)
     assert read(yaw, "present_position") - goal > 15  # to the left
-    # More than 0.1 of the stall current of 1.8 A, the other way, in units of 1 mA.
+    # More than 0.1 of the stall current of 1.8 A, in the opposite direction, in units of 1 mA.
     assert read(yaw, "present_current") < -180
     assert read(bench.servos["neck_roll"], "present_position") < upright - 15
     bench.pass_ms(1500)
@@ -85,7 +85,7 @@ HAND = """<mujoco><worldbody>
 
 
 def test_a_hand_that_moves_into_the_head_pushes_it(tmp_path: Path) -> None:
-    """What is led through the world from outside cannot be stopped: the head gives way."""
+    """A body moved through the world from outside cannot be stopped: the head yields."""
     (tmp_path / "hand.xml").write_text(HAND)
     bench = _held(tmp_path / "hand.xml")
     roll, goal = bench.servos["neck_roll"], read(bench.servos["neck_roll"], "present_position")
@@ -100,7 +100,7 @@ def test_a_hand_that_moves_into_the_head_pushes_it(tmp_path: Path) -> None:
 
 
 def test_only_a_body_that_is_led_can_be_moved(tmp_path: Path) -> None:
-    """The message says what it needs."""
+    """The message names the requirement."""
     (tmp_path / "hand.xml").write_text(HAND)
     bench = _held(tmp_path / "hand.xml")
     with pytest.raises(ValueError, match="no body 'arm' with mocap=\"true\""):
@@ -148,7 +148,7 @@ def test_what_stands_before_the_forehead_stops_it(tmp_path: Path) -> None:
 def test_the_guard_finds_a_head_that_is_held_away_and_brings_it_back_softly(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A push of a second: the neck gives way, is found stalled, waits, and comes back."""
+    """A push of a second: the neck yields, is detected as stalled, waits, and returns."""
     run = world_run("desk", monkeypatch)
     seen: list[tuple[float, float, tuple[str, ...]]] = []
 
@@ -177,7 +177,7 @@ def test_the_guard_finds_a_head_that_is_held_away_and_brings_it_back_softly(
 
 
 def test_a_push_can_be_typed() -> None:
-    """With a direction as the rig stands; half a second where no time is given."""
+    """The direction is in the rig's frame; the default duration is half a second."""
     bench = _held()
     before = bench.world.joints_rad()["neck_yaw"]
     assert (
@@ -204,7 +204,7 @@ def test_a_push_that_cannot_be_is_refused_with_what_would_be_right(text: str, me
 
 
 def test_two_heads_are_pushed_each_by_its_own_name_and_its_own_left() -> None:
-    """The second one stands opposite and turned round."""
+    """The second head is opposite and turned round."""
     desk = load_rig("desk")
     rigs = [
         rig_in_world(desk, looks=False),

@@ -249,7 +249,7 @@ def test_several_threads_may_use_one_renderer_and_it_can_be_closed_twice(balls: 
 
 
 def refused(**environment: str) -> str:
-    """Return what a process says that tries to render with other settings."""
+    """Return the output of a process that tries to render with other settings."""
     code = (
         "from gazerig.features.world.gl_context import import_mujoco, NoRenderer\n"
         "mujoco = import_mujoco()\n"
@@ -291,7 +291,7 @@ def test_a_smear_of_nothing_changes_nothing() -> None:
 
 
 def test_places_of_a_camera_are_as_from_where_its_rig_stands(balls: Balls) -> None:
-    """A rig that stands elsewhere and turned round sees what a camera there sees."""
+    """A rig at another place and turned round has the view of a camera at that place."""
     R, p_m = POSES[0]
     turned: Mat3 = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     back: Mat3 = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))

@@ -78,7 +78,7 @@ def test_both_servos_of_a_pair_feel_a_push_against_one_joint() -> None:
 
 
 class TwoHeads:
-    """Two desk rigs that stand opposite each other in one world, a metre apart."""
+    """Two desk rigs opposite each other in one world, a metre apart."""
 
     def __init__(self) -> None:
         self.now_s = 0.0

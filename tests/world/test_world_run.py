@@ -103,7 +103,7 @@ def test_nothing_but_the_world_imports_its_graphics() -> None:
 
 
 def test_ideal_servos_move_the_world_too() -> None:
-    """For what is judged above the bus; the head is where the world has it."""
+    """For tests above the bus; the head has its pose in the world."""
     made = simulate(load_rig("desk"), replace(FAST, bus="ideal", seconds=4.0))
     error = made.figures["gaze_error_deg"]
     assert isinstance(error, dict) and error["median"] < 1.0

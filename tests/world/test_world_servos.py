@@ -20,7 +20,7 @@ STEP = 200
 
 
 def _armed(name: str, joint: str, gains: tuple[int, ...] = ()) -> WorldBench:
-    """Return a rig whose joint holds its position, in the world and by itself."""
+    """Return a rig whose joint holds its position, in the world and alone."""
     bench = WorldBench(name)
     for servo in bench.both(joint):
         arm(servo, gains)
@@ -163,7 +163,7 @@ def _after_500_ms() -> bytes:
 
 
 def test_a_world_whose_numbers_run_away_says_so(tmp_path: Path) -> None:
-    """MuJoCo would begin anew in silence, and servos would see a joint jump."""
+    """MuJoCo would reset silently, and servos would see a joint jump."""
     spring = (
         '<body pos="1 0 0"><joint name="s" stiffness="1e12" ref="1"/><geom size=".001"/></body>'
     )
@@ -258,7 +258,7 @@ def test_acceleration_is_fed_forward_as_by_servos_with_mechanics_of_their_own() 
 
 
 def test_a_stalled_motor_does_not_wind_up() -> None:
-    """Freed after a second it goes past its goal by no more than one that was never held."""
+    """Freed after a second, it overshoots its goal by no more than a servo that was never held."""
     past = []
     for held_ms in (0, 1000):
         bench = _armed("desk", "neck_yaw", (1500, 300, 3000))

@@ -1,4 +1,4 @@
-"""What of a world the page draws: all of its geoms where they are, its people, and no rig."""
+"""The page's shapes of a world: all of its geoms in place, its people, and no rig."""
 
 import pickle
 from collections.abc import Sequence
@@ -72,7 +72,7 @@ def test_a_shipped_world_is_small_enough_for_a_browser(world: str) -> None:
     room = room_glbs(parts)
     people = [part_glb(part) for part in parts if part.moves]
     assert sum(map(len, (*room, *people))) < 0.85 * MOST_BYTES and len(room) < 20
-    # The rig stands on something, and walls let one look in from outside.
+    # The rig has a plinth, and the walls permit a view from outside.
     assert any(np.ptp(_vertices(part)[:, 2]) > 0.05 for part in parts if not part.moves)
 
 

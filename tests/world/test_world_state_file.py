@@ -1,4 +1,4 @@
-"""States of a world on their way from one process to another."""
+"""States of a world between two processes."""
 
 import threading
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Rigs in a world with physics, for tests; a test that needs mujoco skips where it is not."""
+"""Rigs in a world with physics, for tests; a test that needs mujoco is skipped without it."""
 
 from collections.abc import Callable
 from pathlib import Path
