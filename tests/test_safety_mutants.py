@@ -216,7 +216,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (MOTION, "self.low[i] = max(self.low[i], wall_rad)", "pass", collision),
     (
         COLLISIONS,
-        "self._keeper[k] = keeper\n        _wall_off(pair[keeper], motion)",
+        "self._keeper[k] = keeper\n        _put_wall(pair[keeper], motion)",
         "pass",
         collision,
     ),
@@ -244,15 +244,15 @@ MUTATIONS: tuple[Mutation, ...] = (
         "stop = p",
         collision_braking,
     ),
-    (COLLISIONS, "and _is_out(other, position)", "", collision_lag),
-    (COLLISIONS, "                _wall_off(other, motion)", "                pass", collision_lag),
+    (COLLISIONS, "and _is_outside(other, position)", "", collision_lag),
+    (COLLISIONS, "                _put_wall(other, motion)", "                pass", collision_lag),
     (GUARD, "if i in self._collisions.exits:", "if False:", collision_start),
     (GUARD, "if i in self._collisions.still:", "if False:", collision_start),
     (GUARD, "slowly=True,", "", collision_start),
     (
         COLLISIONS,
-        "_, joint, exit_rad = min(ways)",
-        "_, joint, exit_rad = max(ways)",
+        "_, joint, exit_rad = min(paths)",
+        "_, joint, exit_rad = max(paths)",
         collision_start,
     ),
 )
