@@ -29,10 +29,10 @@ from gazerig.drivers.servo_bus.discovery import FoundServo, scan
 from gazerig.features.bringup.servo_families import KINDS
 
 BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)
-"""Of a Maestro's serial pins, the usual ones first; on USB any will do."""
+"""Rates of a Maestro's serial pins, the usual ones first; on USB any works."""
 
 ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
-"""In which kinds are asked; see above."""
+"""Order of the search by kind; see above."""
 
 RATES: Mapping[BusKind, Sequence[int]] = {
     "maestro": BOARD_RATES,

@@ -24,7 +24,7 @@ SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
 """20 deg/s of the servo's shaft."""
 
 SETTLE_S = 0.4
-"""From the first pulse until a servo has arrived from anywhere."""
+"""Time from the first pulse until a servo has arrived from any position."""
 
 LOOK_S = 0.02
 FINE_STEPS = 2

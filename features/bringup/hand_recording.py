@@ -17,7 +17,7 @@ from gazerig.robot.model.joint import JointParams
 RATE_HZ = 50.0
 LONGEST_S = 60.0
 _LEAST_SHARE = 0.5
-"""A joint that was silent at more readings than the rest of this is not recorded."""
+"""Share of readings with an answer that a recorded joint must exceed."""
 
 
 class HandRecording(NamedTuple):

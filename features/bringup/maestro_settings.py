@@ -27,7 +27,7 @@ MANTISSA, MOST_DOUBLED = 31, 7
 """A board keeps a speed as up to 31, doubled up to seven times."""
 
 TIMEOUT_S = 0.5
-"""Long beside a tick, short beside what a hand between lids needs."""
+"""Long compared with a tick, short compared with the time in which a hand gets between lids."""
 
 
 def range_us(setup: ServoConfig) -> tuple[int, int]:

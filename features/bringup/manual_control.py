@@ -178,7 +178,7 @@ def _deg(angle: float) -> str:
 
 
 _PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
-"""Of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""
+"""Peaks of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""
 
 
 @dataclass(frozen=True)
@@ -195,10 +195,10 @@ class JogParams:
 
 
 DesiredPose = Callable[[JointState, float, float], JointAngles]
-"""Returns the desired pose for measured joints, the time, and the time since the step before."""
+"""Returns the desired pose for measured joints, the time, and the time since the last step."""
 
 Done = Callable[[Step], str | None]
-"""Returns how it ended, None while it goes on."""
+"""Returns how it ended, None while it continues."""
 
 
 def no_reason() -> str | None:

@@ -18,7 +18,7 @@ from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
 
 Tell = Callable[[str], None]
-"""Takes a few words on what is being done now."""
+"""Receives a short text about the present step."""
 
 
 class Setting(NamedTuple):
@@ -153,7 +153,7 @@ SCS = FEETECH._replace(
 )
 
 KINDS: dict[str, ServoKind] = {kind.name: kind for kind in (DYNAMIXEL, FEETECH)}
-"""By the name that a rig's YAML gives a bus; its servos are searched for as this kind."""
+"""Kinds by the name of a bus kind in a rig's YAML."""
 
 _KIND_OF = {kind.family.name: kind for kind in (*KINDS.values(), SCS)}
 

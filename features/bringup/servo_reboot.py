@@ -10,7 +10,7 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.servo_families import ServoKind
 
 BACK_S = 3.0
-"""A servo that is not back after so long will not come; they take about 0.4 to 0.8 s."""
+"""Longest wait for a servo after its restart, which takes about 0.4 to 0.8 s."""
 PAUSE_S = 0.1
 
 

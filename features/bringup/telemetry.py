@@ -31,7 +31,7 @@ LIVE = (
     "present_input_voltage",
     "present_temperature",
 )
-"""Registers that every smart servo is asked for; its errors and its load are called differently."""
+"""Registers that are read from every smart servo; those of errors and load have other names."""
 
 
 class Telemetry(NamedTuple):

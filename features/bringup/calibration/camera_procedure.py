@@ -102,8 +102,7 @@ class LensSteps:
         """Return the lens, or None and why more views are needed.
 
         Raises:
-            CameraCalibrationRefused: more views will
-                not help.
+            CameraCalibrationRefused: more views will not help.
         """
         try:
             return self.result(), ""
@@ -117,8 +116,7 @@ class LensSteps:
         """Return the lens.
 
         Raises:
-            CameraCalibrationRefused: the views do not
-                show it.
+            CameraCalibrationRefused: the views do not show it.
         """
         views: Sequence[SeenBoard] = self._collector.views if self._collector is not None else ()
         width, height = self._size if self._collector is not None else (1, 1)

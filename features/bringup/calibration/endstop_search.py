@@ -16,10 +16,10 @@ from gazerig.params import Bounds
 STEPS_PER_DEG = STEPS_PER_TURN / 360.0
 
 NEAR_DEG = 1.0
-"""With its factory gains a servo comes no nearer to its goal than that under a light load."""
+"""Distance from its goal of a servo with factory gains under a light load."""
 
 BACK_OFF_EXCHANGES = 25
-"""Half a second at 50 Hz, for the way back from a stop."""
+"""Half a second at 50 Hz, for the motion back from a stop."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class StopSearch:
 
 
 Exchange = Callable[[int | None], tuple[int, float, float]]
-"""Sends a goal (None: none) and gives position in steps, load share and time in seconds."""
+"""Sends a goal (None: none) and returns position in steps, load share and time in seconds."""
 
 
 def search(

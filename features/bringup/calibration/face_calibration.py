@@ -52,7 +52,7 @@ _WAYS: Mapping[str, tuple[float, float]] = {
 class FaceCalibration:
     """Progress of a calibration.
 
-    starts_mm, places_mm: each part's place in the face frame as it was at first, and now
+    starts_mm, places_mm: each part's first and present place in the face frame
     at: number of the part in ORDER, len(ORDER) after the last
     chosen: parts that the gaze seemed to look at
     step: number of the present step in STEPS_MM

@@ -20,13 +20,13 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.gaze_error import gaze_error
 
 AIMED_DEG = 1.0
-"""Eyes nearer than this to the part look at it."""
+"""Largest gaze error at which the eyes look at the part."""
 
 STALE_S = 0.4
 """No face is seen in an image older than this."""
 
 WAIT_S = 1.5
-"""So long an Enter waits for eyes that are on their way."""
+"""Time for which an Enter waits for moving eyes."""
 
 _LOST_S = 5.0
 _STILL: Vec3 = (0.0, 0.0, 0.0)

@@ -18,7 +18,7 @@ from gazerig.gaze.angles import norm
 from gazerig.robot.perception.face_pose import face_pose
 
 SIZE_SPREAD = 0.08
-"""Standard deviation of people's faces' size, as part of it."""
+"""Standard deviation of the size of faces, as a share."""
 LEAST_FRAMES = 60
 _ROUNDS = 4  # perspective changes with the focal length, a little
 _MOST_MOVED = 0.15

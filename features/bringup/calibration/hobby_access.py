@@ -25,7 +25,7 @@ SPEED_US_S = 200.0
 
 NEAR_STEPS = 4
 TIMEOUT_S = 1.0
-"""A goal is given up that was not reached so long after it could have been."""
+"""A goal that is not reached this long after the planned time is given up."""
 
 SILENT_S = 2.0
 

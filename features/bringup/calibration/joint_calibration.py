@@ -19,11 +19,11 @@ from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
 
 SMALLEST_RANGE_DEG = 5.0
-"""A joint that moves less than this was not really moved."""
+"""A joint that moved less than this was not turned."""
 
 LONGEST_GAP_S = 0.3
 MAX_UNSEEN_JUMP_STEPS = STEPS_PER_TURN // 8
-"""A joint that turned farther unseen for longer than that may have turned the other way."""
+"""A joint that turned farther in a longer gap may have turned in the other direction."""
 
 ENDS = {
     "eye_pan": ("LEFT", "RIGHT"),
@@ -36,7 +36,7 @@ ENDS = {
     "neck_pitch": ("UPPER", "LOWER"),
     "neck_roll": ("RIGHT EAR DOWN", "LEFT EAR DOWN"),
 }
-"""What people call the ends of a joint, the positive one first (signs as in gaze.types)."""
+"""Names of the ends of a joint, the positive one first (signs as in gaze.types)."""
 
 
 class CalibrationRefused(SetupError):
@@ -76,7 +76,7 @@ class LinkageFit(NamedTuple):
 
 
 Value = int | float | tuple[tuple[float, float], ...]
-"""What a calibration writes."""
+"""A value that a calibration writes."""
 
 
 class PositionUnwrapper:
@@ -272,7 +272,7 @@ def changes(
 ) -> dict[str, Value]:
     """Return dotted keys of the rig file and their new values, only those that differ.
 
-    Values that stood on the old range follow: a lid's shut and open angle go to its ends,
+    Values that depend on the old range follow: a lid's shut and open angle go to its ends,
     a parking angle outside the new range to its nearer end.
     """
     wanted: dict[str, Value] = {

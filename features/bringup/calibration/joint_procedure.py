@@ -72,10 +72,9 @@ def calibrate_by_hand(single: SingleJoint, person: Operator, margin_deg: float) 
     """Let the user turn the joint, with torque off, to its ends and straight ahead.
 
     Raises:
-        CalibrationRefused: what was marked makes no
-            calibration.
+        CalibrationRefused: the marks make no calibration.
         DriverError: the servo does not answer any more.
-        CalibrationStopped: the person wants it to end.
+        CalibrationStopped: the person ended it.
     """
     single.servo.disable_torque()
     watched = PositionTracker(single)
@@ -106,10 +105,9 @@ def calibrate_by_motion(
     """Drive the joint slowly and weakly to both stops; the zero is in the middle, or a person's.
 
     Raises:
-        CalibrationRefused: what was found makes no
-            calibration.
+        CalibrationRefused: the stops make no calibration.
         DriverError: the servo is not fit for it, or does not answer any more.
-        CalibrationStopped: the person wants it to end.
+        CalibrationStopped: the person ended it.
     """
     try:
         marks = _find_stops(single, person, params)

@@ -64,8 +64,7 @@ def fit_linkage(
         margin_deg: kept from the ends of any other joint.
 
     Raises:
-        CalibrationRefused: they make no linkage, or no
-            range with 0 inside.
+        CalibrationRefused: they make no linkage, or no range with 0 inside.
     """
     linkage = tuple(sorted((round(angle, 1) + 0.0, position) for angle, position in marked))
     kept = 0.0 if is_lid(name) else margin_deg
@@ -101,7 +100,7 @@ SHUT_WHERE = {
 
 
 LEAD_US = 50.0
-"""A quarter of a second at its slow speed: so soon it stands when a key is let go."""
+"""A quarter of a second at its slow speed: the time until it stops after a key is released."""
 
 
 class JoggableJoint(Protocol):
@@ -276,7 +275,7 @@ def calibrate_by_marks(placer: Marker, person: Jogger, margin_deg: float, more: 
     Raises:
         CalibrationRefused: they make no linkage.
         DriverError: the servo does not answer any more.
-        CalibrationStopped: the person wants it to end.
+        CalibrationStopped: the person ended it.
     """
     placer.begin()
     positive, negative = ends_of(placer.name)

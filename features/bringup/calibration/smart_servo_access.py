@@ -280,7 +280,7 @@ class SingleServo:
 
 
 PERIOD_S = 0.02
-"""A search looks 50 times a second where the line is quick enough."""
+"""A search reads 50 times a second if the line is fast enough."""
 
 
 class CalibrationStopped(DriverError):

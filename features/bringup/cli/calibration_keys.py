@@ -14,7 +14,7 @@ HELP = (
 )
 
 BUTTONS: tuple[Key, ...] = get_args(Key)
-"""What stands on the page's buttons."""
+"""Labels of the page's buttons."""
 _MOST_WAITING = 50
 
 _PLAIN: dict[str, Key] = {
@@ -76,7 +76,7 @@ class TerminalKeys(TerminalInput):
         self._rest = ""
 
     def next(self, ready: bool) -> Key | None:
-        """Return the next key, None where none has been pressed; ``ready`` does not matter."""
+        """Return the next key, None if none has been pressed; ``ready`` does not matter."""
         if not self._ready:
             text = self.text()
             if text is None:

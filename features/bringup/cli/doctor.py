@@ -131,7 +131,7 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[
     ),
     "pca9685": lambda line, config, setups: visit_pca9685(line, config.pca9685, setups),
 }
-"""What examines boards, by the kind of bus."""
+"""Examinations of boards, by the kind of bus."""
 
 
 def _print_line(line: str) -> None:

@@ -43,7 +43,7 @@ def holding_rig(
         rig: to move.
         paths: of the serial ports, by the name of the bus.
         params: how slowly it moves.
-        stopped: returns why to end a motion, None while there is no reason.
+        stopped: returns why to end a motion, None without a reason.
         interrupts: requests to end this program.
         park: False leaves the joints where they are.
         watch: is shown every step.

@@ -88,7 +88,7 @@ BOARDS: Mapping[str, Callable[[BusPort, BusConfig], TelemetryReader]] = {
     "maestro": lambda port, config: MaestroTelemetry(port, config.maestro),
     "pca9685": lambda port, config: Pca9685Telemetry(port, config.pca9685),
 }
-"""Of the kinds of bus whose servos are not asked themselves."""
+"""Readers of boards, whose servos do not answer, by the kind of bus."""
 
 
 @contextlib.contextmanager

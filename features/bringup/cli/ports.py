@@ -24,7 +24,7 @@ from gazerig.sim_mock.devices import Emulated
 from gazerig.sim_mock.pty.client import PtyBuses
 
 host = Host()
-"""Where this computer tells about its ports."""
+"""Source of data about the ports of this computer."""
 
 YesOption = Annotated[bool, typer.Option("--yes", help="Yes to every question.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="One line of JSON instead of words.")]

@@ -12,10 +12,10 @@ from gazerig.features.bringup.calibration.smart_servo_access import CalibrationS
 from gazerig.robot.cli.terminal import say, status
 
 LOOK_S = 0.03
-"""A joint is looked at so often while the user thinks: more than 20 times a second."""
+"""Period at which a joint is read while the user thinks: more than 20 times a second."""
 
 HAND_STEPS = 100
-"""An emulated hand turns a joint by so much between two looks."""
+"""Steps by which an emulated hand turns a joint between two readings."""
 
 YES, NO = ("y", "yes"), ("n", "no")
 
@@ -74,7 +74,7 @@ class TerminalPerson:
 
     Args:
         lines: where answers come from.
-        stopped: returns why to end, None while there is no reason.
+        stopped: returns why to end, None without a reason.
         yes: every question for a yes or no has the answer yes.
     """
 
@@ -84,7 +84,7 @@ class TerminalPerson:
         self._yes = yes
         self._live_line = sys.stderr.isatty()
         self.hand: Callable[[int], None] | None = None
-        """Turns the joint at hand by some steps, where it is emulated."""
+        """Turns the present joint by some steps, if it is emulated."""
 
     def tell(self, line: str) -> None:
         """Print a line."""

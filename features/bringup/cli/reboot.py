@@ -153,4 +153,4 @@ BOARDS: dict[str, Callable[[Rig, str, BusPort, bool], None]] = {
     "maestro": _maestro,
     "pca9685": _pca9685,
 }
-"""What comes nearest to a restart where servos have none, by the kind of bus."""
+"""Replacement of a restart for servos without one, by the kind of bus."""

@@ -23,7 +23,7 @@ COMMON = (
 """Registers of every smart servo that are read."""
 
 DELAY_UNIT_US = 1e6 * dynamixel.RETURN_DELAY_UNIT_S
-"""The same for all."""
+"""Unit of Return Delay Time, the same for all servos."""
 
 
 class WantedSetting(NamedTuple):
@@ -55,7 +55,7 @@ class WantedSetting(NamedTuple):
 class Protection(NamedTuple):
     """The register by which a servo protects motor and gears.
 
-    errors: those that it must heed, by the bits of the register
+    errors: those that must switch it off, by the bits of the register
     text: with {errors} and {value}
     by_hand: what to do, by the model; None: missing bits may be set
     """
@@ -201,7 +201,7 @@ _DYNAMIXEL = ServoChecks(
 FD = "Feetech's program"
 
 HOTTEST_C = 70
-"""Temperature limit as from the factory; the motor's magnets suffer above."""
+"""Factory setting of the temperature limit; the motor's magnets suffer above."""
 
 _FEETECH = ServoChecks(
     kind=FEETECH,
@@ -271,4 +271,4 @@ _SCS = replace(
 )
 
 CHECKS: dict[str, ServoChecks] = {one.kind.family.name: one for one in (_DYNAMIXEL, _FEETECH, _SCS)}
-"""By the name of the family."""
+"""Checks by the name of the family."""

@@ -475,7 +475,7 @@ def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardP
 
 
 StopReason = Callable[[], str | None]
-"""Returns why to stop, None while there is no reason."""
+"""Returns why to stop, None without a reason."""
 
 _GENTLE_DEG_S = 15.0
 _SETTLE_S = 0.4

@@ -219,7 +219,7 @@ class _CalibrationSession:
         """Handle a key; return why the procedure ended, None while it continues.
 
         Raises:
-            SetupError: nothing can happen any more in a script.
+            SetupError: a script cannot continue.
         """
         steering, now_s = self._steering, self._now_s()
         if (why := self._stopped()) is not None:
