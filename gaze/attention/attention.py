@@ -168,7 +168,10 @@ class Attention:
         if changed:
             self._behaviour, self._changed_s = self.top_down.behaviour, t_s
         present = self._present_row(made)
-        row = self._winner(made, present)
+        row = made.best
+        if present is not None:
+            favoured = made.total[present] * self._params.hysteresis_ratio
+            row = present if made.total[row] < favoured else row
         named = made.rule_target is not None and row in made.rule_target.rows
         if named:
             self._favoured_id = made.bodies.ids[row]
@@ -318,13 +321,6 @@ class Attention:
         if before is None or not 0.0 < t_s - before[1] <= _SPEED_OVER_S:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
-
-    def _winner(self, made: TargetComparison, present: int | None) -> int:
-        """Return the row of the strongest body; the present one is favoured."""
-        if present is None:
-            return made.best
-        stays = made.total[made.best] < made.total[present] * self._params.hysteresis_ratio
-        return present if stays else made.best
 
     def _present_row(self, made: TargetComparison) -> int | None:
         """Return the row of the present target, None if it is gone."""

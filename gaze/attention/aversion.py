@@ -207,7 +207,8 @@ class Aversion:
         self._away = self._place(_centre(target), p_world_head_m)
         self._shifts += 1
         self._away_shift = target.shift + self._shifts
-        self._until_s = t_s + self._away_s()
+        _, _, mean_s, sd_s = self._times[self._mode]
+        self._until_s = t_s + self._time_s(mean_s, sd_s)
 
     def _return(self) -> None:
         if self._away is not None:
@@ -273,11 +274,6 @@ class Aversion:
         if mean == 0.0:
             return inf
         return min(self._params.longest_mutual_s, self._time_s(mean, sd))
-
-    def _away_s(self) -> float:
-        """Draw a duration of an aversion."""
-        _, _, mean, sd = self._times[self._mode]
-        return self._time_s(mean, sd)
 
     def _time_s(self, mean_s: float, sd_s: float) -> float:
         """Draw from the log-normal distribution with a given mean and standard deviation."""

@@ -187,14 +187,12 @@ class Idle:
             self._now, self._until_s = self._resting(t_s), float("inf")
         elif self._gone is not None and t_s < self._search_until_s:
             self._search(self._gone, t_s, self._rng)
-        elif self._now.kind == "rest" or self._repeats_glance(self._rng):
+        elif self._now.kind == "rest" or (
+            self._now.kind == "glance" and self._rng.random() < self._params.again_share
+        ):
             self._glance(t_s, self._rng)
         else:
             self._rest_now(t_s)
-
-    def _repeats_glance(self, rng: np.random.Generator) -> bool:
-        """Return whether another glance follows a glance immediately."""
-        return self._now.kind == "glance" and rng.random() < self._params.again_share
 
     def _rest_now(self, t_s: float) -> None:
         """Start a rest: look straight ahead."""

@@ -187,7 +187,8 @@ class GazePoint:
                     )
                 return None
         elif trigger.redirects(t_s):
-            self._redirect(trajectory, point, velocity, p_head, t_s)
+            end = self.clear(add(point, scale(velocity, trajectory.ends_s - t_s)), p_head)
+            self._trajectory = RedirectedTrajectory(trajectory, self._saccade, end, p_head, t_s)
         trajectory = self._trajectory
         assert trajectory is not None
         self.point_m = trajectory.at(p_head, t_s)
@@ -209,13 +210,6 @@ class GazePoint:
         self._trajectory = SaccadeTrajectory(self._saccade, self.point_m, end, p_head, t_s)
         self.saccades += 1
         return error
-
-    def _redirect(
-        self, before: Trajectory, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float
-    ) -> None:
-        """Bend the saccade in flight to the present position of the target."""
-        end = self.clear(add(point, scale(velocity, before.ends_s - t_s)), p_head)
-        self._trajectory = RedirectedTrajectory(before, self._saccade, end, p_head, t_s)
 
     def _correction_delay_s(self) -> float:
         """Draw the delay of a correction of this landing's error."""

@@ -5,7 +5,7 @@ head during or after a gaze shift, planned or pushed, is compensated exactly (th
 reflex), and vergence follows from each eye's own geometry.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.gesture.animation import NO_OFFSET, PoseOffset
+from gazerig.gaze.gesture.breathing import Breathing
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.binocular import EyeGeometry
 from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint
@@ -41,18 +42,6 @@ from gazerig.gaze.types import (
 )
 
 _AT_END = "at the end of its range"
-
-
-class Sway(Protocol):
-    """A motion added to the head's angles: breathing."""
-
-    def reset(self, t_s: float) -> None:
-        """Start from rest."""
-        ...
-
-    def step(self, t_s: float) -> Angles3:
-        """Return (yaw, pitch, roll) to add to the head's angles."""
-        ...
 
 
 _Seen = tuple[Vec3, Vec3, Vec3, Vec3]
@@ -104,7 +93,7 @@ class Oculomotor:
         pursuit: Pursuit,
         head: HeadModel,
         lids: Lids,
-        breathing: Sway | None = None,
+        breathing: Breathing | None = None,
         rng: np.random.Generator | None = None,
     ) -> None:
         self._prediction = TargetPrediction("none", 0.0, 1.0)

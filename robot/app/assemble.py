@@ -42,7 +42,6 @@ from gazerig.robot.app.rig_limits import (
     park_rad,
 )
 from gazerig.robot.app.run_bus import run_bus
-from gazerig.robot.app.run_parts import RunBus
 from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
 from gazerig.robot.control.body import Body
@@ -198,9 +197,12 @@ def assemble(
             seen = make_lendable(
                 seen, rig, clock, lambda: sight.mount.retune(placement.camera(live.rig))
             )
+        gentle_deg_s = rig.guard.soft_start_speed_deg_s
+        body = Body(wires.bus, rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
+        # A recorded camera was on other joints: its gyro is not fused with these.
         parts = _components(
-            rig, _body(rig, wires), kinematics, seen, sight.mount, camera, walk, random,
-            _gyro_fusion(options, messages.append),
+            rig, body, kinematics, seen, sight.mount, camera, walk, random,
+            GyroFusion(messages.append) if options.replay is None else None,
         )  # fmt: skip
         placement = CameraPlacement(
             lambda rig: placed_camera(rig, options, kinematics, seen)[0], camera.mount
@@ -261,7 +263,7 @@ def _components(
     animation = Animation(further(rig.joints), animation_tables(rig))
     return Components(
         body=body,
-        guard=_guard(rig, body),
+        guard=Guard(rig.guard, limits(rig.joints), body.names, body.reach, 1.0 / rig.loop.rate_hz),
         kinematics=kinematics,
         camera=seen,
         mount=mount,
@@ -298,20 +300,6 @@ def _components(
             lid_spans(rig),
         ),
     )
-
-
-def _gyro_fusion(options: RunOptions, report: Callable[[str], None]) -> GyroFusion | None:
-    """Return the fusion of gyro and joints; None for a recorded camera (on other joints)."""
-    return GyroFusion(report) if options.replay is None else None
-
-
-def _body(rig: Rig, wires: RunBus) -> Body:
-    gentle_deg_s = rig.guard.soft_start_speed_deg_s
-    return Body(wires.bus, rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
-
-
-def _guard(rig: Rig, body: Body) -> Guard:
-    return Guard(rig.guard, limits(rig.joints), body.names, body.reach, 1.0 / rig.loop.rate_hz)
 
 
 def _robot(

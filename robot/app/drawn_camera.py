@@ -82,7 +82,9 @@ class DrawnSource:
                 stop.wait(_LOOK_S)
                 continue
             self._due_s = now_s() + max(0.0, self._period_s - (now_s() - newest.t_s))
-            return self._shot(found)
+            self._number, image = found.number, found.image
+            assert image is not None
+            return Shot(found.captured_s, found.number, image, found.depth_m)
         return None
 
     def events(self) -> tuple[str, ...]:
@@ -96,12 +98,6 @@ class DrawnSource:
     def _head(self, t_s: float) -> tuple[Mat3, Vec3]:
         assert self._now is not None  # ``take`` waits for the first
         return self._now.R_world_head, self._now.p_world_head_m
-
-    def _shot(self, found: Detections) -> Shot:
-        image = found.image
-        assert image is not None
-        self._number = found.number
-        return Shot(found.captured_s, found.number, image, found.depth_m)
 
 
 def scene_pixels(

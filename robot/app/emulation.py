@@ -9,7 +9,6 @@ from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, rig_setups
 from gazerig.robot.description.mass import HEAD_LOAD_KG_M2
 from gazerig.robot.model.coupling_params import pair_setups, pairs_of
-from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import (
     DynamixelLine,
     Emulated,
@@ -48,7 +47,8 @@ def emulated_servo(rig: Rig, name: str) -> ServoSpec:
     """Return the smart servo of one joint."""
     joint = rig.joints[name]
     start, (low, high) = _start(rig, name), _stops(rig, name)
-    load = HEAD_LOAD_KG_M2.get(name, 0.0) * (_steps_per_rad(joint) / joint.made().steepest) ** 2
+    steps_per_rad = joint.facts.steps_per_turn / (2.0 * pi)
+    load = HEAD_LOAD_KG_M2.get(name, 0.0) * (steps_per_rad / joint.made().steepest) ** 2
     physics = Physics(load_kg_m2=load, stop_low_steps=low, stop_high_steps=high)
     return ServoSpec(joint.id, joint.model, start, physics=physics)
 
@@ -67,7 +67,12 @@ def _line(rig: Rig, name: str) -> Emulated:
         return CHAINS[config.kind](specs, config.baud)
     if config.kind in BOARDS:
         return BOARDS[config.kind](config, tuple(_hobby(rig, one) for one in joints))
-    servos = tuple(_plain(rig, one) for one in joints)
+    servos = tuple(
+        EmulatedJoint(
+            rig.joints[name].id, rig.joints[name].model, _start(rig, name), *_stops(rig, name)
+        )
+        for name in joints
+    )
     return plugin_line(config.kind, config.section, servos)
 
 
@@ -106,11 +111,6 @@ def _hobby(rig: Rig, name: str) -> HobbySpec:
     )
 
 
-def _plain(rig: Rig, name: str) -> EmulatedJoint:
-    joint = rig.joints[name]
-    return EmulatedJoint(joint.id, joint.model, _start(rig, name), *_stops(rig, name))
-
-
 def crooked_rad(rig: Rig) -> dict[str, float]:
     """Return the start angles of a rig's emulated joints."""
     crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
@@ -140,7 +140,3 @@ def _stops(rig: Rig, name: str) -> tuple[float, float]:
     ends = (joint.min_deg - STOP_BEYOND_DEG, joint.max_deg + STOP_BEYOND_DEG)
     low, high = sorted(joint.steps(radians(end)) for end in ends)
     return low, high
-
-
-def _steps_per_rad(joint: JointParams) -> float:
-    return joint.facts.steps_per_turn / (2.0 * pi)

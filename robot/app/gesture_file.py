@@ -41,7 +41,8 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
     Raises:
         SetupError: a joint is not the rig's, the gesture is too long, or nothing moves.
     """
-    unknown = [name for name in series if _track(name) not in _tracks(rig)]
+    tracks = {_track(name) for name in rig.names}
+    unknown = [name for name in series if _track(name) not in tracks]
     if unknown:
         raise SetupError(
             f"no joint {unknown[0]!r}; there is {', '.join(rig.names)}; rename the column"
@@ -94,10 +95,6 @@ def fit_to_rig(rig: Rig, gesture: Gesture) -> FittedGesture:
     fit = GestureFit(rig.names, lid_spans(rig))
     share = rig.gaze.gestures.limit_share
     return fit.fit("", motions(gesture, rig.names), 1.0, middle, bounds, share)
-
-
-def _tracks(rig: Rig) -> set[str]:
-    return {_track(name) for name in rig.names}
 
 
 def _track(joint: str) -> str:

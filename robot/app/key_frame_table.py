@@ -42,7 +42,8 @@ def read_table(path: Path, fps: float | None) -> dict[str, Series]:
         raise SetupError(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise SetupError(f"{path} is not UTF-8 text: export it as CSV") from None
-    rows = list(csv.reader(text.splitlines(), delimiter=_separator(text)))
+    separator = max(",;\t", key=text.partition("\n")[0].count)
+    rows = list(csv.reader(text.splitlines(), delimiter=separator))
     head = [name.strip().lower() for name in rows[0]] if rows else []
     time = next((i for i, name in enumerate(head) if name in _TIMES), None)
     if time is None:
@@ -61,11 +62,6 @@ def read_table(path: Path, fps: float | None) -> dict[str, Series]:
     if not found:
         raise SetupError(f"{path}: no rows under the names of the columns")
     return found
-
-
-def _separator(text: str) -> str:
-    first = text.partition("\n")[0]
-    return max(",;\t", key=first.count)
 
 
 class _Table:

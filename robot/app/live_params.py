@@ -165,15 +165,12 @@ class LiveParams:
                 ready = _prepare(command, self.rig, changed(self.rig, dict(command.changes)))
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
-        said = self._put(ready.rig, ready.walk or self._walk)
-        return (*(_change_text(key, value) for key, value in command.changes), *said)
-
-    def _put(self, rig: Rig, walk: Walk) -> tuple[str, ...]:
-        """Pass the parameters that differ to their parts."""
-        before, self.rig = self.rig, rig
-        self._put_gaze(before, rig, walk)
+        before, self.rig = self.rig, ready.rig
+        walk = ready.walk or self._walk
+        self._put_gaze(before, self.rig, walk)
         self._walk = walk
-        return self._put_machine(before, rig)
+        said = self._put_machine(before, self.rig)
+        return (*(_change_text(key, value) for key, value in command.changes), *said)
 
     def _put_gaze(self, old: Rig, new: Rig, walk: Walk) -> None:
         parts, was, now = self.parts, old.gaze, new.gaze

@@ -229,7 +229,8 @@ class RunObservers:
         with self._spared("the page"):
             if self._page is not None:
                 self._page.open()
-                self._page.offer(self._menus())
+                steps = None if self._steer is None else {STEER: self._steer.keys}
+                self._page.offer(steps or self._made.robot.menus())
         with self._spared("the remote control"):
             if self._live is not None:
                 self._live.open()
@@ -273,11 +274,6 @@ class RunObservers:
         with self._spared("the recording"):
             if self._recorder is not None:
                 self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
-
-    def _menus(self) -> dict[str, tuple[str, ...]]:
-        if self._steer is not None:
-            return {STEER: self._steer.keys}
-        return self._made.robot.menus()
 
     def _in_force(self) -> tuple[str, str, str]:
         """Return the present behaviour, mode of conversation and character."""

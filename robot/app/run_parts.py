@@ -11,14 +11,6 @@ TrueSteps = Callable[[], Mapping[str, float]]
 """Function that returns the present true positions of the servos in steps, by joint."""
 
 
-def _no_digest() -> str | None:
-    return None
-
-
-def _nothing() -> None:
-    return None
-
-
 class RunBus(NamedTuple):
     """The bus of the rig.
 
@@ -30,8 +22,8 @@ class RunBus(NamedTuple):
 
     bus: ServoBus
     true_steps: TrueSteps | None = None
-    digest: Callable[[], str | None] = _no_digest
-    close: Callable[[], None] = _nothing
+    digest: Callable[[], str | None] = lambda: None
+    close: Callable[[], None] = lambda: None
     fault: Callable[[str], str] | None = None
 
 

@@ -157,7 +157,11 @@ class Session:
             observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", self._faults.update)
         self._run_observers.join(observers)
-        _observe_scene(observers, self._made, self._score, self._face_gaze)
+        if self._score is not None:
+            observers.add("the scene's score", self._score.behaviours.update)
+            observers.add("the planner's score", self._score.planner.update)
+        if self._face_gaze is not None:
+            observers.add("the heat map", self._face_gaze.update)
         observers.add("the log", self._log)
         return observers
 
@@ -256,17 +260,6 @@ class Session:
             self._say(str(error))
             return out
         return None
-
-
-def _observe_scene(
-    observers: Observers, made: Assembly, score: SceneScore | None, face_gaze: GazeOnFace | None
-) -> None:
-    """Add the score of a scene and the heat map, if any."""
-    if score is not None:
-        observers.add("the scene's score", score.behaviours.update)
-        observers.add("the planner's score", score.planner.update)
-    if face_gaze is not None:
-        observers.add("the heat map", face_gaze.update)
 
 
 def _suppress_errors(say: Callable[[str], None]) -> Callable[[str], None]:

@@ -116,14 +116,12 @@ class FrameLocator:
         why = lens_fault(self.lens, found.width_px, found.height_px)
         if not why:
             return ""
-        instead = "what the camera reports" if found.lens is not None else self._field_text()
+        field = f"the field of view of {degrees(self.field_rad):.0f} deg"
+        instead = "what the camera reports" if found.lens is not None else field
         return (
             f"camera.lens does not fit: {why}; {instead} is used instead: calibrate the lens at "
             "this size (gazerig calibrate camera), or ask the camera for that one"
         )
-
-    def _field_text(self) -> str:
-        return f"the field of view of {degrees(self.field_rad):.0f} deg"
 
     def locate(self, found: Detections, intrinsics: Intrinsics) -> LocatedFrame:
         """Return the contents of a frame of known intrinsics in the camera's axes."""

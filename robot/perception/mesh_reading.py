@@ -98,7 +98,8 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
     length = min(max(tall / apart * PUPIL_DISTANCE_M / _HEIGHT_M, 1.0 / _LONGEST), _LONGEST)
     sd = hypot(_TURN_SD_RAD, _POINT_PX * px_m / _DEEP_M)
     opening = None if mesh.lids_px is None else _eye_opening(mesh.lids_px, apart)
-    signs = FaceSigns(opening, _gap_m(points, _LIPS, apart))
+    lips = float(np.linalg.norm(points[_LIPS[0]] - points[_LIPS[1]]))
+    signs = FaceSigns(opening, lips / apart * PUPIL_DISTANCE_M)
     shut = opening is None or opening < EYES_SHUT
     gaze = None if shut else _gaze(mesh, R, p, intrinsics)
     return MeshReading(FacePose(_vector(p), _matrix(R), length, sd), gaze, signs)
@@ -114,12 +115,9 @@ def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
     """
     deep = 1.0 + depth_px / focal_px
     flat = rays[:, :2] / rays[:, 2:] * deep[:, np.newaxis]
-    return _rotation(_RIGID_M, np.column_stack([flat, deep]))
-
-
-def _rotation(face: Floats, seen: Floats) -> Floats | None:
-    """Return the rotation of the similarity that maps a face onto points (Kabsch)."""
-    a, b = face - face.mean(axis=0), seen - seen.mean(axis=0)
+    seen = np.column_stack([flat, deep])
+    # The rotation of the similarity that maps the face onto the points (Kabsch).
+    a, b = _RIGID_M - _RIGID_M.mean(axis=0), seen - seen.mean(axis=0)
     u, _, vt = np.linalg.svd(a.T @ b)
     flip = float(np.sign(np.linalg.det(vt.T @ u.T)))
     return None if flip == 0.0 else np.asarray(vt.T @ np.diag([1.0, 1.0, flip]) @ u.T)
@@ -141,11 +139,6 @@ def _position(R: Floats, seen: Floats) -> Floats | None:
     wanted = np.concatenate([u * turned[:, 2] - turned[:, 0], v * turned[:, 2] - turned[:, 1]])
     found = np.linalg.lstsq(rows, wanted, rcond=None)[0]
     return found if np.isfinite(found).all() and found[2] > 0.0 else None
-
-
-def _gap_m(points: Floats, pair: tuple[int, int], apart: float) -> float:
-    """Return the distance of two points, scaled to an adult's distance of the eyes, metres."""
-    return float(np.linalg.norm(points[pair[0]] - points[pair[1]])) / apart * PUPIL_DISTANCE_M
 
 
 def _eye_opening(lids_px: NDArray[np.float32], apart: float) -> float:

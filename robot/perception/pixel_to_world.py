@@ -6,7 +6,6 @@ from math import hypot, radians
 import numpy as np
 
 from gazerig.drivers.camera.depth_roi import depth_at
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gazerig.gaze.types import Percept, Vec3
@@ -56,7 +55,10 @@ class PixelToWorld:
         newest = captured_s is None or captured_s == found.captured_s
         at_s = found.captured_s if captured_s is None else captured_s
         R, p = self._mount.pose(*self._poses.head_pose(at_s))
-        x_ray, y_ray, z_ray = rays(np.array([pixel]), self._lens(found))[0].tolist()
+        camera, size_px = self._camera(), (found.width_px, found.height_px)
+        field_rad = radians(camera.horizontal_field_deg)
+        lens = intrinsics_of_lens(camera.lens, field_rad, *size_px, found.lens)
+        x_ray, y_ray, z_ray = rays(np.array([pixel]), lens)[0].tolist()
         through = rotate(R, (x_ray, y_ray, z_ray))  # 1 m deep: depth is along the optical axis
         depth_m = _depth_m(found, pixel) if newest and distance_m is None else None
         if depth_m is not None:
@@ -65,12 +67,6 @@ class PixelToWorld:
         if distance_m is None:
             distance_m = seen_distance_m(percept, p, direction)
         return add(p, scale(direction, distance_m))
-
-    def _lens(self, found: Detections) -> Intrinsics:
-        camera = self._camera()
-        field_rad = radians(camera.horizontal_field_deg)
-        size_px = found.width_px, found.height_px
-        return intrinsics_of_lens(camera.lens, field_rad, *size_px, found.lens)
 
 
 def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: Vec3) -> float:

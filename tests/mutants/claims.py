@@ -121,7 +121,7 @@ CLAIMS = (
     Mutant("gaze/attention/action_planner.py", "one.contact_s < ratio * par.contact_ms / 1e3", "one.contact_s > ratio * par.contact_ms / 1e3",
            "a fist is guarded against when it has arrived",
            ("behaviours::test_e46_a_the_fist_of_a_punch_is_looked_at_and_guarded_against",), ("E46",)),
-    Mutant("gaze/attention/attention.py", "stays = made.total[made.best] < made.total[present] * self._params.hysteresis_ratio", "stays = True",
+    Mutant("gaze/attention/attention.py", "made.total[row] < favoured", "True",
            "what is looked at is never left",
            ("behaviours::test_e48_back_on_the_face_within_a_second_of_a_distraction",), ("E48", "M 4: back to the face at once")),
     Mutant("gaze/lids/blink.py", "between = 60.0 / per_min - length_s", "between = 45.0 / per_min - length_s",
