@@ -82,7 +82,7 @@ class Figures:
             half.rename(self.shared)
 
     def segments(self, t_s: float) -> Segments:
-        """Return all segments at a time, which continues over rounds."""
+        """Return all segments at a time; the time continues over rounds."""
         if self._last is not None and self._last[0] == t_s:
             return self._last[1]
         at = (t_s % self.script.round_s) * RATE_HZ

@@ -43,7 +43,7 @@ class WorldUnstable(Error):
 
 
 class WorldState(NamedTuple):
-    """The state of a world: with the script of its people, all that a picture needs.
+    """The state of a world; a picture needs only this and the script of the people.
 
     t_s: time since the script of its people began, 0 before
     qpos: positions of its joints as MuJoCo orders them, shape (nq,)

@@ -15,6 +15,7 @@ from gazerig.robot.description.paint import Colour
 from gazerig.robot.description.parts import FLOOR_M
 
 _BOX, _CYLINDER = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
+_ELLIPSOID, _CAPSULE = mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_CAPSULE
 _CEILING: Colour = (238, 236, 230)
 _GLOWS: dict[Colour | str, float] = {"window": 0.7, _CEILING: 0.42, (250, 232, 196): 0.18}
 """Pictures and colours that emit light; no lamp lights the ceiling."""
@@ -57,16 +58,9 @@ class _Room:
         repeat: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         """Add a box by its middle and its full sizes, with a colour or the name of a picture."""
-        x, y, z = middle
-        geom = self.body.add_geom(
-            type=_BOX,
-            pos=[x, y, z + self.floor_m],
-            size=[0.5 * one for one in size],
-            quat=[cos(0.5 * yaw), 0.0, 0.0, sin(0.5 * yaw)],
-            contype=int(solid),
-            conaffinity=int(solid),
-        )
-        self._paint(geom, colour, shine, repeat)
+        quat = [cos(0.5 * yaw), 0.0, 0.0, sin(0.5 * yaw)]
+        half = [0.5 * one for one in size]
+        self._add(_BOX, middle, half, colour, shine, repeat, solid, quat=quat)
 
     def panel(
         self,
@@ -79,79 +73,55 @@ class _Room:
         repeat: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         """Add an upright panel, width and height, that shows its picture on its front."""
-        x, y, z = middle
         c, s = cos(facing), sin(facing)
-        geom = self.body.add_geom(
-            type=_BOX,
-            pos=[x, y, z + self.floor_m],
-            size=[0.5 * size[0], 0.5 * size[1], 0.5 * thick],
-            contype=0,
-            conaffinity=0,
-        )
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, np.array([-s, 0.0, c, c, 0.0, s, 0.0, 1.0, 0.0]))
-        geom.quat = quat
-        self._paint(geom, picture, shine, repeat)
+        half = [0.5 * size[0], 0.5 * size[1], 0.5 * thick]
+        self._add(_BOX, middle, half, picture, shine, repeat, quat=quat)
 
     def cylinder(
         self, foot: Vec3, radius: float, height: float, colour: Colour | str, shine: float = 0.1
     ) -> None:
         """Add an upright cylinder by the middle of its foot."""
         x, y, z = foot
-        geom = self.body.add_geom(
-            type=_CYLINDER,
-            pos=[x, y, z + 0.5 * height + self.floor_m],
-            size=[radius, 0.5 * height, 0.0],
-            contype=0,
-            conaffinity=0,
-        )
-        self._paint(geom, colour, shine, (1.0, 1.0))
+        self._add(_CYLINDER, (x, y, z + 0.5 * height), [radius, 0.5 * height, 0.0], colour, shine)
 
     def bush(self, middle: Vec3, size: Vec3, colour: Colour) -> None:
         """Add an ellipsoid by its middle and its full sizes."""
-        x, y, z = middle
-        geom = self.body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-            pos=[x, y, z + self.floor_m],
-            size=[0.5 * one for one in size],
-            contype=0,
-            conaffinity=0,
-        )
-        self._paint(geom, colour, 0.02, (1.0, 1.0))
+        self._add(_ELLIPSOID, middle, [0.5 * one for one in size], colour, 0.02)
 
     def rod(self, start: Vec3, end: Vec3, radius: float, colour: Colour) -> None:
         """Add a rope or rail between two points."""
-        geom = self.body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, 0.0, 0.0], contype=0, conaffinity=0
-        )
-        geom.fromto = [*start[:2], start[2] + self.floor_m, *end[:2], end[2] + self.floor_m]
-        self._paint(geom, colour, 0.1, (1.0, 1.0))
+        fromto = [*start[:2], start[2] + self.floor_m, *end[:2], end[2] + self.floor_m]
+        self._add(_CAPSULE, None, [radius, 0.0, 0.0], colour, 0.1, fromto=fromto)
 
-    def _paint(
-        self, geom: Any, colour: Colour | str, shine: float, repeat: tuple[float, float]
-    ) -> None:
-        if not isinstance(colour, str):
-            name = f"room/{colour[0]}-{colour[1]}-{colour[2]}-{shine:g}"
-            if self.spec.material(name) is None:
-                material = self.spec.add_material(
-                    name=name,
-                    rgba=[*(c / 255.0 for c in colour), 1.0],
-                    specular=shine,
-                    shininess=0.3,
-                )
-                material.emission = _GLOWS.get(colour, 0.0)
-        else:
+    def _add(
+        self, kind: Any, middle: Vec3 | None, size: list[float], colour: Colour | str, shine: float,
+        repeat: tuple[float, float] = (1.0, 1.0), solid: bool = False, **pose: Any,
+    ) -> None:  # fmt: skip
+        """Add a geom with a material; only a solid one collides."""
+        if middle is not None:
+            pose["pos"] = [*middle[:2], middle[2] + self.floor_m]
+        geom = self.body.add_geom(
+            type=kind, size=size, contype=int(solid), conaffinity=int(solid), **pose
+        )
+        if isinstance(colour, str):
             name = f"room/{colour}-{repeat[0]:g}-{repeat[1]:g}"
-            if self.spec.material(name) is None:
-                self._picture(colour)
-                material = self.spec.add_material(
-                    name=name, specular=shine, shininess=0.3, texrepeat=list(repeat)
-                )
-                textures = list(material.textures)
-                textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = f"room/{colour}"
-                material.emission = _GLOWS.get(colour, 0.0)
-                material.textures = textures
+        else:
+            name = f"room/{colour[0]}-{colour[1]}-{colour[2]}-{shine:g}"
         geom.material = name
+        if self.spec.material(name) is not None:
+            return
+        material = self.spec.add_material(name=name, specular=shine, shininess=0.3)
+        material.emission = _GLOWS.get(colour, 0.0)
+        if isinstance(colour, str):
+            self._picture(colour)
+            material.texrepeat = list(repeat)
+            textures = list(material.textures)
+            textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = f"room/{colour}"
+            material.textures = textures
+        else:
+            material.rgba = [*(c / 255.0 for c in colour), 1.0]
 
     def _picture(self, name: str) -> None:
         if self.spec.texture(f"room/{name}") is not None:
@@ -321,34 +291,16 @@ def _light(spec: Any, script: WorldScript) -> None:
     spec.visual.headlight.ambient = [light.ambient] * 3
     spec.visual.headlight.diffuse = [0.0] * 3
     spec.visual.headlight.specular = [0.0] * 3
-    spec.worldbody.add_light(
-        name="room/window",
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[-0.6, -2.2, 1.3],
-        dir=[0.62, 0.62, -0.48],
-        ambient=[0.0] * 3,
-        diffuse=[light.window, 0.98 * light.window, 0.93 * light.window],
-        specular=[0.15] * 3,
-        castshadow=light.shadows,
-    )
-    spec.worldbody.add_light(
-        name="room/lamp",
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[0.5, 0.8, 1.5],
-        dir=[0.35, -0.45, -0.82],
-        ambient=[0.0] * 3,
-        diffuse=[light.lamp, 0.97 * light.lamp, 0.90 * light.lamp],
-        specular=[0.05] * 3,
-        castshadow=False,
-    )
-    if light.opposite:
-        spec.worldbody.add_light(
-            name="room/opposite",
-            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-            pos=[2.6, 1.6, 1.4],
-            dir=[-0.74, -0.48, -0.47],
-            ambient=[0.0] * 3,
-            diffuse=[light.opposite, 0.98 * light.opposite, 0.93 * light.opposite],
-            specular=[0.10] * 3,
-            castshadow=False,
-        )
+    lights = [
+        # name, position, direction, level of red, green and blue, specular, shadows
+        ("window", [-0.6, -2.2, 1.3], [0.62, 0.62, -0.48], light.window, 0.98, 0.93, 0.15, light.shadows),
+        ("lamp", [0.5, 0.8, 1.5], [0.35, -0.45, -0.82], light.lamp, 0.97, 0.90, 0.05, False),
+        ("opposite", [2.6, 1.6, 1.4], [-0.74, -0.48, -0.47], light.opposite, 0.98, 0.93, 0.10, False),
+    ]  # fmt: skip
+    for name, pos, direction, level, green, blue, specular, shadows in lights:
+        if name != "opposite" or level:
+            spec.worldbody.add_light(
+                name=f"room/{name}", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=pos,
+                dir=direction, ambient=[0.0] * 3, diffuse=[level, green * level, blue * level],
+                specular=[specular] * 3, castshadow=shadows,
+            )  # fmt: skip

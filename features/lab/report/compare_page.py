@@ -8,6 +8,7 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.page import (
     Figure,
     RunHeader,
+    TextLine,
     banner,
     left_out,
     line_of,
@@ -41,14 +42,8 @@ class MeasureDifference(NamedTuple):
 class ComparedRow(NamedTuple):
     """One row of the page's table, ready to print."""
 
-    title: str
-    people: str
-    a: str
-    b: str
-    a_css: str
-    b_css: str
-    a_verdict: str
-    b_verdict: str
+    a: TextLine
+    b: TextLine
     events: str
     difference: str
     interval: str
@@ -62,20 +57,13 @@ _CLASSES = {"more than chance": "more", "may be chance": "same", "too few events
 
 def _row(difference: MeasureDifference, abouts: tuple[RunHeader, RunHeader]) -> ComparedRow:
     a, b = difference.a, difference.b
-    lines = (line_of(a, abouts[0].styles), line_of(b, abouts[1].styles))
     known = isfinite(difference.difference)
     chances = [f"p {_p(difference.chance)}"] if known else []
     if isfinite(difference.chance_shape):
         chances.append(f"distribution p {_p(difference.chance_shape)}")
     return ComparedRow(
-        a.band.title,
-        lines[0].band,
-        lines[0].value,
-        lines[1].value,
-        lines[0].css,
-        lines[1].css,
-        a.verdict,
-        b.verdict,
+        line_of(a, abouts[0].styles),
+        line_of(b, abouts[1].styles),
         f"{a.measured.events} and {b.measured.events}",
         with_unit(difference.difference, a.band.unit) if known else "",
         f"{number(difference.low95)} to {number(difference.high95)}" if known else "",
