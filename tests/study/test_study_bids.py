@@ -112,7 +112,7 @@ def test_it_is_written_anew_over_its_own_and_over_nothing_else(
     other = tmp_path / "other"
     other.mkdir()
     (other / "notes.txt").write_text("mine")
-    with pytest.raises(SetupError, match="no data set of gazerig"):
+    with pytest.raises(SetupError, match="not a data set of gazerig"):
         write(study(records(design(), 1)), other, folder)
     assert (other / "notes.txt").read_text() == "mine"
 
