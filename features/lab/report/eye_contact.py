@@ -33,8 +33,7 @@ def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
         else:
             out.append([begin, end, cut])
     rows = np.array(out).reshape(-1, 3)
-    kept: Floats = rows[rows[:, 1] - rows[:, 0] >= BRIDGED_S]
-    return kept
+    return np.asarray(rows[rows[:, 1] - rows[:, 0] >= BRIDGED_S])
 
 
 def looks(run: GazeTrace) -> Floats:
@@ -67,8 +66,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
 
 
 def _lengths(rows: Floats) -> Floats:
-    out: Floats = rows[:, 1] - rows[:, 0]
-    return out
+    return np.asarray(rows[:, 1] - rows[:, 0])
 
 
 def _share(rows: Floats) -> float:

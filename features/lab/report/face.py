@@ -74,8 +74,7 @@ def on_parts(run: GazeTrace) -> Floats:
 def share(rows: Floats) -> Floats:
     """Return the share of time on each part, (8,)."""
     time = np.bincount(rows[:, 0].astype(int), weights=rows[:, 1], minlength=N)
-    out: Floats = time / time.sum()
-    return out
+    return np.asarray(time / time.sum())
 
 
 @cache
@@ -110,8 +109,7 @@ def density(rows: Floats) -> Floats:
     on_grid = (z >= 0) & (z < len(_Z_M)) & (y >= 0) & (y < len(_Y_M))
     cells = z[on_grid] * len(_Y_M) + y[on_grid]
     time = np.bincount(cells, rows[on_grid, 2], len(_Z_M) * len(_Y_M))
-    out: Floats = _bell("z") @ time.reshape(len(_Z_M), len(_Y_M)) @ _bell("y")
-    return out
+    return np.asarray(_bell("z") @ time.reshape(len(_Z_M), len(_Y_M)) @ _bell("y"))
 
 
 @cache
@@ -166,13 +164,12 @@ def axes(run: GazeTrace) -> Floats:
     """
     names = ("left_y_mm", "left_z_mm", "right_y_mm", "right_z_mm", "off_left", "off_right")
     due = run.column("vergence") - run.column("vergence_due")
-    table = np.column_stack([*(run.column(name) for name in names), due])
+    table = np.column_stack([run.columns(*names), due])
     parts = [table[run.between(f.start_s + _SETTLED_S, f.end_s)] for f in run.fixations
              if f.kind == "face"]  # fmt: skip
     rows = [np.median(part, axis=0) for part in parts if len(part)]
     found = np.array(rows).reshape(-1, 7)
-    whole: Floats = found[np.isfinite(found).all(axis=1)]
-    return whole
+    return np.asarray(found[np.isfinite(found).all(axis=1)])
 
 
 def _share_difference(rows: Floats) -> float:
@@ -209,8 +206,7 @@ def _expected_unit() -> Floats:
     """Return the heat map expected of people, less its mean, with norm 1."""
     expected = expected_density().ravel()
     expected = expected - expected.mean()
-    out: Floats = expected / np.sqrt(expected @ expected)
-    return out
+    return np.asarray(expected / np.sqrt(expected @ expected))
 
 
 def _cells(places: Floats, centres: Floats) -> NDArray[np.intp]:
@@ -224,5 +220,4 @@ def _cells(places: Floats, centres: Floats) -> NDArray[np.intp]:
 def _bell(axis: str) -> Floats:
     """Return the weights (n, n) that spread time over the cells of an axis; computed once."""
     centres = _Z_M if axis == "z" else _Y_M
-    out: Floats = np.exp(-0.5 * ((centres[:, None] - centres[None]) / _SPREAD_M) ** 2)
-    return out
+    return np.asarray(np.exp(-0.5 * ((centres[:, None] - centres[None]) / _SPREAD_M) ** 2))

@@ -92,8 +92,7 @@ def _dwell(figure: Figure, runs: Sequence[Shown]) -> None:
 
 
 def _below(values: Floats, grid: Floats) -> Floats:
-    out: Floats = np.searchsorted(np.sort(values), grid, side="right") / len(values)
-    return out
+    return np.asarray(np.searchsorted(np.sort(values), grid, side="right") / len(values))
 
 
 def _transitions(figure: Figure, runs: Sequence[Shown]) -> None:

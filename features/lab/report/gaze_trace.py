@@ -112,8 +112,11 @@ class GazeTrace:
 
     def column(self, name: str) -> Floats:
         """Return a column of Row by its name."""
-        out: Floats = self.rows[:, TraceRow._fields.index(name)]
-        return out
+        return np.asarray(self.rows[:, TraceRow._fields.index(name)])
+
+    def columns(self, *names: str) -> Floats:
+        """Return columns (n, k) by their names."""
+        return self.rows[:, [TraceRow._fields.index(name) for name in names]]
 
     @property
     def seconds(self) -> float:

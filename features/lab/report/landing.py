@@ -22,12 +22,13 @@ def planned_saccades(run: GazeTrace) -> Floats:
     Columns: onset and end in s, measured gaze amplitude in deg, and 1 on a face.
     """
     t, flying = run.column("t"), run.column("phase") == PHASES.index("saccade")
+    gaze = run.columns("gaze_yaw", "gaze_pitch")
     edges = np.flatnonzero(np.diff(flying.astype(int), prepend=0, append=0)).reshape(-1, 2)
     rows = []
     for first, last in edges:
         landed = run.between(t[min(last, len(t) - 1)] + _LANDED_S[0], t[last - 1] + 0.06)
         if landed.stop > landed.start:
-            gone = np.median(_gaze(run, landed), axis=0) - _gaze(run, slice(first, first + 1))[0]
+            gone = np.median(gaze[landed], axis=0) - gaze[first]
             on_face = run.column("is_face")[first]
             rows.append((t[first], t[last - 1], float(np.hypot(*gone)), on_face))
     return np.array(rows).reshape(-1, 4)
@@ -35,7 +36,7 @@ def planned_saccades(run: GazeTrace) -> Floats:
 
 def overshoots(run: GazeTrace) -> Floats:
     """Return (n,) the overshoot of each saccade of 5 to 20 deg, as a share of its amplitude."""
-    rows = []
+    rows, gaze = [], run.columns("gaze_yaw", "gaze_pitch")
     moves = np.hypot(run.column("target_yaw_rate"), run.column("target_pitch_rate"))
     asked = [s for s in run.saccades if s.commanded is not None]
     onsets = [*(s.onset_s for s in asked), np.inf]
@@ -47,8 +48,8 @@ def overshoots(run: GazeTrace) -> Floats:
             continue
         if float(np.median(moves[rest])) > _STILL_DEG_S:
             continue
-        path = _gaze(run, flight)
-        whole = np.median(_gaze(run, rest), axis=0) - path[0]
+        path = gaze[flight]
+        whole = np.median(gaze[rest], axis=0) - path[0]
         size = float(np.hypot(*whole))
         farthest = float(((path - path[0]) @ whole).max()) / size
         rows.append(max(0.0, farthest / size - 1.0))
@@ -63,7 +64,7 @@ def landings(run: GazeTrace) -> Floats:
     corrected: 1 if another saccade to the same target follows within .35 s
     """
     t, shift = run.column("t"), run.column("shift")
-    at = np.column_stack([run.column("target_yaw"), run.column("target_pitch")])
+    gaze, target = run.columns("gaze_yaw", "gaze_pitch"), run.columns("target_yaw", "target_pitch")
     jumps, limited = planned_saccades(run), run.column("eye_limited")
     rows = []
     for number, (onset_s, end_s, _, _) in enumerate(jumps):
@@ -73,13 +74,11 @@ def landings(run: GazeTrace) -> Floats:
             continue
         if limited[first : landed.stop].any():
             continue
-        gaze, goal = _gaze(run, landed), at[landed].mean(axis=0)
-        start = _gaze(run, slice(first, first + 1))[0]
-        way = goal - start
+        way = target[landed].mean(axis=0) - gaze[first]
         far = float(np.hypot(*way))
         if far < FAR_DEG:
             continue
-        share = float((np.median(gaze, axis=0) - start) @ way) / far**2
+        share = float((np.median(gaze[landed], axis=0) - gaze[first]) @ way) / far**2
         rows.append((share, float(_is_corrected(jumps, number, t, shift))))
     return np.array(rows).reshape(-1, 2)
 
@@ -93,10 +92,6 @@ def _is_corrected(jumps: Floats, number: int, t: Floats, shift: Floats) -> bool:
         np.searchsorted(t, jumps[number, 0])
     ]  # fmt: skip
     return bool(same and _CORRECTION_S[0] <= after_s <= _CORRECTION_S[1])
-
-
-def _gaze(run: GazeTrace, part: slice) -> Floats:
-    return np.column_stack([run.column("gaze_yaw")[part], run.column("gaze_pitch")[part]])
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:

@@ -35,8 +35,7 @@ def resting_opening(opening: Floats, pitch_deg: Floats) -> Floats:
     # Lids are shut for less than half of the time, whatever the gaze.
     rest = [float(np.median(opening[pieces[at]])) for at in often]
     middle = [float(np.median(pitch_deg[pieces[at]])) for at in often]
-    out: Floats = np.interp(pitch_deg, middle, rest)
-    return out
+    return np.asarray(np.interp(pitch_deg, middle, rest))
 
 
 def blinks_of(t_s: Floats, opening: Floats, pitch_deg: Floats) -> tuple[BlinkEvent, ...]:

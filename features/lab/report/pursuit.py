@@ -21,14 +21,9 @@ def pursuit_stretches(run: GazeTrace) -> Floats:
     t = run.column("t")
     if len(t) < 20:
         return np.zeros((0, 3))
-    at = np.column_stack([run.column("target_yaw_rate"), run.column("target_pitch_rate")])
+    at = run.columns("target_yaw_rate", "target_pitch_rate")
     gaze = np.column_stack([rate(t, run.column("gaze_yaw")), rate(t, run.column("gaze_pitch"))])
-    error = np.column_stack(
-        [
-            run.column("target_yaw") - run.column("gaze_yaw"),
-            run.column("target_pitch") - run.column("gaze_pitch"),
-        ]
-    )
+    error = run.columns("target_yaw", "target_pitch") - run.columns("gaze_yaw", "gaze_pitch")
     speed = np.hypot(at[:, 0], at[:, 1])
     mask = run.slow(0.02, 0.06) & (speed > SLOWEST_DEG_S) & (speed < FASTEST_DEG_S)
     rows = []

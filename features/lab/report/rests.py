@@ -53,8 +53,7 @@ def _beyond_neighbours(rests_s: Floats) -> Floats:
     near = np.ones(2 * _NEAR_SLOTS + 1)
     near[_NEAR_SLOTS - 1 : _NEAR_SLOTS + 2] = 0.0
     inside = np.convolve(np.ones_like(share), near, "same")
-    beyond: Floats = share - np.convolve(share, near, "same") / inside
-    return beyond
+    return np.asarray(share - np.convolve(share, near, "same") / inside)
 
 
 def small_shifts(run: GazeTrace) -> Floats:
@@ -81,8 +80,7 @@ def _pieces(run: GazeTrace, onsets_s: Floats, here: np.ndarray) -> Floats:
     counts, _ = np.histogram(onsets_s, edges)
     seconds, _ = np.histogram(t[here], edges)
     rows = np.column_stack([counts, seconds / run.rate_hz])
-    kept: Floats = rows[rows[:, 1] > 0.0]
-    return kept
+    return np.asarray(rows[rows[:, 1] > 0.0])
 
 
 def per_second(rows: Floats) -> float:

@@ -94,8 +94,7 @@ def _pauses(run: GazeTrace) -> Floats:
     ends = np.array([s.end_s for s in asked])
     onsets = np.array([s.onset_s for s in asked])
     pauses = onsets[1:] - ends[:-1]
-    soon: Floats = pauses[pauses < _PAUSE_S]
-    return soon
+    return np.asarray(pauses[pauses < _PAUSE_S])
 
 
 def rest_errors(run: GazeTrace) -> Floats:

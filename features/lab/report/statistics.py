@@ -175,8 +175,7 @@ def longest(rows: Floats) -> float:
 def _spreads_over_means(rows: Floats) -> Floats:
     if rows.shape[1] < 2:
         return np.full(len(rows), nan)
-    spreads: Floats = np.std(rows, axis=1, ddof=1) / np.mean(rows, axis=1)
-    return spreads
+    return np.asarray(np.std(rows, axis=1, ddof=1) / np.mean(rows, axis=1))
 
 
 _ALONG: Mapping[Statistic, Callable[[Floats], Floats]] = {

@@ -246,8 +246,7 @@ def latin_hypercube(axes: Sequence[Axis], samples: int, seed: int) -> list[Point
 def latin_shares(dimensions: int, samples: int, rng: np.random.Generator) -> Floats:
     """Return a Latin hypercube in the unit cube, (samples, dimensions)."""
     parts = rng.permuted(np.tile(np.arange(samples), (dimensions, 1)), axis=1)
-    shares: Floats = ((parts + rng.random(parts.shape)) / samples).T
-    return shares
+    return np.asarray(((parts + rng.random(parts.shape)) / samples).T)
 
 
 def point_at(axes: Sequence[Axis], shares: Iterable[float]) -> Point:

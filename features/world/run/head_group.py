@@ -227,13 +227,19 @@ class HeadGroup:
             if reason != SECONDS:  # all heads reach that end by themselves
                 end_all(reason)
 
+        def watch_first(tick: Tick) -> None:
+            for trace in self._traces:
+                trace.update(0, tick)
+            if watch is not None:
+                watch(tick)
+
         for thread in threads:
             thread.start()
         try:
             self._world.enter(0)
             self._figures[0] = run(
                 self.members[0].composed, lead, self._printer(say), status,
-                lambda tick: self._watch_first(tick, watch), browse, ended,
+                watch_first, browse, ended,
             )  # fmt: skip
         except KeyboardInterrupt:  # an end was requested before the start, maybe by a failed head
             if not self._failures:
@@ -252,7 +258,10 @@ class HeadGroup:
             line := overload_message(zip(names, self._figures, strict=True), *self._pictures)
         ):
             say(line)
-        return self._joined()
+        first, *others = self._figures
+        assert first is not None
+        gazes = dict(zip(names[1:], (trace.figures() for trace in self._traces), strict=True))
+        return {**first, "mutual_gaze": gazes, "heads": dict(zip(names[1:], others, strict=True))}
 
     def _follow(
         self, number: int, lead: Interrupts, own: Interrupts, say: Callable[[str], None]
@@ -287,16 +296,3 @@ class HeadGroup:
                 say(before + line)
 
         return one_by_one
-
-    def _watch_first(self, tick: Tick, watch: Callable[[Tick], object] | None) -> None:
-        for trace in self._traces:
-            trace.update(0, tick)
-        if watch is not None:
-            watch(tick)
-
-    def _joined(self) -> dict[str, object]:
-        first, *others = self._figures
-        assert first is not None
-        names = [member.name for member in self.members[1:]]
-        gazes = dict(zip(names, (trace.figures() for trace in self._traces), strict=True))
-        return {**first, "mutual_gaze": gazes, "heads": dict(zip(names, others, strict=True))}

@@ -24,7 +24,7 @@ from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.head_shape import HeadMeasures
-from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.model.clock import RealClock
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 from gazerig.sim_mock.scenes.scene import Scene
 
@@ -71,7 +71,7 @@ class SimulatedWorld:
     def face(self, number: int, rig: Rig) -> FacePoseSource:
         """Return a source of the current pose of a head's face."""
         joints = RigInState(kinematics_of(rig), self._world.model.rigs[number].qpos)
-        poses = SimulatedPoses(self._world, self.clock(number), joints)
+        poses = SimulatedPoses(self._world, self._lockstep.clock(number), joints)
         return FacePoseSource(poses, self.frames[number], _nose_m(rig))
 
     def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
@@ -85,11 +85,9 @@ class SimulatedWorld:
         """
         world = self._found._replace(scene=before(self._found.scene), number=number)
         stands = HeadPlace(*self.frames[number]).numbers
-        return simulated_room(rig, options, self.clock(number), world, self._world, stands)
-
-    def clock(self, number: int) -> Clock:
-        """Return a head's clock."""
-        return self._lockstep.clock(number)
+        return simulated_room(
+            rig, options, self._lockstep.clock(number), world, self._world, stands
+        )
 
     def enter(self, number: int) -> None:
         """Wait for a head's first turn."""
@@ -140,11 +138,7 @@ class RealTimeWorld:
         served = ServedRig(self._buses, self._paths[number], lambda: None)
         world = self._found._replace(scene=before(self._found.scene), number=number)
         stands = HeadPlace(*self.frames[number]).numbers
-        return served_room(rig, options, self.clock(number), world, served, stands)
-
-    def clock(self, number: int) -> Clock:
-        """Return the host's clock."""
-        return RealClock()
+        return served_room(rig, options, RealClock(), world, served, stands)
 
     def enter(self, number: int) -> None:
         """Return immediately: real time does not wait."""
