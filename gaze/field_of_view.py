@@ -18,9 +18,6 @@ from gazerig.gaze.angles import angles_of, compose, direction, rotate, rotation
 from gazerig.gaze.types import Angles2, Angles3, Bodies, BodyRows, Floats, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
 
-BLOCK = 8192
-"""Bodies computed together: their intermediate results stay in the processor's cache."""
-
 _PAIRS_AT_ONCE = 1_000_000
 
 
@@ -54,27 +51,17 @@ class FieldOfView:
         self._occlusion = params.occlusion
         self._own = frozenset(params.own_kinds)
 
-    def visible(self, bodies: Bodies, state: GazeState) -> NDArray[np.bool_]:
-        """Return (n,) whether each body's centre is in the field of at least one eye.
+    def visible(self, bodies: Bodies, rows: BodyRows, state: GazeState) -> list[bool]:
+        """Return whether each body's centre is in the field of at least one eye.
 
         Own bodies are never visible; with occlusion neither are bodies behind another one, own
         bodies included, as seen from the head.
-        """
-        seen = self._in_field(bodies.p_world_m, state)
-        if not self._own.isdisjoint(bodies.kinds):
-            own = map(self._own.__contains__, bodies.kinds)
-            seen &= ~np.fromiter(own, dtype=np.bool_, count=len(bodies))
-        if self._occlusion:
-            rows = np.flatnonzero(seen)
-            rel = bodies.p_world_m - np.asarray(state.p_world_head_m)
-            seen[rows[occluded(rel, bodies.radius_m, rows)]] = False
-        return seen
 
-    def visible_rows(self, bodies: Bodies, rows: BodyRows, state: GazeState) -> list[bool]:
-        """Return the result of ``visible`` for few bodies, whose rows are given as well."""
-        if self._occlusion:
-            found: list[bool] = self.visible(bodies, state).tolist()
-            return found
+        Args:
+            bodies: the bodies.
+            rows: the same as plain numbers.
+            state: of head and eyes.
+        """
         left, right = eye_axes(state, left=True), None
         seen = []
         for p, kind in zip(rows.p_world_m, rows.kinds, strict=True):
@@ -83,55 +70,26 @@ class FieldOfView:
                 right = right or eye_axes(state, left=False)
                 inside = self._inside(p, state.p_world_eye_right_m, right, left=False)
             seen.append(inside)
+        if self._occlusion:
+            rel = bodies.p_world_m - np.asarray(state.p_world_head_m)
+            found = np.flatnonzero(seen)
+            for row in found[occluded(rel, bodies.radius_m, found)].tolist():
+                seen[row] = False
         return seen
 
     def _inside(self, p: list[float], p_eye: Vec3, axes: Mat3, left: bool) -> bool:
-        """Return whether a point is in the field of one eye; scalar form of ``_in_one_field``."""
+        """Return whether a point is in the field of one eye."""
         x, y, z = p[0] - p_eye[0], p[1] - p_eye[1], p[2] - p_eye[2]
         (a, b, c), (d, e, f), (g, h, i) = axes
         ahead, side, up = a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
         off_axis2 = side * side + up * up
         if off_axis2 == 0.0:
             return ahead > 0.0
+        # Each quadrant is bounded by a quarter ellipse between its two limits.
         eccentricity = atan2(sqrt(off_axis2), ahead)
         side /= self._temporal if (side > 0.0) is left else self._nasal
         up /= self._up if up > 0.0 else self._down
         return eccentricity * eccentricity * (side * side + up * up) <= off_axis2
-
-    def _in_field(self, p_world_m: Floats, state: GazeState) -> NDArray[np.bool_]:
-        """Return (n,) whether each point is in the field of at least one eye."""
-        seen = np.empty(len(p_world_m), dtype=np.bool_)
-        for start in range(0, len(seen), BLOCK):
-            some = slice(start, start + BLOCK)
-            seen[some] = self._in_one_field(p_world_m[some], state, left=True)
-        rest = np.flatnonzero(~seen)
-        if len(rest):
-            seen[rest] = self._in_one_field(p_world_m[rest], state, left=False)
-        return seen
-
-    def _in_one_field(self, p_world_m: Floats, state: GazeState, left: bool) -> NDArray[np.bool_]:
-        """Return (n,) whether each point is in the field of one eye."""
-        p_eye = state.p_world_eye_left_m if left else state.p_world_eye_right_m
-        rel = columns(p_world_m)
-        rel -= np.array(p_eye)[:, None]
-        ahead, side, up = np.array(eye_axes(state, left)).T @ rel
-        off_axis2 = side * side + up * up
-        eccentricity = np.arctan2(np.sqrt(off_axis2), ahead)
-        to_left, to_right = (self._temporal, self._nasal) if left else (self._nasal, self._temporal)
-        side = np.maximum(side / to_left, side / -to_right)
-        up = np.maximum(up / self._up, up / -self._down)
-        # Each quadrant is bounded by a quarter ellipse between its two limits; multiplied
-        # out, so that a body right on the axis needs no division.
-        inside: NDArray[np.bool_] = (
-            eccentricity * eccentricity * (side * side + up * up) <= off_axis2
-        )
-        inside &= (off_axis2 > 0.0) | (ahead > 0.0)
-        return inside
-
-
-def columns(rows: Floats) -> Floats:
-    """Return (n, 3) vectors as (3, n), copied: numpy is many times slower on rows of three."""
-    return rows.T.copy(order="C")
 
 
 def occluded(rel_m: Floats, radius_m: Floats, rows: NDArray[np.intp]) -> NDArray[np.bool_]:

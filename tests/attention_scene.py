@@ -76,6 +76,10 @@ def salience(
     return Terms(*np.array(rows).reshape(-1, 5).T)
 
 
+def visible(view: FieldOfView, seen: Bodies, state: GazeState) -> list[bool]:
+    return view.visible(seen, seen.rows(), state)
+
+
 def attention(**params: Any) -> Attention:
     return Attention(
         AttentionParams(**params),

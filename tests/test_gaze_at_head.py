@@ -202,12 +202,10 @@ def test_the_page_says_it_above_the_face() -> None:
     assert face_label(replace(shown, looks_at_head=True)) == "face 3, looks at the head"
 
 
-@pytest.mark.parametrize("few", [24, -1])
 @pytest.mark.parametrize(("ratio", "looked_at"), [(0.85, [(2,), (1,)]), (1.0, [(1, 2), (1, 2)])])
 def test_of_two_faces_the_one_that_looks_at_the_head_gets_more(
-    monkeypatch: pytest.MonkeyPatch, few: int, ratio: float, looked_at: list[tuple[int, ...]]
+    ratio: float, looked_at: list[tuple[int, ...]]
 ) -> None:
-    monkeypatch.setattr("gazerig.gaze.attention.attention._FEW", few)
     left, right = (1.0, 0.2, 0.0), (1.0, -0.2, 0.0)
     for (one, other), first in zip([(False, True), (True, False)], looked_at, strict=True):
         model = attention(looks_elsewhere_ratio=ratio)

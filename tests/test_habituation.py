@@ -77,7 +77,7 @@ def stays_s(targets: list[Target]) -> list[float]:
 
 
 def interest(model: Habituation, seen: Bodies, attended: int, t_s: float) -> list[float]:
-    return model.step(seen.ids, seen.p_world_m, EYE, attended, t_s).tolist()
+    return model.step(seen.rows(), EYE, attended, t_s)
 
 
 def test_interest_falls_while_attended_and_recovers_otherwise() -> None:

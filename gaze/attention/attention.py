@@ -28,8 +28,6 @@ from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _NO_ONE: frozenset[int] = frozenset()
-_FEW = 24
-"""Up to this number of bodies are computed one by one, which is faster than arrays."""
 _SPEED_OVER_S = 0.2  # longest interval for a speed of the head from two positions
 _DECIDED_S = 0.2
 """Time within which a camera may show the target of a new behaviour after the change."""
@@ -152,11 +150,10 @@ class Attention:
             self.top_down.plan(percept, state.p_world_head_m, t_s)
         trait = self.top_down.rule.person
         self.top_down.named_ids = self._persons.named(trait) if trait is not None else _NO_ONE
-        compare = self._compare_few if len(bodies) <= _FEW else self._compare
         ratio = self._params.looks_elsewhere_ratio
         elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
         worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
-        made = compare(bodies, worth, state, t_s)
+        made = self._compare(bodies, worth, state, t_s)
         self._note_gestures(made)
         if self._shows_nothing_salient(made):
             self._reaction.drop()
@@ -193,19 +190,22 @@ class Attention:
             return bool(most == -inf)
         return best < len(made.bodies) and made.bodies.kinds[best] != "face"
 
-    def _compare_few(
+    def _compare(
         self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
     ) -> TargetComparison:
-        """Return the result of ``_compare`` for few bodies."""
+        """Return the amounts that the decision compares.
+
+        worth: additional factor 0..1 of each body's salience
+        """
         n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
-        seen = self._field_of_view.visible_rows(bodies, rows, state)
+        seen = self._field_of_view.visible(bodies, rows, state)
         v_eye = self._eye_velocity(eye, t_s)
         motion = self._bottom_up.step(
             rows, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
         )
-        rule_target = self.top_down.step_rows(rows, seen, eye)
+        rule_target = self.top_down.step(rows, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
-        left = self._habituation.step_rows(rows, eye, attended, t_s)
+        left = self._habituation.step(rows, eye, attended, t_s)
         habituation = [*map(mul, left, worth), 1.0]
         rule = [0.0] * (n + 1)
         amount = [*[terms.total for terms in motion], 0.0]
@@ -224,42 +224,6 @@ class Attention:
             for one, factor, there in zip(amount, habituation, (*seen, point), strict=True)
         ]
         best = total.index(max(total))
-        plan = self.top_down.plan_text
-        return TargetComparison(
-            bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
-        )
-
-    def _compare(
-        self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
-    ) -> TargetComparison:
-        """Return the amounts that the decision compares.
-
-        worth: additional factor 0..1 of each body's salience
-        """
-        n, eye = len(bodies), state.p_world_head_m
-        seen = self._field_of_view.visible(bodies, state)
-        v_eye = self._eye_velocity(eye, t_s)
-        limits = self._motion_limits(bodies)
-        motion = self._bottom_up.step(
-            bodies.rows(), eye, t_s, v_eye, self._gaze(state), seen.tolist(), *limits
-        )
-        rule_target = self.top_down.step(bodies, seen, eye)
-        attended = self._identity[1] if self._identity is not None else -1
-        habituation, rule = np.ones(n + 1), np.zeros(n + 1)
-        left = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
-        habituation[:n] = left * worth
-        amount = np.array([*[terms.total for terms in motion], 0.0])
-        if rule_target is not None:
-            rows = rule_target.rows if rule_target.point_world_m is None else np.array([n])
-            rule[rows] = rule_target.salience
-            amount[rows] = np.maximum(amount[rows], rule_target.salience)
-        if rule_target is not None and rule_target.point_world_m is None:
-            habituation[rows] = self._shares(rule_target, bodies.ids, worth, attended, t_s)
-        total = amount * habituation
-        total[:n][~seen] = -inf
-        if rule_target is None or rule_target.point_world_m is None:
-            total[n] = -inf
-        best = int(total.argmax())
         plan = self.top_down.plan_text
         return TargetComparison(
             bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
@@ -299,7 +263,7 @@ class Attention:
         named = [ids[row] for row in rule_target.rows]
         moved = self._gestures
         mine = [worth[row] * (1.0 + moved.get(ids[row], 0.0)) for row in rule_target.rows]
-        weights = [float(near) * one for near, one in zip(rule_target.nearness, mine, strict=True)]
+        weights = [near * one for near, one in zip(rule_target.nearness, mine, strict=True)]
         shares = [
             factor * one * (rule_target.stay if id == self._favoured_id else 1.0)
             for id, factor, one in zip(

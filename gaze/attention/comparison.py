@@ -4,11 +4,9 @@ from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
-import numpy as np
-
 from gazerig.gaze.attention.bottom_up import SalienceRow
 from gazerig.gaze.attention.top_down import RuleTarget
-from gazerig.gaze.types import Bodies, Floats, Salience, Target, vec
+from gazerig.gaze.types import Bodies, Salience, Target, vec
 
 NO_BODY = -1
 """Id of a target that is a point and not a body."""
@@ -30,9 +28,9 @@ class TargetComparison(NamedTuple):
     bodies: Bodies
     motion: Callable[[int], SalienceRow]
     rule_target: RuleTarget | None
-    rule: Floats | list[float]
-    habituation: Floats | list[float]
-    total: Floats | list[float]
+    rule: list[float]
+    habituation: list[float]
+    total: list[float]
     best: int
     plan: str = ""
 
@@ -70,21 +68,14 @@ class TargetComparison(NamedTuple):
     def _strongest(self, row: int) -> tuple[Salience, ...]:
         """Return the saliences of a row and of the highest others, term by term."""
         total = self.total
-        if isinstance(total, list):
-            there = [each for each, one in enumerate(total) if one > -inf]
-            rows = sorted(there, key=lambda each: -total[each]) if len(there) > 1 else there
-        elif len(total) > 64:
-            some = np.argpartition(-total, _LISTED)[:_LISTED]
-            rows = some[np.argsort(-total[some], kind="stable")].tolist()
-        else:
-            rows = np.argsort(-total, kind="stable").tolist()
-        others = [other for other in rows[:_LISTED] if other != row and total[other] > -inf]
+        there = [each for each, one in enumerate(total) if one > -inf]
+        rows = sorted(there, key=lambda each: -total[each]) if len(there) > 1 else there
+        others = [other for other in rows[:_LISTED] if other != row]
         return tuple([self._salience(each) for each in (row, *others[: _LISTED - 1])])
 
     def _salience(self, row: int) -> Salience:
         """Return the salience of one row, term by term."""
-        rule, habituation = float(self.rule[row]), float(self.habituation[row])
-        total = float(self.total[row])
+        rule, habituation, total = self.rule[row], self.habituation[row], self.total[row]
         if row == len(self.bodies):
             kind = self.point_kind
             return Salience(NO_BODY, kind, 0.0, 0.0, 0.0, 0.0, rule, habituation, total)

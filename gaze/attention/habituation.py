@@ -14,12 +14,10 @@ from collections.abc import Sequence
 from math import acos, exp, radians
 from typing import NamedTuple
 
-import numpy as np
-
 from gazerig.gaze.angles import dot, sub, unit
 from gazerig.gaze.attention.params import HabituationParams
 from gazerig.gaze.attention.shared_attention import SharedAttention
-from gazerig.gaze.types import BodyRows, Floats, Vec3
+from gazerig.gaze.types import BodyRows, Vec3
 
 
 class _Left(NamedTuple):
@@ -56,31 +54,12 @@ class Habituation:
             self._left.append(_Left(p_world_m, t_s))
 
     def step(
-        self,
-        ids: tuple[int, ...],
-        p_world_m: Floats,
-        p_world_eye_m: Vec3,
-        attended_id: int,
-        t_s: float,
-    ) -> Floats:
-        """Return (n,) the factor 0..1 of each body's salience.
-
-        ids, p_world_m: the bodies in view and their centres, (n, 3)
-        attended_id: what has been looked at since the step before; -1 for nothing
-        """
-        self._advance(attended_id, t_s)
-        habituation = np.ones(len(ids))
-        for id, left in self._habituation.items():
-            if id in ids:
-                habituation[ids.index(id)] = left
-        if self._left:
-            self._avoid(habituation, ids, p_world_m, p_world_eye_m, attended_id, t_s)
-        return habituation
-
-    def step_rows(
         self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float
     ) -> list[float]:
-        """Return the result of ``step`` for few bodies."""
+        """Return the factor 0..1 of each body's salience.
+
+        attended_id: what has been looked at since the step before; -1 for nothing
+        """
         self._advance(attended_id, t_s)
         if not self._left:
             return [self._habituation.get(id, 1.0) for id in rows.ids]
@@ -129,7 +108,7 @@ class Habituation:
             self._habituation[attended_id] = attended
 
     def _return_factor(self, p_world_m: list[float], p_eye: Vec3, t_s: float) -> float:
-        """Return the factor of one body near points left; scalar form of ``_avoid``."""
+        """Return the factor of one body near the points left."""
         par = self._params
         x, y, z = p_world_m
         way = unit(sub((x, y, z), p_eye))
@@ -140,31 +119,3 @@ class Habituation:
             age = (t_s - left.at_s) / par.inhibition_of_return_s
             factor *= 1.0 - par.inhibition_of_return_strength * exp(-0.5 * sigmas * sigmas - age)
         return factor
-
-    def _avoid(
-        self,
-        habituation: Floats,
-        ids: tuple[int, ...],
-        p_world_m: Floats,
-        p_eye: Vec3,
-        attended_id: int,
-        t_s: float,
-    ) -> None:
-        """Inhibit the return to points left: lower the factors of bodies near them, in place."""
-        par = self._params
-        places = np.array([one.p_world_m for one in self._left]) - np.asarray(p_eye)
-        ages = t_s - np.array([one.at_s for one in self._left])
-        cosines = _directions(p_world_m - np.asarray(p_eye)) @ _directions(places).T
-        angles = np.arccos(np.clip(cosines, -1.0, 1.0))
-        sigmas = angles / radians(par.inhibition_of_return_sigma_deg)
-        near = np.exp(-0.5 * sigmas * sigmas - ages / par.inhibition_of_return_s)
-        factor = (1.0 - par.inhibition_of_return_strength * near).prod(axis=1)
-        if attended_id in ids:
-            factor[ids.index(attended_id)] = 1.0
-        habituation *= factor
-
-
-def _directions(rel_m: Floats) -> Floats:
-    """Return the directions of (n, 3) vectors."""
-    out: Floats = rel_m / np.maximum(np.sqrt((rel_m * rel_m).sum(axis=1, keepdims=True)), 1e-9)
-    return out

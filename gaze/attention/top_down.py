@@ -12,12 +12,8 @@ percept. A user's choice overrides it until they return to the planner (``PLANNE
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import compress
 from math import dist
 from typing import Annotated, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from gazerig.gaze.attention.action_planner import (
     ACTIONS,
@@ -26,7 +22,7 @@ from gazerig.gaze.attention.action_planner import (
     ActionPlannerParams,
 )
 from gazerig.gaze.attention.persons import TRAITS
-from gazerig.gaze.types import Bodies, BodyRows, Floats, Percept, Vec3
+from gazerig.gaze.types import BodyRows, Percept, Vec3
 from gazerig.params import Bounds
 
 _BY_ID = "id:"
@@ -147,16 +143,16 @@ class TopDownParams:
 class RuleTarget(NamedTuple):
     """Targets of the present rule.
 
-    rows:     (k,) rows of the selected bodies; none for a place
-    nearness: (k,) weight of each, 1 for the nearest
+    rows:     rows of the selected bodies; none for a place
+    nearness: weight of each, 1 for the nearest
     stay:     factor by which the last target is preferred
     point_world_m: the selected place, None for bodies
     salience, behaviour: the rule's constant and name
     point_kind, point_world_m_s: kind of the place, and its velocity
     """
 
-    rows: NDArray[np.intp] | list[int]
-    nearness: Floats | list[float]
+    rows: list[int]
+    nearness: list[float]
     stay: float
     point_world_m: Vec3 | None
     salience: float
@@ -236,8 +232,6 @@ class TopDown:
         self._by_user = False
         self._planner.reset()
         self.named_ids = _NO_ONE
-        self._named: tuple[str, tuple[str, ...]] = ("", ())
-        self._rows_named = np.zeros(0, dtype=np.intp)
 
     def behave(self, behaviour: str) -> None:
         """Set the present behaviour, or leave it to the planner again.
@@ -254,37 +248,14 @@ class TopDown:
 
     def step(
         self,
-        bodies: Bodies,
-        seen: NDArray[np.bool_],
-        p_world_eye_m: Vec3,
-    ) -> RuleTarget | None:
-        """Return the rule's targets among the bodies in view, None without any.
-
-        seen: (n,) which bodies are in view
-        """
-        rule = self._params.rules[self.behaviour]
-        if self.plans and (planned := self._plan_target(rule, bodies.ids, seen.tolist())):
-            return planned
-        rows = self._rows(bodies, rule)
-        rows = rows[seen[rows]]
-        if self.named_ids:
-            named = np.isin(np.array(bodies.ids, dtype=np.int64)[rows], list(self.named_ids))
-            some = rows[named]
-            rows = some if len(some) else rows
-        if len(rows) == 0 and rule.point_world_m is None:
-            return None
-        near = self._nearness(bodies, rows, p_world_eye_m)
-        return RuleTarget(
-            rows, near, self._stay_factor, rule.point_world_m, rule.salience, self.behaviour
-        )
-
-    def step_rows(
-        self,
         bodies: BodyRows,
         seen: list[bool],
         p_world_eye_m: Vec3,
     ) -> RuleTarget | None:
-        """Return the result of ``step`` for few bodies."""
+        """Return the rule's targets among the bodies in view, None without any.
+
+        seen: which bodies are in view
+        """
         rule = self._params.rules[self.behaviour]
         if self.plans and (planned := self._plan_target(rule, bodies.ids, seen)):
             return planned
@@ -325,27 +296,3 @@ class TopDown:
     def _stay_factor(self) -> float:
         """Return the factor by which the present person is preferred, as if nearer."""
         return float(self._params.stay_with_person**self._params.nearness)
-
-    def _nearness(self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3) -> Floats:
-        """Return the factor of each wanted row: (nearest distance / its distance)^nearness."""
-        if len(rows) <= 1:
-            return np.ones(len(rows))
-        rel = bodies.p_world_m[rows] - np.asarray(p_eye)
-        distance = np.maximum(np.sqrt((rel * rel).sum(axis=1)), 1e-3)
-        factor: Floats = (distance.min() / distance) ** self._params.nearness
-        return factor
-
-    def _rows(self, bodies: Bodies, rule: Rule) -> NDArray[np.intp]:
-        """Return the rows of the bodies that a rule selects."""
-        if rule.point_world_m is not None:
-            return np.zeros(0, dtype=np.intp)
-        if rule.body_id is not None:
-            rows = [bodies.ids.index(rule.body_id)] if rule.body_id in bodies.ids else []
-            return np.array(rows, dtype=np.intp)
-        # Frames repeat the same kinds in the same order; comparing tuples of identical strings is
-        # many times faster than a search.
-        if (rule.kind, bodies.kinds) != self._named:
-            same = [kind == rule.kind for kind in bodies.kinds]
-            self._named = rule.kind, bodies.kinds
-            self._rows_named = np.array(list(compress(range(len(same)), same)), dtype=np.intp)
-        return self._rows_named

@@ -549,7 +549,7 @@ CLAIMS = (
            "gaze = self._oculomotor.step(target._replace(p_world_m=(1.0, 0.0, 0.2), centre_world_m=None), pose, t_s, dt_s, offset)",
            "what attention chose is not looked at",
            ("run::test_the_head_looks_at_the_visitor",), ("M 3.2: order of work in one step",)),
-    Mutant("gaze/field_of_view.py", "rest = np.flatnonzero(~seen)", "rest = np.flatnonzero(seen)",
+    Mutant("gaze/field_of_view.py", "inside = self._inside(p, state.p_world_eye_right_m, right, left=False)", "inside = False",
            "the right eye sees nothing",
            ("attention::test_field_of_both_eyes",), ("M 3.3.2: visible bodies",)),
     Mutant("gaze/attention/bottom_up.py", "abs(wx * x + wy * y + wz * z)", "0.0",

@@ -41,7 +41,7 @@ MUTANTS = (
     Mutant("gaze/attention/bottom_up.py", "exp((state.entered_s - t_s) / par.onset_s)",
            "exp((state.entered_s - t_s) / 10.0)", "what appeared draws the gaze for ever",
            ("attention", "attention_choice", "habituation")),
-    Mutant("gaze/attention/habituation.py", "habituation *= factor", "habituation *= 1.0",
+    Mutant("gaze/attention/habituation.py", "factor *= 1.0 - par.inhibition_of_return_strength * exp(", "factor *= 1.0 - 0.0 * exp(",
            "no inhibition of return", ("habituation",)),
     Mutant("gaze/attention/habituation.py", "id: left + risen for id", "id: left for id",
            "interest that was lost never recovers", ("habituation",)),
