@@ -78,7 +78,9 @@ def shapes_of(spec: WorldSpec, others: OtherHeads | None = None) -> SpecShapes:
         others: all of its rigs but the first, None if they are not shown.
     """
     joints = {rig.prefix + name for rig in spec.rigs for name in rig.stops_rad}
-    places = tuple(_place(rig) for rig in spec.rigs)
+    places = tuple(
+        rig._replace(body=_no_body, stops_rad={}, start_rad={}, servos=()) for rig in spec.rigs
+    )
     return SpecShapes(spec._replace(rigs=places), frozenset(joints), others)
 
 
@@ -88,20 +90,14 @@ def script_shapes(figures: Figures) -> SpecShapes:
     Args:
         figures: the people of the script.
     """
-    heads = figures.script.heads.items()
-    places = [RigInWorld(_no_body, {}, {}, ())]
-    places += [
-        RigInWorld(
-            _no_body, {}, {}, (), f"{name}_", (head.x_m, head.y_m, 0.0), radians(head.facing_deg)
+    first = RigInWorld(_no_body, {}, {}, ())
+    heads = [
+        first._replace(
+            prefix=f"{name}_", p_m=(head.x_m, head.y_m, 0.0), yaw_rad=radians(head.facing_deg)
         )
-        for name, head in heads
+        for name, head in figures.script.heads.items()
     ]
-    return SpecShapes(WorldSpec(figures, tuple(places)))
-
-
-def _place(rig: RigInWorld) -> RigInWorld:
-    """Return a rig reduced to its pose."""
-    return RigInWorld(_no_body, {}, {}, (), rig.prefix, rig.p_m, rig.yaw_rad)
+    return SpecShapes(WorldSpec(figures, (first, *heads)))
 
 
 def _no_body() -> tuple[str, Mapping[str, bytes]]:

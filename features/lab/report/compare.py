@@ -34,8 +34,8 @@ from gazerig.features.lab.report.statistics import (
     figure,
     figures,
     judge,
+    unbiased_interval,
 )
-from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.control.tick import Tick
 
@@ -139,18 +139,12 @@ def _difference(
     if not isfinite(p):
         return MeasureDifference(ours, theirs, nan, nan, nan, nan, nan, "too few events")
     value = theirs.value - ours.value
-    low, high = _interval(bootstrap(b, rng), bootstrap(a, rng), value)
+    of_b, of_a = bootstrap(b, rng), bootstrap(a, rng)
+    n = min(len(of_a), len(of_b))
+    low, high = unbiased_interval(of_b[:n] - of_a[:n], value)
     differs = p < LEVEL or (isfinite(shape) and shape < LEVEL)
     word: Word = "more than chance" if differs else "may be chance"
     return MeasureDifference(ours, theirs, value, low, high, p, shape, word)
-
-
-def _interval(b: Floats, a: Floats, value: float) -> tuple[float, float]:
-    n = min(len(a), len(b))
-    spread = b[:n] - a[:n]
-    bias = float(spread.mean()) - value
-    low, high = (float(x) - bias for x in np.percentile(spread, (2.5, 97.5)))
-    return low, high
 
 
 def _numbers(d: MeasureDifference, runs: Sequence[GazeTrace]) -> dict[str, object]:

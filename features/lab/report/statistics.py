@@ -87,11 +87,16 @@ def interval(measured: MeasuredValue) -> tuple[float, float]:
         return nan, nan
     if of is mean and rows.ndim == 1 and np.isin(rows, (0.0, 1.0)).all():
         return _wilson(float(rows.mean()), len(rows))
-    spread = bootstrap(measured, np.random.default_rng(_SEED))
-    # Figures that cannot be below 0 are biased upwards in bootstrap samples: subtract the bias.
-    bias = float(spread.mean()) - figure(of, rows)
-    low, high = np.percentile(spread, (2.5, 97.5))
-    return float(low) - bias, float(high) - bias
+    return unbiased_interval(bootstrap(measured, np.random.default_rng(_SEED)), figure(of, rows))
+
+
+def unbiased_interval(spread: Floats, value: float) -> tuple[float, float]:
+    """Return the 95 % interval of a value from the values of bootstrap samples.
+
+    Figures that cannot be below 0 are biased upwards in bootstrap samples: the bias is subtracted.
+    """
+    low, high = np.percentile(spread, (2.5, 97.5)) - (spread.mean() - value)
+    return float(low), float(high)
 
 
 def _wilson(share: float, n: int) -> tuple[float, float]:
