@@ -208,7 +208,7 @@ def test_another_rig_by_name_and_as_it_is(once: Once) -> None:
     as_it_is = rerun(once.recording, rig=load_rig("desk"), joints="recorded")
     assert by_name.same and as_it_is.same
     with pytest.raises(
-        SetupError, match="joints upside_down: unknown; there is recorded, emulated"
+        SetupError, match="joints upside_down: unknown; choose recorded or emulated"
     ):
         rerun(once.recording, joints="upside_down")
 
@@ -338,7 +338,7 @@ def test_a_recording_without_ticks_is_refused(once: Once, tmp_path: Path) -> Non
     path = tmp_path / "none.mcap"
     writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), as_text(once.recording.info), 0)
     writer.close(RunEnd("seconds"))
-    with pytest.raises(SetupError, match="holds no tick: there is nothing to run again"):
+    with pytest.raises(SetupError, match="contains no tick: nothing can be run again"):
         rerun(RunRecording(path))
 
 

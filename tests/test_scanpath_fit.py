@@ -112,6 +112,6 @@ def test_what_cannot_be_trusted_is_refused() -> None:
     refused([*looks[:60], looks[60]._replace(duration_s=float("nan"))], "fixation 61: .*finite")
     refused([looks[0]._replace(part="NOSE"), *looks[1:]], "fixation 1: no part 'NOSE'")
     staring = [PartFixation("N", 0.3 * k, 0.25) for k in range(60)]
-    refused(staring, "no transition leads away from chin", replace(params, smoothing="none"))
+    refused(staring, "no transition starts at chin", replace(params, smoothing="none"))
     apart = [PartFixation("N", 3.0 * k, 0.25) for k in range(60)]
     refused(apart, "no two fixations on the face follow each other")

@@ -43,25 +43,25 @@ class ActionPlannerParams:
     """Conditions of guard and attack in a boxing match."""
 
     # fmt: off
-    enabled: Annotated[bool, "the behaviours wait, guard and attack are chosen from what is seen"] = False
+    enabled: Annotated[bool, "the behaviours wait, guard and attack are chosen from the percept"] = False
     contact_ms: Annotated[float, Bounds(0, 5000), "guard against a fist that arrives within this time; 0: never"] = 450.0
     contact_m: Annotated[float, Bounds(0, 2), "a fist this near to the head has arrived"] = 0.3
-    closing_m_s: Annotated[float, Bounds(0, 20), "a fist that comes nearer more slowly than this is no punch"] = 0.8
+    closing_m_s: Annotated[float, Bounds(0, 20), "a fist that approaches more slowly than this is no punch"] = 0.8
     miss_m: Annotated[float, Bounds(0, 5),
         "a fist that would pass the middle of the eyes farther away than this is no punch: half a head and half a fist"] = 0.2
     reaction_ms: Annotated[float, Bounds(0, 1000),
-        "what may be a punch must have been seen to come for this long, unless its speed is certain"] = 30.0
+        "a possible punch must have approached for this long, unless its speed is certain"] = 30.0
     release_ratio: Annotated[float, Bounds(1, 10),
         "guard ends when the fist fails contact_ms, closing_m_s and miss_m by more than this factor"] = 1.5
     min_guard_ms: Annotated[float, Bounds(0, 10000), "shortest time on guard"] = 300.0
-    attack_reach_m: Annotated[float, Bounds(0, 10), "an opponent whose face is farther away is not attacked; 0: nobody is"] = 1.3
-    open_m: Annotated[float, Bounds(0, 2), "a place is open if every hand is at least so far from the line to it"] = 0.28
+    attack_reach_m: Annotated[float, Bounds(0, 10), "an opponent whose face is farther away is not attacked; 0: no one is"] = 1.3
+    open_m: Annotated[float, Bounds(0, 2), "a place is open if every hand is at least this far from the line to it"] = 0.28
     opening_ms: Annotated[float, Bounds(0, 5000), "a place must have been open for this long"] = 200.0
-    counter_ms: Annotated[float, Bounds(0, 5000), "so long after a guard counter_ratio holds and opening_ms does not"] = 300.0
+    counter_ms: Annotated[float, Bounds(0, 5000), "for this time after a guard counter_ratio applies and opening_ms does not"] = 300.0
     counter_ratio: Annotated[float, Bounds(0, 1), "share of open_m that is enough then"] = 0.6
     attack_ms: Annotated[float, Bounds(50, 10000), "how long the place is looked at before the blow has landed"] = 600.0
     rest_ms: Annotated[float, Bounds(0, 60000), "shortest time between the end of an attack and the next"] = 800.0
-    hand_memory_ms: Annotated[float, Bounds(0, 60000), "a hand that is not seen is taken to be where it was for this long"] = 600.0
+    hand_memory_ms: Annotated[float, Bounds(0, 60000), "an unseen hand keeps its last position for this long"] = 600.0
     # fmt: on
 
 
@@ -84,7 +84,7 @@ class Plan(NamedTuple):
         return f"{self.action}: {self.why}"
 
 
-WAITING = Plan("wait", "nobody is in view")
+WAITING = Plan("wait", "no one is in view")
 
 
 class ActionPlanner:
@@ -212,12 +212,13 @@ class ActionPlanner:
         if best.clear_m < par.open_m * (par.counter_ratio if counters else 1.0):
             self._open = None
             return Plan(
-                "wait", f"nothing comes, and the opponent's guard is closed ({best.clear_m:.2f} m)"
+                "wait",
+                f"no fist approaches, and the opponent's guard is closed ({best.clear_m:.2f} m)",
             )
         if self._open is None or self._open[0] != best.name:
             self._open = best.name, t_s
         if not counters and t_s - self._open[1] < par.opening_ms / 1e3 - 1e-9:
-            return Plan("wait", f"nothing comes; {best.name} opens")
+            return Plan("wait", f"no fist approaches; {best.name} opens")
         if t_s - self._attack_end_s < par.rest_ms / 1e3:
             return Plan("wait", f"{best.name} is open, but the last attack is just over")
         self._since_s, self._place = t_s, best.name

@@ -58,10 +58,10 @@ class BottomUpParams:
         "speed along the line of sight divided by distance that gives salience 1"] = 0.5
     rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "angular speed about the line of sight that gives salience 1"] = 3.0
     saturation: Annotated[float, Bounds(0, 10),
-        "salience that motion alone cannot exceed, unless it comes nearer fast; 0: no limit"] = 0.35
-    hand_saturation: Annotated[float, Bounds(0, 10), "the same of a hand raised to the face, as one that waves; 0: no limit"] = 0.9
+        "salience that motion alone cannot exceed, except a fast approach; 0: no limit"] = 0.35
+    hand_saturation: Annotated[float, Bounds(0, 10), "the same for a hand raised to the face, such as a waving one; 0: no limit"] = 0.9
     smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass filter of salience"] = 0.1
-    onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just come into view or begun to move; 0: none"] = 1.0
+    onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just entered or begun to move; 0: none"] = 1.0
     onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.5
     onset_recovery_s: Annotated[float, Bounds(0, 60),
         "time constant with which the next onset regains its full salience; 0: every onset has it"] = 2.0

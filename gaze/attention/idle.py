@@ -44,13 +44,13 @@ class IdleParams:
     """Durations, ranges and the resting point."""
 
     # fmt: off
-    hold_ms: Annotated[float, Bounds(0, 60000), "time for which the gaze stays where a lost target was"] = 1000.0
+    hold_ms: Annotated[float, Bounds(0, 60000), "time for which the gaze stays at the position of a lost target"] = 1000.0
     rest_distance_m: Annotated[float, Bounds(0.3, 20), "distance of the resting point"] = 1.5
     rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
     rest_salience: Annotated[float, Bounds(0, 10), "salience of the resting point"] = 0.2
     explores: Annotated[bool, "glance around while nothing is there; without it the gaze rests straight ahead"] = True
     coast_ms: Annotated[float, Bounds(0, 2000),
-        "longest time for which a target is assumed to move on with its last velocity when no pictures come"] = 200.0
+        "longest time for which a target is assumed to move on with its last velocity without new images"] = 200.0
     search_ms: Annotated[float, Bounds(0, 60000), "duration of the search for a lost target after that; 0: no search"] = 3000.0
     search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean duration of one fixation of the search"] = 600.0
     search_aside_deg: Annotated[float, Bounds(0, 90), "how far the search looks towards the side to which the target left"] = 18.0
@@ -65,7 +65,7 @@ class IdleParams:
     glance_least_deg: Annotated[float, Bounds(0, 90), "smallest size of such a shift"] = 2.0
     glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side; the middle is looked at more"] = 30.0
     glance_pitch_deg: Annotated[float, Bounds(0, 60), "largest angle of a glance up or down"] = 12.0
-    thing_share: Annotated[float, Bounds(0, 1), "share of glances at something in view or seen lately, where there is any"] = 0.5
+    thing_share: Annotated[float, Bounds(0, 1), "share of glances at a thing in view or seen recently, if there is one"] = 0.5
     thing_memory_s: Annotated[float, Bounds(0, 3600), "how long a place where something was seen is glanced at"] = 20.0
     # fmt: on
 
@@ -243,7 +243,7 @@ class Idle:
         things = self._elsewhere(here, t_s) if rng.random() < par.thing_share else []
         if things:
             rel = sub(things[int(rng.integers(len(things)))], self._eye)
-            self._look("glance", yaw_pitch(rel), norm(rel), t_s, "looking at what is in view")
+            self._look("glance", yaw_pitch(rel), norm(rel), t_s, "looking at things in view")
             self._until_s = t_s + _THING_HOLDS * (self._until_s - t_s)
             return
         place = self._plausible(here, rng)

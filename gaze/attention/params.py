@@ -31,7 +31,7 @@ class ReactionParams:
     median_ms: Annotated[float, Bounds(0, 1000),
         "median time from the frame in which something else wins attention to the change of target; 0: at once; people 150 to 250"] = 150.0
     spread: Annotated[float, Bounds(0, 1), "standard deviation of the logarithm of that time"] = 0.15
-    looming_ratio: Annotated[float, Bounds(0, 1), "share of that time for what comes nearer fast"] = 0.65
+    looming_ratio: Annotated[float, Bounds(0, 1), "share of that time for a fast approach"] = 0.65
     return_ratio: Annotated[float, Bounds(0, 1), "share of that time for a face that was looked at within return_s"] = 0.8
     return_s: Annotated[float, Bounds(0, 600), "time for which a face counts as just looked at"] = 5.0
     # fmt: on
@@ -45,16 +45,16 @@ class AttentionParams:
     hysteresis_ratio: Annotated[float, Bounds(1, 10),
         "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
     least_salience: Annotated[float, Bounds(0, 10),
-        "a thing less salient than this is no target of its own: glanced at like anything in view, as if nobody were there"] = 0.05
+        "a thing less salient than this is no target of its own: it gets glances like anything in view"] = 0.05
     min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
     stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
     looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
         "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
     own_motion_ratio: Annotated[float, Bounds(0, 1),
-        "share of their motion that a person's own hands and clothes keep beside the face, unless they are raised to it or held "
-        "out; the rest counts for the face; 1: all"] = 0.3
+        "share of their motion that a person's own hands and clothes keep for themselves, unless they are raised to the face or "
+        "reach out; the rest counts for the face; 1: all"] = 0.3
     face_memory_s: Annotated[float, Bounds(0, 600),
-        "a face that leaves the view while something else is looked at is remembered where it was for this time; 0: not at all"] = 15.0
+        "a face that leaves the view while the gaze is elsewhere is remembered at its position for this time; 0: not at all"] = 15.0
     habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
     reaction: Annotated[ReactionParams, "reaction time"] = field(default_factory=ReactionParams)
     # fmt: on

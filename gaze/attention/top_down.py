@@ -45,13 +45,13 @@ class Rule:
     # fmt: off
     look_at: Annotated[str,
         'kind of body to look at, e.g. "face" or "hand"; "person:nearest", "person:waving", "person:looking" (at the head) or '
-        '"person:newest" (who came last); "id:7" for the body with that id; "point" for the position point_world_m']
+        '"person:newest" (the last to appear); "id:7" for the body with that id; "point" for the position point_world_m']
     salience: Annotated[float, Bounds(0, 10), "salience of the rule's target (A_attack, A_guard, A_face)"]
     point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
         "position to look at: ahead, left and above of the neck base"] = None
-    gesture: Annotated[str, "gesture that is played once when the gaze comes to what the rule names; empty: none"] = ""
+    gesture: Annotated[str, "gesture that is played once when the gaze reaches the rule's target; empty: none"] = ""
     gesture_at: Annotated[str, 
-        "kind of body at which it is played wherever the rule looks, e.g. hand; empty: what look_at names"] = ""
+        "kind of body at which it is played instead, e.g. hand; empty: that of look_at"] = ""
     gesture_refractory_s: Annotated[float, Bounds(0, 3600), "shortest time between two of its gestures"] = 10.0
     # fmt: on
 
@@ -117,7 +117,7 @@ class TopDownParams:
 
     # fmt: off
     behaviour: Annotated[str, "name of the behaviour that is active at the start"] = "wait"
-    rules: Annotated[Mapping[str, Rule], "behaviour -> what to look at and with what salience"] = field(default_factory=_shipped_rules)
+    rules: Annotated[Mapping[str, Rule], "behaviour -> target and its salience"] = field(default_factory=_shipped_rules)
     stay_with_person: Annotated[float, Bounds(1, 10),
         "the person looked at last is treated as this many times nearer than they are; larger: the gaze changes less often"] = 1.25
     nearness: Annotated[float, Bounds(0, 4),

@@ -87,16 +87,16 @@ class Gesture:
     """One gesture."""
 
     # fmt: off
-    description: Annotated[str, "what it expresses"]
+    description: Annotated[str, "meaning of the gesture"]
     frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; all returns to rest after the last one"]
     space: Annotated[Literal["gaze", "joint"],
         "gaze: the eyes stay on their target while the head moves; joint: they go along with the head"] = "gaze"
     fit: Annotated[Literal["slow", "refuse"],
-        "where a rig cannot do it as written: slow: slower, and smaller where a range ends; refuse: not at all"] = "refuse"
+        "if a rig cannot do it as written: slow: slower, and smaller at the end of a range; refuse: not at all"] = "refuse"
     count: Annotated[int, Bounds(1, MAX_COUNT), "how often it is done"] = 1
     loop_s: Annotated[tuple[float, float] | None, Bounds(0, 60),
         "times of the two frames between which it repeats; null: all of it repeats"] = None
-    return_s: Annotated[float, Bounds(0.05, 10), "time in which what the last frame leaves aside returns to rest"] = 0.4
+    return_s: Annotated[float, Bounds(0.05, 10), "time in which the tracks that the last frame leaves displaced return to rest"] = 0.4
     optional: Annotated[tuple[str, ...], "joints that a rig may lack; a rig that lacks any other joint is refused the gesture"] = ()
     frames_without_neck: Annotated[tuple[KeyFrame, ...],
         "frames for rigs that lack a joint of the neck that the frames move and that is not optional"] = ()

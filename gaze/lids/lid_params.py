@@ -55,13 +55,13 @@ class LidParams:
     lower_close_share: Annotated[float, Bounds(0, 1),
         "share of its travel that a lower lid closes in a blink; 1: it meets the upper lid"] = 1.0
     gaze_evoked_blink_middle_deg: Annotated[float, Bounds(1, 180),
-        "size of a gaze shift that comes with a blink in half of the cases"] = 17.0
+        "size of a gaze shift that evokes a blink in half of the cases"] = 17.0
     gaze_evoked_blink_steepness_1_deg: Annotated[float, Bounds(0, 5),
         "steepness of that probability; larger: closer to a fixed threshold"] = 0.217
-    gaze_evoked_blink_least_deg: Annotated[float, Bounds(0, 180), "size of a gaze shift up to which there is no such blink"] = 6.0
+    gaze_evoked_blink_least_deg: Annotated[float, Bounds(0, 180), "size of a gaze shift up to which it evokes no blink"] = 6.0
     gaze_evoked_blink_jitter_ms: Annotated[float, Bounds(0, 500),
-        "standard deviation of the time from the onset of the gaze shift to that of its blink, which may come first; at most twice "
-        "that; 0: at once"] = 30.0
+        "standard deviation of the time from the onset of the gaze shift to that of its blink, which may precede it; at most twice "
+        "that; 0: together"] = 30.0
     gaze_evoked_blink_replaces: Annotated[bool,
         "a gaze-evoked blink takes the place of the next spontaneous one, so that the rate stays"] = True
     gaze_evoked_blink_pause_ms: Annotated[float, Bounds(0, 10000),

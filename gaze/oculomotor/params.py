@@ -20,10 +20,10 @@ class OculomotorParams:
 
     # fmt: off
     refixation_deg: Annotated[float, Bounds(0, 5),
-        "largest re-fixation, a small saccade within what is looked at; 0: none"] = 1.5
+        "largest re-fixation, a small saccade within the target; 0: none"] = 1.5
     refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest one; three steps of the servos and their play show"] = 0.9
     refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 350.0
-    refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is drawn from so long to so much longer"] = 700.0
+    refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is extended by a random time of up to this"] = 700.0
     undershoot: Annotated[float, Bounds(0, 0.3),
         "share of its amplitude by which a saccade of 10 deg or more falls short, none up to 5 deg; people .05-.10"] = 0.08
     endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
@@ -40,16 +40,16 @@ class OculomotorParams:
     crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and this time from now"] = 180.0
     correct_deg: Annotated[float, Bounds(0.1, 30), "landing error above which a corrective saccade follows, if saccades err"] = 1.2
     correct_after_ms: Annotated[float, Bounds(0, 1000), "mean delay from landing to the corrective saccade; people 100 to 200"] = 155.0
-    correct_spread_ms: Annotated[float, Bounds(0, 500), "that delay is drawn from so much less to so much more"] = 45.0
+    correct_spread_ms: Annotated[float, Bounds(0, 500), "that delay varies at random by up to this, up or down"] = 45.0
     min_interval_ms: Annotated[float, Bounds(0, 1000), "shortest time from the landing of a saccade to the next one"] = 100.0
     redirect_before_ms: Annotated[float, Bounds(0, 1000),
-        "a new target bends the saccade in flight if it comes at least this long before its end; 1000: never"] = 70.0
+        "a new target bends the saccade in flight if it appears at least this long before its end; 1000: never"] = 70.0
     nearest_m: Annotated[float, Bounds(0.05, 2), "nearest distance on which the eyes converge (0.2 m is 17.6 deg of vergence)"] = 0.2
     prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
         "longest time over which a target's position is extrapolated with its velocity"] = 120.0
     fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
     target_prediction: Annotated[PredictionModel,
-        "where a target is expected: where its frame showed it, moved on with its velocity, or along its curve and its swing, "
+        "predicted position of a target: that in its frame, moved on with its velocity, or along its curve and its swing, "
         "which is recognised after one to two cycles"] = "periodic"
     eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
     # fmt: on
@@ -75,8 +75,8 @@ class PursuitParams:
 
     # fmt: off
     model: Annotated[Literal["gaze_space", "binocular", "opposite_angles"],
-        "the gaze point follows the predicted target; or the binocular controller of Zhang & Wakamatsu moves the eyes; or they stand "
-        "between shifts and turn by the opposite of the head's angles (Nakamoto & Tsuruno 3.4)"] = "gaze_space"
+        "the gaze point follows the predicted target; or the binocular controller of Zhang & Wakamatsu moves the eyes; or they turn "
+        "between shifts by the opposite of the head's angles (Nakamoto & Tsuruno 3.4)"] = "gaze_space"
     gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc at which the position error is closed"] = 8.0
     velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye follows at once; people .95"] = 0.95
     vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0
@@ -87,7 +87,7 @@ class PursuitParams:
         "the rate of closing applies to at most this error; larger errors are closed no faster"] = 5.0
     delay_ms: Annotated[float, Bounds(0, 500), "binocular: delay tau_c of seeing, the age of a frame included"] = 100.0
     smooth_ms: Annotated[float, Bounds(0.1, 500), "binocular: smoothing Tf of the direction seen"] = 40.0
-    vergence_delay_ms: Annotated[float, Bounds(0, 500), "binocular: what vergence is later than that; 60 makes 160 ms in all"] = 60.0
+    vergence_delay_ms: Annotated[float, Bounds(0, 500), "binocular: additional delay of vergence; 60 makes 160 ms in all"] = 60.0
     max_vergence_deg: Annotated[float, Bounds(1, 60), "binocular: largest vergence"] = 20.0
     reflex_gain: Annotated[float, Bounds(0, 1.5), "binocular: gain of the vestibulo-ocular reflex; people .95"] = 1.0
     reflex_delay_ms: Annotated[float, Bounds(0, 100), "binocular: delay of the reflex; people 7-10"] = 10.0
@@ -101,10 +101,10 @@ class HeadParams:
 
     # fmt: off
     goal_model: Annotated[Literal["attention", "align", "stahl"],
-        "share of the head in a gaze shift: head_slope of what exceeds the eye-only range (stahl), by salience (attention, eq 7), or "
+        "share of the head in a gaze shift: head_slope of the excess over the eye-only range (stahl), by salience (attention, eq 7), or "
         "fixed (align)"] = "stahl"
     eye_only_range_deg: Annotated[float, Bounds(0, 180),
-        "with goal_model stahl: full width of the range of targets, as seen from where the head points, that the eyes take alone; "
+        "with goal_model stahl: full width of the range of targets, about the head's direction that the eyes reach alone; "
         "people 4 to 68"] = 35.8
     head_slope: Annotated[float, Bounds(0, 1),
         "with goal_model stahl: degrees of head for each degree beyond that range; people .61 to .93"] = 0.77

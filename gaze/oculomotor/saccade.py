@@ -28,7 +28,7 @@ class SaccadeParams:
     # fmt: off
     profile: Annotated[Literal["human", "main_sequence", "min_jerk", "literal_frame"],
         "velocity profile of a saccade: human duration and peak speed, human duration alone, minimum jerk (eqs 2-6), or a "
-        "fixed share of the way each frame"] = "human"
+        "fixed share of the distance per frame"] = "human"
     max_speed_deg_s: Annotated[float, Bounds(10, 1000), "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s"] = 500.0
     min_duration_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
     max_acceleration_deg_s2: Annotated[float, Bounds(100, 200_000),
@@ -40,7 +40,7 @@ class SaccadeParams:
     human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "main_sequence: peak over mean speed, below max_speed_deg_s"] = 1.65
     device_floor_ms: Annotated[float, Bounds(1, 500),
         "shortest saccade that the servos can make, with the profiles human and main_sequence"] = 20.0
-    frame_share: Annotated[float, Bounds(0.05, 0.99), "share of the remaining way per frame of the profile literal_frame"] = 0.8
+    frame_share: Annotated[float, Bounds(0.05, 0.99), "share of the remaining distance per frame of the profile literal_frame"] = 0.8
     frame_ms: Annotated[float, Bounds(1, 200), "length of such a frame; the authors' display showed 90 a second"] = 11.1
     # fmt: on
 

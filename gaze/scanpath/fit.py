@@ -48,7 +48,7 @@ class FitParams:
     confidence: Annotated[float, Bounds(0.5, 0.999), "level of the intervals"] = 0.95
     resamples: Annotated[int, Bounds(100, 100000), "resampled recordings"] = 1000
     fewest: Annotated[int, Bounds(2, 100000), "fixations on the face below which nothing is fitted"] = 50
-    longest_gap_s: Annotated[float, Bounds(0.01, 60), "fixations further apart are no transition: what lay between is unknown"] = 0.5
+    longest_gap_s: Annotated[float, Bounds(0.01, 60), "fixations further apart are no transition: the looks in between are unknown"] = 0.5
     fewest_dwells: Annotated[int, Bounds(2, 1000), "a part with fewer fixations gets mean and SD of all parts together"] = 5
     # fmt: on
 
@@ -177,7 +177,7 @@ def _refuse_dead_ends(counts: Floats) -> None:
     stuck = [PART_NAMES[part] for part, n in zip(PARTS, away, strict=True) if n == 0.0]
     if stuck:
         raise ValueError(
-            f"no transition leads away from {', '.join(stuck)}:"
+            f"no transition starts at {', '.join(stuck)}:"
             " record for longer or take laplace smoothing"
         )
 

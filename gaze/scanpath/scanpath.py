@@ -82,8 +82,7 @@ class ScanpathParams:
         "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
     transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "nakamoto_tsuruno"
     start: Annotated[str, Choices("nearest", "as_walk", *PARTS),
-        "face part that is looked at first, named as in the matrix; nearest: the one nearest to where the gaze comes from; "
-        "as_walk: as the matrix file says"] = "nearest"
+        "first face part, named as in the matrix; nearest: the one nearest to the gaze; as_walk: that of the matrix file"] = "nearest"
     viewers_left: Annotated[bool,
         "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
     diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
@@ -91,9 +90,9 @@ class ScanpathParams:
         "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "one_rest"
     dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
     min_dwell_ms: Annotated[float, Bounds(0, 2000),
-        "shortest dwell, from landing to departure; what lasts longer is distributed above it, with the same mean"] = 140.0
+        "shortest dwell, from landing to departure; longer ones are distributed above it, with the same mean"] = 140.0
     rest_spread: Annotated[float, Bounds(0.05, 3),
-        "with diagonal one_rest: standard deviation over mean of what a rest lasts beyond min_dwell_ms"] = 0.6
+        "with diagonal one_rest: standard deviation over mean of a rest's time beyond min_dwell_ms"] = 0.6
     shift_ms: Annotated[float, Bounds(0, 500),
         "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 44.0
     rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0

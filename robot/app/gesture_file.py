@@ -129,7 +129,7 @@ def _factors(rig: Rig, lid: str, first_deg: float, values_deg: Floats) -> Floats
     """Return openings over the first opening, of a lid at these angles."""
     shut, wide = rig.lid_joints.ends_deg(lid)
     if shut is None or wide is None:
-        raise SetupError(f"{lid}: the rig does not say where it is shut and open")
+        raise SetupError(f"{lid}: the rig does not define its shut and open angles")
     opening = (first_deg - shut) / (wide - shut)
     if opening < 0.2:
         raise SetupError(f"{lid}: it begins nearly shut; begin with open lids")

@@ -164,7 +164,7 @@ class RunOptions:
             )
         if not self.mock:
             raise SetupError(
-                f"--bus {self.bus} needs --mock: it says what replaces the rig's servos"
+                f"--bus {self.bus} needs --mock: it selects the replacement of the rig's servos"
             )
 
     def _refuse_clashes(self, scene: str | None) -> None:

@@ -128,7 +128,7 @@ class _Resimulator:
         moments = recording.moments()
         first = next(moments, None)
         if first is None:
-            raise SetupError(f"{recording.path} holds no tick: there is nothing to run again")
+            raise SetupError(f"{recording.path} contains no tick: nothing can be run again")
         self._see_joints(first.tick.guard_result.joints)
         if recording.note:
             self._notes.append(recording.note)
@@ -297,7 +297,7 @@ def _joints(joints: str | None, changed: bool) -> Joints:
             return "emulated" if changed else "recorded"
         case "recorded" | "emulated":
             return "recorded" if joints == "recorded" else "emulated"
-    raise SetupError(f"joints {joints}: unknown; there is recorded, emulated")
+    raise SetupError(f"joints {joints}: unknown; choose recorded or emulated")
 
 
 def recorded_rig(recording: RunRecording) -> Rig:

@@ -83,8 +83,8 @@ class GyroFusion:
         if not self._reported:
             self._reported = True
             self._report(
-                "the camera's gyro does not turn with the joints: gaze goes on by the joints alone "
-                f"and tries it again every {_WITHOUT_S:g} s; unless the head was carried about, check "
+                "the camera's gyro does not turn with the joints: the joints alone are used, "
+                f"and the gyro is tried again every {_WITHOUT_S:g} s; unless the head was carried about, check "
                 "oak.imu_rotation_deg and camera.mount, or set oak.gyro: false"
             )
 
