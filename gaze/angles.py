@@ -46,6 +46,11 @@ def dot(a: Vec3, b: Vec3) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def perpendicular(v: Vec3, way: Vec3) -> Vec3:
+    """Return the part of a vector that is perpendicular to a unit vector."""
+    return sub(v, scale(way, dot(v, way)))
+
+
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """Return the outer product."""
     return (

@@ -148,7 +148,7 @@ def test_a_face_seen_from_behind_is_none() -> None:
 def spoken(gap_m: Callable[[float], float], seconds: float = 4.0, seed: int = 0) -> list[bool]:
     rng, speech, out = np.random.default_rng(seed), NO_SPEECH, []
     for k in range(round(30 * seconds)):
-        speech = speech.seen(gap_m(k / 30) + rng.normal(0.0, 0.0003), k / 30)
+        speech = speech.advance(gap_m(k / 30) + rng.normal(0.0, 0.0003), k / 30)
         out.append(speech.speaks(k / 30))
     return out
 

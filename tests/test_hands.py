@@ -42,7 +42,7 @@ def level(p: Vec3) -> float:
 
 def kinds(hands: Hands, *seen: LocalisedDetection, faces: tuple[Known, ...] = (FACE,)) -> list[str]:
     """Return what the patches of successive frames are called."""
-    return [hands.named([one], list(faces), EYE, k / 30)[0].kind for k, one in enumerate(seen)]
+    return [hands.label([one], list(faces), EYE, k / 30)[0].kind for k, one in enumerate(seen)]
 
 
 def test_what_moves_within_reach_is_a_hand_from_the_second_frame_on() -> None:
@@ -113,20 +113,20 @@ def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(
         speed = 1.2 if k < 10 else last_m_s
         seen = [patch(v=(0.0, speed, 0.0))] if k < 12 else []
         there.append(
-            [(one.kind, one.v_world_m_s) for one in hands.named(seen, [FACE], EYE, k / 30)]
+            [(one.kind, one.v_world_m_s) for one in hands.label(seen, [FACE], EYE, k / 30)]
         )
     assert there[11][0][0] == HAND
     assert there[12:71] == [[(HAND, (0.0, 0.0, 0.0))] if stays else []] * 59
-    assert there[-1] == [] and not hands.held
+    assert there[-1] == [] and not hands.has_resting
 
 
 def test_a_hand_that_moves_again_is_one_hand() -> None:
     hands = Hands()
     for k in range(6):
-        hands.named([patch(v=(0.0, 1.2 if k < 4 else 0.1, 0.0))], [FACE], EYE, k / 30)
+        hands.label([patch(v=(0.0, 1.2 if k < 4 else 0.1, 0.0))], [FACE], EYE, k / 30)
     for k in range(30, 34):
-        found = hands.named([patch(mark=8)], [FACE], EYE, k / 30)
-    assert [one.kind for one in found] == [HAND] and not hands.held
+        found = hands.label([patch(mark=8)], [FACE], EYE, k / 30)
+    assert [one.kind for one in found] == [HAND] and not hands.has_resting
 
 
 def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured() -> None:
@@ -134,7 +134,7 @@ def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured() -> Non
         p: Vec3 = (0.6, 0.15, -0.05) if measured else (2.0, 0.5, -0.2)
         hands, seen = Hands(), patch(p=p, depth_measured=measured, along_sd_m=0.02)
         for k in range(3):
-            (found,) = hands.named([seen], [FACE], EYE, k / 30)
+            (found,) = hands.label([seen], [FACE], EYE, k / 30)
         assert level(found.p_world_m) == pytest.approx(far, abs=0.01)
         assert found.v_world_m_s is not None
         assert found.v_world_m_s[1] == pytest.approx(
@@ -149,9 +149,9 @@ def test_between_two_people_the_arm_tells_whose_hand_it_is_and_it_stays_theirs()
         hands = Hands()
         seen = patch(p=(2.0, 0.62 + side, -0.4), fastest_m=tip)
         for k in range(3):
-            (found,) = hands.named([seen], [FACE, OTHER], EYE, k / 30)
+            (found,) = hands.label([seen], [FACE, OTHER], EYE, k / 30)
         assert level(found.p_world_m) == pytest.approx(level(face[0]))
-        (found,) = hands.named([patch(p=tip)], [FACE, OTHER], EYE, 0.1)
+        (found,) = hands.label([patch(p=tip)], [FACE, OTHER], EYE, 0.1)
         assert level(found.p_world_m) == pytest.approx(level(face[0]))
 
 
@@ -230,7 +230,7 @@ FIST: LocalisedDetection = patch(radius_m=0.13 * 2.0, compact=True)
 def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_makes_it_one() -> None:
     hands, far = Hands(), []
     for k in range(12):
-        (found,) = hands.named([replace(FIST, radius_m=0.26 + 0.01 * k)], [FACE], EYE, k / 30)
+        (found,) = hands.label([replace(FIST, radius_m=0.26 + 0.01 * k)], [FACE], EYE, k / 30)
         far.append(level(found.p_world_m))
     size_m = (0.26 + 0.11) * 1.0 / level(FIST.p_world_m)  # as far away as the person
     assert far[-1] == pytest.approx(0.065 / size_m, rel=0.1)
@@ -238,7 +238,7 @@ def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_make
     assert found.v_world_m_s[1] == pytest.approx(1.2 * far[-1] / level(FIST.p_world_m))
     # A hand that is drawn back, or goes on as an arm, is at the person's distance again.
     for k in range(12, 20):
-        (found,) = hands.named([patch(radius_m=0.2)], [FACE], EYE, k / 30)
+        (found,) = hands.label([patch(radius_m=0.2)], [FACE], EYE, k / 30)
     assert level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
 
 
@@ -252,7 +252,7 @@ def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_make
 def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: LocalisedDetection) -> None:
     hands = Hands()
     for k in range(6):
-        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+        (found,) = hands.label([seen], [FACE], EYE, k / 30)
     assert level(found.p_world_m) == pytest.approx(
         level(seen.p_world_m) if seen.depth_measured else 1.0, abs=0.02
     )
@@ -273,7 +273,7 @@ def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_ha
     hands = Hands()
     seen = [reaching(0.17)] * 3 + [reaching(0.06)] * 3 + [reaching(0.25)] * 2
     away = [
-        level(hands.named([one], [FACE], EYE, k / 30)[0].p_world_m) for k, one in enumerate(seen)
+        level(hands.label([one], [FACE], EYE, k / 30)[0].p_world_m) for k, one in enumerate(seen)
     ]
     assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
 
@@ -281,7 +281,7 @@ def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_ha
 def test_nor_is_it_the_persons_arm_because_it_moves_before_their_shoulder() -> None:
     hands, seen = Hands(), reaching(0.17, p=(2.0, 0.68, -0.24))
     for k in range(3):
-        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+        (found,) = hands.label([seen], [FACE], EYE, k / 30)
     assert found.kind == HAND and level(found.p_world_m) == pytest.approx(0.5, abs=0.03)
 
 
@@ -298,7 +298,7 @@ def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
 ) -> None:
     hands = Hands()
     for k, one in enumerate([patch()] * 2 + [seen] * 4):
-        (found,) = hands.named([one], [FACE], EYE, k / 30)
+        (found,) = hands.label([one], [FACE], EYE, k / 30)
     assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.07)
 
 
@@ -307,15 +307,15 @@ def test_a_known_hand_beside_one_at_rest_does_not_take_its_place() -> None:
     hands, rests = Hands(), patch(v=(0.0, 0.0, 0.0), thickness_m=0.1)
     glove = patch(p=(0.95, 0.3, -0.1), mark=99, kind=HAND, depth_measured=True)
     for k, one in enumerate([patch()] * 3 + [rests] * 2):
-        hands.named([one, glove], [FACE], EYE, k / 30)
-    later = hands.named([glove], [FACE], EYE, 1.0)
+        hands.label([one, glove], [FACE], EYE, k / 30)
+    later = hands.label([glove], [FACE], EYE, 1.0)
     assert {one.mark for one in later} == {99, 7}
 
 
 def test_one_large_frame_brings_no_hand_near() -> None:
     hands = Hands()
     for k, seen in enumerate([patch()] * 4 + [FIST] + [patch()] * 2):
-        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+        (found,) = hands.label([seen], [FACE], EYE, k / 30)
         assert k == 0 or level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
 
 
@@ -323,11 +323,11 @@ def test_a_hand_that_was_near_and_moves_again_at_the_person_leaves_none_behind()
     hands = Hands()
     for k in range(10):
         v: Vec3 = (0.0, 1.2 if k < 8 else 0.1, 0.0)
-        hands.named([replace(FIST, v_world_m_s=v, fastest_m_s=v)], [FACE], EYE, k / 30)
-    assert hands.held
+        hands.label([replace(FIST, v_world_m_s=v, fastest_m_s=v)], [FACE], EYE, k / 30)
+    assert hands.has_resting
     for k in range(10, 14):
-        found = hands.named([patch(mark=8)], [FACE], EYE, k / 30)
-    assert [one.kind for one in found] == [HAND] and not hands.held
+        found = hands.label([patch(mark=8)], [FACE], EYE, k / 30)
+    assert [one.kind for one in found] == [HAND] and not hands.has_resting
 
 
 @pytest.mark.parametrize(("start_s", "side"), [(23.3, 1.0), (35.8, -1.0)])

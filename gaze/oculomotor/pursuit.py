@@ -13,7 +13,7 @@ slower Kdiv for a receding target. Saccades close larger errors of direction.
 from math import exp, radians, sqrt
 from typing import NamedTuple, Protocol
 
-from gazerig.gaze.angles import scale, sub
+from gazerig.gaze.angles import perpendicular, scale, sub
 from gazerig.gaze.oculomotor.binocular import (
     BinocularController,
     EyeGeometry,
@@ -104,7 +104,7 @@ class Pursuit:
     def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
         """Return error and retinal slip; all points in the world, metres."""
         (x, y, z, _), (to_x, to_y, to_z, near) = sight(gaze, eye), sight(target, eye)
-        across = _across((to_x, to_y, to_z), scale(v_target, near))
+        across = perpendicular(scale(v_target, near), (to_x, to_y, to_z))
         return Slip((to_x - x, to_y - y, to_z - z), sub(across, self._adopted_speed(across)))
 
     def step(
@@ -197,9 +197,3 @@ def sight(point: Vec3, eye: Vec3) -> Sight:
     if length == 0.0:
         return 1.0, 0.0, 0.0, 1.0 / _NEAREST_M
     return x / length, y / length, z / length, 1.0 / _NEAREST_M
-
-
-def _across(way: Vec3, v: Vec3) -> Vec3:
-    """Return the part of a vector that is perpendicular to a direction."""
-    along = way[0] * v[0] + way[1] * v[1] + way[2] * v[2]
-    return sub(v, scale(way, along))

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import hypot
 
-from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
+from gazerig.gaze.angles import add, norm, perpendicular, scale, sub, unit
 from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.hands import Known
 from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
@@ -68,9 +68,12 @@ def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int
     if thing.kind != UNNAMED:
         return None
     for k, (p_face, v_face) in enumerate(faces):
-        if _on_head(thing, p_face, p_camera):
+        if (off := _off(thing, p_face, p_camera)) is None:
+            continue
+        if hypot(*off) < _HEAD_M:
             return k
-        if _below(thing, p_face, p_camera) and _moves_along(thing, p_face, v_face, p_camera):
+        on_body = off[0] < _HALF_WIDTH_M and -_BELOW_M < off[1] < _ABOVE_M
+        if on_body and _moves_along(thing, p_face, v_face, p_camera):
             return k
     return None
 
@@ -79,12 +82,6 @@ def _on_head(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> bool:
     """Return whether a patch's middle is on the head."""
     off = _off(thing, p_face, p_camera)
     return off is not None and hypot(*off) < _HEAD_M
-
-
-def _below(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> bool:
-    """Return whether a patch's middle is on the body of a face."""
-    off = _off(thing, p_face, p_camera)
-    return off is not None and off[0] < _HALF_WIDTH_M and -_BELOW_M < off[1] < _ABOVE_M
 
 
 def _off(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:
@@ -111,7 +108,5 @@ def _moves_along(
     v = thing.v_world_m_s
     if not thing.depth_measured:
         v = scale(v, norm(sub(p_face, p_camera)) / max(norm(way), 1e-6))
-    view = unit(way)
-    other = sub(v, v_face)
-    across = norm(sub(other, scale(view, dot(other, view))))
+    across = norm(perpendicular(sub(v, v_face), unit(way)))
     return across < max(_ALONG_WITH_M_S, _ALONG_WITH_SHARE * norm(v_face))

@@ -24,7 +24,7 @@ from functools import partial
 from math import hypot, inf
 from typing import NamedTuple
 
-from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
+from gazerig.gaze.angles import add, dot, norm, perpendicular, scale, sub, unit
 from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.track import UNNAMED, LocalisedDetection
 
@@ -96,7 +96,7 @@ class _MovingPatch:
     nearer: float = 1.0
     palm_s: float = -inf
 
-    def sized(self, thing: LocalisedDetection, arm: "_Arm") -> None:
+    def update_distance(self, thing: LocalisedDetection, arm: "_Arm") -> None:
         """Update the distance by the size.
 
         Args:
@@ -140,7 +140,7 @@ class Hands:
         self._resting: dict[int, _RestingHand] = {}
         self._palm_mark, self._searched_s = 0, -inf
 
-    def named(
+    def label(
         self,
         things: Iterable[LocalisedDetection],
         faces: list[Known],
@@ -171,7 +171,7 @@ class Hands:
         return [*found, *self._at_rest(found, p_camera, t_s)] if self._resting else found
 
     @property
-    def held(self) -> bool:
+    def has_resting(self) -> bool:
         """Return whether there are hands at rest."""
         return bool(self._resting)
 
@@ -264,7 +264,7 @@ class Hands:
                 known.palm_s = t_s
                 known.nearer = _level(palm.p_world_m, p_camera) / _level(arm.tip_m, p_camera)
             elif t_s - known.palm_s > _PALM_S:
-                known.sized(thing, arm)
+                known.update_distance(thing, arm)
             hand = _as_hand(thing, arm, known.nearer, p_camera)
             if palm is not None:
                 hand = replace(hand, p_world_m=palm.p_world_m, along_sd_m=palm.along_sd_m)
@@ -459,6 +459,4 @@ def _approaches(thing: LocalisedDetection, p_camera: Vec3) -> bool:
 
 def _speed_across(arm: _Arm, v_face: Vec3, p_camera: Vec3) -> float:
     """Return the speed of a hand across the view, relative to the person."""
-    view = unit(sub(arm.tip_m, p_camera))
-    other = sub(arm.tip_m_s, v_face)
-    return norm(sub(other, scale(view, dot(other, view))))
+    return norm(perpendicular(sub(arm.tip_m_s, v_face), unit(sub(arm.tip_m, p_camera))))

@@ -125,11 +125,11 @@ class Perception:
         palms = (
             None if located.palms is None else [place_in_world(one, R, p) for one in located.palms]
         )
-        if things or palms or self._hands.held:
+        if things or palms or self._hands.has_resting:
             if self._own_parts is not None:
                 things = label_own_body(things, self._own_parts(R_head, self._p_head), p)
             known = self._known(t_s)
-            things = self._hands.named(things, known_faces(faces, known), p, t_s, palms)
+            things = self._hands.label(things, known_faces(faces, known), p, t_s, palms)
             faces, things = without_own_motion(faces, things, known, p)
             things = [_at_head(thing) for thing in things]
         tracked = self._tracker.step([*faces, *things], p, t_s)
@@ -304,7 +304,7 @@ def _eyes(track: Track) -> SeenEyes | None:
     if signs is None:
         return None
     if track.seen_s == t_s:
-        track.speech = track.speech.seen(signs.mouth_opening_m, t_s)
+        track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
         if signs.eye_opening is not None:
             track.eyes = SeenEyes(track.detection.gaze_world, signs.eye_opening, t_s)
     return None if track.eyes is None else track.eyes.at(t_s)

@@ -26,7 +26,7 @@ class Speech:
     crossed_s: tuple[float, ...] = ()
     at_s: float = 0.0
 
-    def seen(self, gap_m: float, t_s: float) -> Self:
+    def advance(self, gap_m: float, t_s: float) -> Self:
         """Return the motion after another frame."""
         if self.mean_m is None:
             return replace(self, mean_m=gap_m, at_s=t_s)
