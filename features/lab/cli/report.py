@@ -52,7 +52,7 @@ def report(
     bus: Annotated[
         str | None, typer.Option(help="With --scene: emulated servos (default) or ideal ones.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all rng.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 0,
     out: Annotated[
         Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
     ] = None,

@@ -44,7 +44,7 @@ def _time_share(figure: Figure, runs: Sequence[Shown]) -> None:
         if shown.model is not None:
             due = shown.model.share(np.random.default_rng(7))
             shares.plot(at, due, "_", color="black", ms=9,
-                        label="as the model asks" if n == 1 else None)  # fmt: skip
+                        label="as the model plans" if n == 1 else None)  # fmt: skip
         seen = face.visits(shown.run)
         each = [[v.end_s - v.start_s for v in seen if v.part == p] for p in range(len(PARTS))]
         means = [float(np.mean(e)) if e else 0.0 for e in each]
@@ -133,7 +133,7 @@ def _heat(figure: Figure, runs: Sequence[Shown]) -> None:
         if len(points):
             _map(axes, face.density(points), f"{shown.name} ({points[:, 2].sum():.0f} s)")
         else:
-            nothing(axes, "no face was looked at")
+            nothing(axes, "no gaze on a face")
 
 
 def _map(axes: Axes, density: Floats, title: str) -> None:
@@ -200,7 +200,7 @@ def _vergence(figure: Figure, runs: Sequence[Shown]) -> None:
         weights = np.full(len(rows), 1.0 / len(rows))
         axes.hist(np.clip(rows[:, 6], -3.0, 5.0), bins, weights=weights, color=shown.colour,
                   alpha=0.75, label=f"{shown.name} ({len(rows)})")  # fmt: skip
-    label(axes, "vergence beyond what the face's distance asks for, deg (+ nearer)",
+    label(axes, "vergence error at the face's distance, deg (+ nearer)",
           "share of fixations")  # fmt: skip
     legend(axes, "upper right")
 
@@ -210,22 +210,22 @@ DRAWINGS = (
             "Share of the time on parts and mean visit, refixations merged; grey is Nakamoto & "
             "Tsuruno, eq 1 with table 1 as dwell of each step.", _time_share, (8.4, 4.0)),
     Drawing("dwell", FACE, "Visits to each part",
-            "Share of visits that are no longer than a time; grey is what table 1 of Nakamoto & "
-            "Tsuruno gives as log-normal dwells with the refixations of eq 1; dotted is what the "
-            "rig's own model asks for, its floor included.", _dwell,
+            "Share of visits up to a duration; grey is table 1 of Nakamoto & Tsuruno as log-normal "
+            "dwells with the refixations of eq 1; dotted is the rig's own model, including its "
+            "floor.", _dwell,
             (8.4, 4.4)),
-    Drawing("transitions", FACE, "Where the gaze goes next",
+    Drawing("transitions", FACE, "Transitions between parts",
             "Shifts between parts in percent of each row, staying left out; red are shifts that "
             "eq 1 of Nakamoto & Tsuruno does not have. DN chin, FL and FR sides, LE and RE eyes, "
             "M mouth, N nose, UP forehead; left and right are the person's own.", _transitions,
             (8.4, 4.2)),
     Drawing("heat", FACE, "Heat map",
-            "Time on the face, and what people's shares of time on the parts would make (the "
-            "figures 8 and 9 of Nakamoto & Tsuruno).", _heat, (8.4, 4.6)),
-    Drawing("pupil_axes", FACE, "Where each pupil axis passes at the face",
+            "Time on the face, and the map expected from people's shares of time on the parts "
+            "(figures 8 and 9 of Nakamoto & Tsuruno).", _heat, (8.4, 4.6)),
+    Drawing("pupil_axes", FACE, "Pupil axes at the face",
             "One dot a fixation: the line of sight of each eye, {measured}, in the plane of the "
-            "face, from the point that was to be looked at. As the rig saw the face: an error of "
-            "its camera does not show here.", _pupils, (8.4, 4.2)),
+            "face, relative to the target point. The face is as seen by the rig: an error of its "
+            "camera is not included.", _pupils, (8.4, 4.2)),
     Drawing("vergence", FACE, "Vergence at the face",
             "Angle between the lines of sight, {measured}, less that of the point looked at.",
             _vergence, (8.4, 3.0)),

@@ -88,22 +88,22 @@ def _following(figure: Figure, runs: Sequence[Shown]) -> None:
     label(phases, "frequency, Hz", "phase, deg (- behind)", "phase")
     legend(gains, "lower right")
     if not some:
-        nothing(response, "no frequency at which\ntarget and gaze go together")
+        nothing(response, "no coherent frequency")
         nothing(phases, "")
 
 
 DRAWINGS = (
     Drawing("head_part", HEAD, "The head's part in a gaze shift",
-            "Head movement with a shift of the gaze, sideways, and when the head set off. Grey: "
+            "Head movement with a shift of the gaze, sideways, and the start of the head. Grey: "
             "Stahl's mean, and one standard deviation of range and slope; and starts from 100 ms "
             "before to 140 ms after the eyes.", _contribution),
     Drawing("vor", HEAD, "Gaze held while the head turns",
-            "Gain of the eyes between saccades, for targets that stand still; 1 holds the gaze. "
-            "What a near target asks for beyond the head's turn is taken into account.", _vor,
+            "Gain of the eyes between saccades, for targets at rest; 1 stabilises the gaze. The "
+            "additional turn for a near target is taken into account.", _vor,
             (8.4, 3.2)),
     Drawing("following", FOLLOWING, "Smooth following",
             "Left: gain of the gaze between saccades against the target's speed; people reach .95 "
             "(Robinson 1986). Middle and right: gain and phase by frequency, from cross spectra, "
             "where coherence is above .6; grey is up to 160 ms behind, to 50 ms ahead. The target "
-            "is what the rig saw.", _following),
+            "is as seen by the rig.", _following),
 )  # fmt: skip

@@ -151,14 +151,14 @@ def _strip(axes: Axes, bouts: np.ndarray, start_s: float, row: int, colour: str)
 DRAWINGS = (
     Drawing("blink_shape", LIDS, "Shape of a blink",
             "Median and 10th to 90th percentile of the upper lids, {measured}, and the median of "
-            "lower ones where the rig has such; and the lengths of the phases beside people's. A "
+            "lower lids if the rig has them; and the lengths of the phases with those of people. A "
             "phase lasts while the lid is faster than a twentieth of its peak.",
             _shape),
     Drawing("blink_when", LIDS, "When the lids blink",
-            "Intervals between blinks; and the share of gaze shifts that bring one.", _when),
+            "Intervals between blinks; and the share of gaze shifts with a blink.", _when),
     Drawing("looks", SOCIAL, "Looks at people",
-            "When the gaze was on a face, and when that face was turned to the robot too; and how "
-            "long each look was. 2.2 s: bouts of face gaze in conversation (Rogers 2018); 3.3 s: "
-            "what people like (Binetti 2016); 7.9 s: while listening (Lee, Badler & Badler 2002); "
+            "Times with the gaze on a face, and with that face turned to the robot too; and the "
+            "length of each look. 2.2 s: bouts of face gaze in conversation (Rogers 2018); 3.3 s: "
+            "preferred length (Binetti 2016); 7.9 s: while listening (Lee, Badler & Badler 2002); "
             "15 s is a stare.", _looks, (8.4, 4.4)),
 )  # fmt: skip

@@ -127,11 +127,11 @@ DRAWINGS = (
             "Gaze and head, {measured}, and the direction of the target, sideways.", _overview,
             (8.4, 3.4)),
     Drawing("main_sequence", SACCADES, "Main sequence",
-            "Each dot is a saccade of the gaze in space, {measured}; grey is where people's lie: "
+            "Each dot is a saccade of the gaze in space, {measured}; grey is the human range: "
             "between Baloh's and the higher of Bahill's and Collewijn's curves, 15 % between "
             "people; durations 21 + 2.2 A less 25 % to 25 + 2.4 A ms and 25 %, or 37 + 2.7 A ms.", _main_sequence),
     Drawing("saccade_shape", SACCADES, "Skew and sizes",
-            "When in a saccade the eye is fastest, .5 is the middle; and how large saccades are.",
+            "Time of the peak speed in a saccade, .5 is the middle; and the sizes of saccades.",
             _shape),
     Drawing("fixations", SACCADES, "Fixations",
             "Time between saccades, on a logarithmic axis.", _fixations, (8.4, 3.2)),
