@@ -77,16 +77,12 @@ def sight_of(
     mount = CameraMount(camera)
     turns = PoseBuffer() if real and mount.on_head else None
     history = PoseHistory if options.placed_by == "capture" else NewestPose
-    return Sight(mount, history(kinematics, tell=_turn_sender(mount, turns)), turns)
 
+    def send(t_s: float, R_world_head: Mat3) -> None:
+        if turns is not None:
+            turns.record(t_s, mount.rotation(R_world_head))
 
-def _turn_sender(
-    mount: CameraMount, turns: PoseBuffer | None
-) -> Callable[[float, Mat3], None] | None:
-    """Return the sender of the camera's rotation to its process, None if it is not needed."""
-    if turns is None:
-        return None
-    return lambda t_s, R_world_head: turns.record(t_s, mount.rotation(R_world_head))
+    return Sight(mount, history(kinematics, tell=send if turns is not None else None), turns)
 
 
 def run_camera(
@@ -228,8 +224,8 @@ def placed_camera(
     turns = options.video is None and options.replay is None and not options.mock
     if what is None or turns or rig.camera.mount == "base":
         return rig.camera, ()
-    beside = "" if options.video or options.replay else " beside an emulated head"
-    note = f"{what}{beside} does not turn with the head: the camera counts as standing still"
+    where = "" if options.video or options.replay else " next to an emulated head"
+    note = f"{what}{where} does not turn with the head: the camera counts as fixed"
     return fixed_mount(rig.camera, kinematics), (note,)
 
 
@@ -370,6 +366,8 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     if detector is None and not moves:
         return ""
     field_rad = radians(placed.horizontal_field_deg)
+    finder = partial(retune_finder, after.motion, placed.lens, field_rad)
+    motion = finder if moves else None
     try:
         match camera:
             case GuardedCamera():
@@ -381,19 +379,18 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
             case RoomCamera():
                 return retune_camera(camera.seeing, before, after, placed) if camera.seeing else ""
             case CameraProcess():
-                motion = partial(retune_finder, after.motion, placed.lens, field_rad)
-                done = camera.retune(detector, motion if moves else None, locate)
+                done = camera.retune(detector, motion, locate)
             case CameraThread():  # it uses the program's own detector
-                motion = partial(retune_finder, after.motion, placed.lens, field_rad)
-                done = camera.retune(None, motion if moves else None, locate)
+                done = camera.retune(None, motion, locate)
             case SceneCamera():  # it computes ideal detections
                 done = locate is None or camera.retune(locate)
             case _:
-                motion = partial(retune_finder, after.motion, placed.lens, field_rad)
-                done = _retune_detecting(camera, after, detector, motion if moves else None, locate)
+                done = _retune_detecting(camera, after, detector, motion, locate)
     except SetupError as error:
         return f"the detector is unchanged: {error}"
-    return "" if done else "the camera's process is busy and looks as before: set it once more"
+    return (
+        "" if done else "the camera's process is busy and keeps its parameters: set them once more"
+    )
 
 
 def _retune_detecting(

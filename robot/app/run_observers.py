@@ -311,7 +311,7 @@ def only_stops(command: CommandTaker) -> CommandTaker:
     def take(asked: Command) -> Ticket | None:
         if not isinstance(asked, Stop | Resume):
             raise ValueError(
-                f"the buttons of {STEER!r} lead the head now; besides them only stop and resume go"
+                f"the buttons of {STEER!r} steer the head now; otherwise only stop and resume work"
             )
         return command(asked)
 

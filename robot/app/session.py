@@ -321,10 +321,14 @@ def prepare_shutdown(
     watch: Callable[[Tick], object] | None = None,
 ) -> PowerDown:
     """Return the shutdown of a run of this robot; watch: gets a tick at every step of parking."""
-    return PowerDown(lambda again: parked(made, again, watch), made.robot.stop, say, interrupts)
+    return PowerDown(
+        lambda again: park_unless_stopped(made, again, watch), made.robot.stop, say, interrupts
+    )
 
 
-def parked(made: Assembly, again: Again, watch: Callable[[Tick], object] | None = None) -> str:
+def park_unless_stopped(
+    made: Assembly, again: Again, watch: Callable[[Tick], object] | None = None
+) -> str:
     """Park a robot unless it was stopped; return the messages."""
     robot = made.robot
     if robot.stopped:

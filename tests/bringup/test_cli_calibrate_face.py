@@ -307,7 +307,7 @@ def test_while_buttons_lead_the_page_can_only_stop_and_resume() -> None:
     order(Stop("a test"))
     order(Resume())
     for asked in (LookAt((1.0, 0.0, 0.0)), Jog((("neck_yaw", 0.1),)), Ask("behaviour", "guard")):
-        with pytest.raises(ValueError, match="lead the head now"):
+        with pytest.raises(ValueError, match="steer the head now"):
             order(asked)
     assert given == [Stop("a test"), Resume()]
 
