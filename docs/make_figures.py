@@ -103,7 +103,7 @@ def head_goal() -> None:
     figure, axes = plt.subplots(figsize=(4.8, 3.4))
     for limit, style in ((55.0, "-"), (20.0, "--")):
         head = HeadModel(params, radians(limit), limits)
-        offsets = [degrees(head.offset_rad(a)) for a in pulls]
+        offsets = [degrees(head.share.offset_rad(a)) for a in pulls]
         axes.plot(pulls, offsets, INK, ls=style, label=f"eye limit {limit:.0f} deg")
     axes.set(
         xlabel="attention, 0 = A1, 1 = A2",

@@ -27,7 +27,7 @@ def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> HeadModel:
 def goal_deg(
     model: HeadModel, yaw: float, salience: float, pitch: float = 0.0
 ) -> tuple[float, float]:
-    goal = model.goal_rad((radians(yaw), radians(pitch)), model.offset_rad(salience))
+    goal = model.goal_rad((radians(yaw), radians(pitch)), model.share.offset_rad(salience))
     return degrees(goal[0]), degrees(goal[1])
 
 
@@ -40,7 +40,7 @@ def test_e11_more_attention_turns_the_head_further() -> None:
 
 @pytest.mark.parametrize(("x", "offset"), [(0.25, 29.121), (0.5, 15.000), (0.75, 0.879)])
 def test_e12_offset_values(x: float, offset: float) -> None:
-    assert degrees(head().offset_rad(x)) == pytest.approx(offset, abs=0.01)
+    assert degrees(head().share.offset_rad(x)) == pytest.approx(offset, abs=0.01)
 
 
 def test_other_side_mirrors_and_near_targets_give_straight_ahead() -> None:
@@ -56,8 +56,8 @@ def test_two_dimensional_targets_are_shortened_along_the_great_circle() -> None:
 
 def test_offset_and_trigger_stay_inside_a_small_eye_range() -> None:
     model = head(eye_deg=20.0)
-    assert degrees(model.trigger_rad) == pytest.approx(18.0)
-    assert degrees(model.offset_rad(0.0)) == pytest.approx(18.0)
+    assert degrees(model.share.trigger_rad) == pytest.approx(18.0)
+    assert degrees(model.share.offset_rad(0.0)) == pytest.approx(18.0)
 
 
 def test_goal_stays_in_the_neck_range() -> None:
@@ -148,8 +148,8 @@ def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
         goal_model="attention", min_salience=0.5, max_salience=1.0, literal_reach=True
     )
     model = HeadModel(params, radians(20.0), NECK)
-    assert degrees(model.trigger_rad) == pytest.approx(30.0)
-    assert degrees(model.offset_rad(0.5)) == pytest.approx(29.97, abs=0.01)
+    assert degrees(model.share.trigger_rad) == pytest.approx(30.0)
+    assert degrees(model.share.offset_rad(0.5)) == pytest.approx(29.97, abs=0.01)
     # 60 - 30.03 - 20: the 9.97 deg that no eye of 20 deg covers.
     assert 60.0 - goal_deg(model, 60.0, 0.5)[0] - 20.0 == pytest.approx(9.97, abs=0.01)
 

@@ -11,13 +11,15 @@ from typing import NamedTuple
 import pytest
 from stand_in import StandIn
 
+from gazerig.config.load import load
+from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.config.text import params_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Percept
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.resimulate import Resimulation, recorded_rig, rerun
+from gazerig.robot.app.resimulate import Resimulation, rerun
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import Tick, run
@@ -219,8 +221,10 @@ def test_a_run_of_a_character_is_done_again_without_its_file(tmp_path: Path) -> 
     assert rerun(RunRecording(path)).same
 
 
-def test_the_recorded_rig(once: Once) -> None:
-    assert repr(recorded_rig(once.recording)) == repr(load_rig("desk"))
+def test_the_recorded_rig(once: Once, tmp_path: Path) -> None:
+    path = tmp_path / "recorded.yaml"
+    path.write_text(once.recording.info.config_yaml, encoding="utf-8")
+    assert repr(load(path, Rig)) == repr(load_rig("desk"))
 
 
 def test_a_configuration_of_another_version_is_told_in_one_line(once: Once) -> None:

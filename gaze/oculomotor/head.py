@@ -93,6 +93,8 @@ _SWINGS = 2.5
 class HeadModel:
     """Start, goal and trajectory of the head's part of a gaze shift.
 
+    share: the present share of the head
+
     Args:
         params: constants of start, goal and motion.
         eye_limit_rad: the smallest limit of the eyes.
@@ -120,9 +122,9 @@ class HeadModel:
         """Change constants and ranges; a movement in progress continues as planned."""
         self._params = params
         self._neck, self._roll = neck_limit_rad, roll_limit_rad
-        self._share = HeadShare(params, eye_limit_rad)
+        self.share = HeadShare(params, eye_limit_rad)
         self._comfort_rad = radians(params.comfort_deg)
-        self._relief_rad = min(self._comfort_rad / 2.0, self._share.trigger_rad)
+        self._relief_rad = min(self._comfort_rad / 2.0, self.share.trigger_rad)
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
         """Start at rest at the present head angles."""
@@ -136,15 +138,6 @@ class HeadModel:
         self._level = head_rad[2] == 0.0
         self._start = self._goal_direction
         self._target: tuple[str, int] | None = None
-
-    @property
-    def trigger_rad(self) -> float:
-        """Return the eccentricity from which the head joins in."""
-        return self._share.trigger_rad
-
-    def offset_rad(self, salience: float) -> float:
-        """Return the angle by which the head stops short of the target (eq 7, sign corrected)."""
-        return self._share.offset_rad(salience)
 
     def goal_rad(self, facing_rad: Angles2, offset_rad: float, start: Vec3 = _AHEAD) -> Angles2:
         """Return the head's yaw and pitch goal: the arc to the target, shortened, in range.
@@ -177,14 +170,14 @@ class HeadModel:
         """
         start = self._goal_direction
         arc_rad = angle_between(start, direction(facing_rad))
-        short_rad = self._share.short_rad(target.salience, arc_rad)
+        short_rad = self.share.short_rad(target.salience, arc_rad)
         if min(short_rad, arc_rad) > self._comfort_rad:
             short_rad = self._relief_rad
         return self._reaching(target, facing_rad, facing_rad, short_rad, start)
 
     def leads_s(self, target: Target, eccentricity_rad: float) -> float:
         """Return the time for which the eyes wait because the head goes first."""
-        first = target.top_down and eccentricity_rad >= self._share.trigger_rad
+        first = target.top_down and eccentricity_rad >= self.share.trigger_rad
         return self._params.lead_ms / 1e3 if first else 0.0
 
     def step(
@@ -223,7 +216,7 @@ class HeadModel:
         t_s: float,
     ) -> None:
         """Choose between turning to the target, recentring an eccentric eye, and rest."""
-        par, share = self._params, self._share
+        par, share = self._params, self.share
         moving = t_s < self._ends_s
         if (target.kind, target.id) != self._target:
             self._target = target.kind, target.id
@@ -264,7 +257,7 @@ class HeadModel:
         way, to_centre = self._goal_direction, direction(facing)
         to_gaze = to_centre if gaze is facing else direction(gaze)
         near_enough = angle_between(way, to_centre) <= short_rad + _ROUNDING_RAD
-        in_reach = angle_between(way, to_gaze) <= self._share.reach_rad + _ROUNDING_RAD
+        in_reach = angle_between(way, to_gaze) <= self.share.reach_rad + _ROUNDING_RAD
         moving, start = t_s < self._ends_s, self._start
         arc_rad = angle_between(start, to_centre)
         if near_enough and in_reach and not (moving and angle_between(start, way) > arc_rad):
@@ -279,13 +272,13 @@ class HeadModel:
         self, target: Target, facing: Angles2, gaze: Angles2, offset_rad: float, start: Vec3
     ) -> Angles3:
         """Return the goal for the centre; for the point itself if the eyes could not reach it."""
-        reach_rad = self._share.reach_rad
+        reach_rad = self.share.reach_rad
         goal = self.goal_rad(facing, offset_rad, start)
         if facing != gaze and not self._params.literal_reach:
             rest = angle_between(direction(goal), direction(gaze))
             goal = goal if rest <= reach_rad else self.goal_rad(gaze, reach_rad, start)
         low, high = self._roll
-        roll = self._share.roll_rad(target.salience, facing[0])
+        roll = self.share.roll_rad(target.salience, facing[0])
         return (*goal, min(max(roll, low), high))
 
     def _facing(self, t_s: float, ahead_s: float = 0.0) -> Vec3:

@@ -300,16 +300,6 @@ def _joints(joints: str | None, changed: bool) -> Joints:
     raise SetupError(f"joints {joints}: unknown; choose recorded or emulated")
 
 
-def recorded_rig(recording: RunRecording) -> Rig:
-    """Return the rig with all values at the start of the run.
-
-    Raises:
-        BadRecording: this version does not know a part of the recorded one.
-    """
-    with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
-        return _read(recording, _write(recording.info.config_yaml, Path(folder) / "recorded.yaml"))
-
-
 def _rig(
     recording: RunRecording, rig: Rig | str | None, character: str | None, folder: Path
 ) -> Rig:
