@@ -183,8 +183,8 @@ def _again(file: Path) -> object:
 
 
 def _reported(file: Path) -> object:
-    _recorded = pytest.importorskip("gazerig.features.lab.cli.report")._recorded
-    return len(_recorded(file, "x", lambda words, share: None)[1].rows)
+    read_run = pytest.importorskip("gazerig.features.lab.cli.report")._read_run
+    return len(read_run(file, "x", lambda words, share: None)[1].rows)
 
 
 USES: dict[str, Callable[[Path], object]] = {
