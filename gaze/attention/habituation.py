@@ -85,8 +85,8 @@ class Habituation:
         floor, rate = self._params.rule_floor, self._params.decay_rate_1_s
         if rate == 0.0 or floor == 1.0:
             return [1.0] * len(ids)
-        leads = self._shared.step(ids, weights, attended_id, t_s)
-        return [floor + (1.0 - floor) * exp(-rate * lead) for lead in leads]
+        surpluses = self._shared.step(ids, weights, attended_id, t_s)
+        return [floor + (1.0 - floor) * exp(-rate * one) for one in surpluses]
 
     def _advance(self, attended_id: int, t_s: float) -> None:
         """Update all factors and the points left to the present time."""
