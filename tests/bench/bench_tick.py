@@ -299,7 +299,7 @@ def show(figures: dict[str, Any], before: dict[str, Any] | None) -> None:
 
 
 def table(figures: dict[str, Any], before: dict[str, Any] | None) -> Iterator[str]:
-    """Yield the rows of docs/measurements/performance.md: mean / 99th percentile; all, new frames."""
+    """Yield rows of docs/measurements/performance.md: mean / 99th percentile, new frames apart."""
     runs = [figures] if before is None else [before, figures]
     for part in ("stages_us", "calls", "peers"):
         rows = {part: figures[part]} if part == "calls" else figures[part]
