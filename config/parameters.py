@@ -269,6 +269,12 @@ def live(key: str) -> str:
     return NEXT_TICK
 
 
+def start_note(key: str) -> str:
+    """Return " (next start: ...)" with the reason if a running rig cannot take a key, else ""."""
+    when = live(key)
+    return f" ({when})" if when.startswith(NEXT_START) else ""
+
+
 def _at(rig: Rig, key: str) -> Value:
     """Return the value at a key, None where this rig has no such entry."""
     try:

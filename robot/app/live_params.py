@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.parameters import NEXT_START, changed, differences, live
+from gazerig.config.parameters import changed, differences, start_note
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.drivers.types import Camera
@@ -170,7 +170,7 @@ class LiveParams:
         self._put_gaze(before, self.rig, walk)
         self._walk = walk
         said = self._put_machine(before, self.rig)
-        return (*(_change_text(key, value) for key, value in command.changes), *said)
+        return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)
 
     def _put_gaze(self, old: Rig, new: Rig, walk: Walk) -> None:
         parts, was, now = self.parts, old.gaze, new.gaze
@@ -278,9 +278,3 @@ def _exceeding_joints(
     if not more:
         return ()
     return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)
-
-
-def _change_text(key: str, value: Value) -> str:
-    when = live(key)
-    note = f" ({when})" if when.startswith(NEXT_START) else ""
-    return f"tuned: {key} = {value}{note}"

@@ -19,11 +19,10 @@ from typing import Any, NamedTuple
 from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 from gazerig.config.parameters import (
-    NEXT_START,
     changed,
     differences,
     flattened,
-    live,
+    start_note,
     value_of,
     values,
     values_after,
@@ -284,7 +283,7 @@ class ParamStore:
             values=values_after(before.values, before.rig, rig) if found else before.values,
             version=before.version + 1,
         )
-        return tuple(_change_text(key, value) for key, value in found.items())
+        return tuple(f"{k} = {_text(v)}{start_note(k)}" for k, v in found.items())
 
 
 def _defaults(rig: Rig) -> Rig:
@@ -327,9 +326,3 @@ def _text(value: Value) -> str:
 def _overlap(one: str, other: str) -> bool:
     """Return whether two keys are the same or one contains the other."""
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
-
-
-def _change_text(key: str, value: Value) -> str:
-    when = live(key)
-    note = f" ({when})" if when.startswith(NEXT_START) else ""
-    return f"{key} = {_text(value)}{note}"

@@ -302,7 +302,7 @@ def plain(value: object) -> object:
 
 def as_changes(changes: Sequence[ParamChange]) -> list[dict[str, object]]:
     """Return differing values as plain JSON."""
-    return [{"key": c.key, "old": plain(c.old), "new": plain(c.new)} for c in changes]
+    return [change._asdict() for change in changes]
 
 
 def as_value(value: object) -> Value:

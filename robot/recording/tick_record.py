@@ -209,7 +209,7 @@ def _body_record(data: Json) -> BodyRecord:
 
 
 def body_record_to_plain(one: BodyRecord) -> tuple[str, Sequence[Any]]:
-    """Return a report of the machine: its name and body_record_to_plain values."""
+    """Return a report of the machine: its name and plain values."""
     name = _BODY_RECORD_NAMES[type(one)]
     if isinstance(one, MeasuredJoints):
         return name, (one.t_s, _name_fields(JointState, one.joints))

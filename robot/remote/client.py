@@ -547,4 +547,6 @@ def _names(rigs: list[RobotClient]) -> str:
 
 def _changes(rows: object) -> tuple[ParamChange, ...]:
     """Return the changes that a rig's answer lists."""
-    return tuple(ParamChange(**row) for row in cast(list[dict[str, Any]], rows))
+    return tuple(
+        ParamChange(row["key"], row["old"], row["new"]) for row in cast(list[dict[str, Any]], rows)
+    )

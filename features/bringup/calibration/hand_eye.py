@@ -163,10 +163,7 @@ class Observations(NamedTuple):
 
     def residuals(self, estimate: Estimate) -> Floats:
         """Return the errors over a corner's usual one, then lens and turns over theirs."""
-        usual = np.concatenate(
-            (self.lens_error, np.full(estimate.turns_rad.size, self.joint_error_rad))
-        )
-        off = np.concatenate((estimate.lens_off, estimate.turns_rad.ravel())) / usual
+        off = np.concatenate((estimate.lens_off, estimate.turns_rad.ravel())) / self._usual()
         return np.concatenate((self.errors(estimate) / _CORNER_PX, off))
 
     def jacobian(self, estimate: Estimate) -> Floats:
@@ -178,9 +175,12 @@ class Observations(NamedTuple):
         at = _SHARED + 3 * np.repeat(self.view, 2)
         for k in range(3):
             slopes[np.arange(rows), at + k] = own[:, k] / _CORNER_PX
-        usual = np.concatenate((self.lens_error, np.full(columns - _SHARED, self.joint_error_rad)))
-        slopes[rows:, 12:] = np.diag(1.0 / usual)
+        slopes[rows:, 12:] = np.diag(1.0 / self._usual())
         return slopes
+
+    def _usual(self) -> Floats:
+        """Return the usual errors of lens and joints: (3 + 3 views,)."""
+        return np.concatenate((self.lens_error, np.full(3 * self.views, self.joint_error_rad)))
 
 
 @dataclass(frozen=True)
