@@ -5,8 +5,10 @@ from collections.abc import Iterator
 import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
+from gazerig.robot.cli import animation
 from gazerig.robot.dashboard.panels.animation_panel import AnimationPanel
 from gazerig.robot.dashboard.widgets.widgets import Widgets
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Command, Express, SetLevel
 
 
@@ -25,7 +27,10 @@ def test_an_expression_from_the_command_line(rig: TickedRig) -> None:
     assert "there is neutral, happy, sad, surprised" in gazerig("ctl", "express", "glad")
 
 
-def test_a_level_from_the_command_line_is_kept_up_and_let_go(rig: TickedRig) -> None:
+def test_a_level_from_the_command_line_is_kept_up_and_let_go(
+    rig: TickedRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(animation, "RealClock", SimulatedClock)
     assert gazerig("ctl", "level", "mouth", "0.7", "--seconds", "0.25") == ""
     assert rig.commands == [SetLevel("mouth", 0.7)] * 4 + [SetLevel("mouth", 0.0)]
     assert "'loud' is no level: give a number 0..1" in gazerig("ctl", "level", "mouth", "loud")

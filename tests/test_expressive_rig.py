@@ -115,6 +115,7 @@ def test_doctor_names_the_jaw_and_mends_its_limits() -> None:
     assert "jaw, left_brow, right_brow (servos" in done.out + done.err
 
 
+@pytest.mark.own_timeouts
 def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
     pytest.importorskip("gazerig.features.bringup")
     rig = tmp_path / "face.yaml"
