@@ -23,7 +23,10 @@ from gazerig.robot.control.loop import Robot, Tick
 LET_GO = "(not )?parked, torque off"
 """On a starved machine the time for parking may be over before."""
 
-pytestmark = pytest.mark.usefixtures("ideal_servos", "branched_children", "own_sockets")
+pytestmark = [
+    pytest.mark.usefixtures("ideal_servos", "branched_children", "own_sockets"),
+    pytest.mark.own_timeouts,
+]
 
 
 @pytest.fixture
