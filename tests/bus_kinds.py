@@ -11,10 +11,9 @@ from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.maestro.commands import MaestroCodec
-from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.params import BusParams

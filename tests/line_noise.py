@@ -12,8 +12,8 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
-from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
-from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.device import Device
@@ -28,7 +28,7 @@ from gazerig.sim_mock.devices import (
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.rows import Row, rows
+from gazerig.testing.bus_bench import Row, rows
 
 TICK_S = 0.005
 IDS = (1, 2, 3, 4, 5, 6)

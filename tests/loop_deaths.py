@@ -20,7 +20,7 @@ from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus, rig_setups
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 SLOW_DEG_S = 4.0
 PATIENCE_S = 30.0

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 CENTRE = 6000
 

@@ -6,7 +6,7 @@ A bus's own test makes the chain and the driver; here is what is done with them.
 from typing import Any
 
 from gazerig.drivers.types import ServoBus
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 from oak_packets import calibrated
 
+from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import Outputs
-from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.source import OakSource
 
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import Rig
-from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import shut_down

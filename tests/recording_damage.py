@@ -14,8 +14,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
+from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text, walk_text
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions

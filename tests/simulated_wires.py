@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from gazerig.drivers.serial import port_by_path as ports
+from gazerig.drivers.serial import port as ports
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.sim_mock.device import Device

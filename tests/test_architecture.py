@@ -21,8 +21,8 @@ OWNERS = {
     "serial": ("drivers.serial.", "sim_mock.in_process_port"),
     "dynamixel_sdk": ("drivers.serial.port", "sim_mock.in_process_port"),
     "evdev": ("robot.remote.gamepad",),
-    "depthai": ("drivers.camera.oak.sdk",),
-    "mcap": ("drivers.camera.recording_", "robot.recording."),
+    "depthai": ("drivers.camera.oak.discovery",),
+    "mcap": ("drivers.camera.playback", "drivers.camera.recorder", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),
     "zstandard": ("robot.recording.",),
     "msgspec": (

@@ -11,14 +11,14 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP, direct_windows, indirect_windows
 from gazerig.drivers.event_log import MOST, EventLog, register_label
 from gazerig.drivers.serial.reconnect import Reconnect
-from gazerig.drivers.servo_bus.adaptive_timeout import (
+from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
+from gazerig.drivers.servo_bus.read_plan import CALM_S
+from gazerig.drivers.servo_bus.transaction import (
     REFILL,
     RESERVE_S,
     WINDOW,
     AdaptiveTimeout,
 )
-from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
-from gazerig.drivers.servo_bus.read_windows import CALM_S
 from gazerig.drivers.types import ServoConfig
 
 

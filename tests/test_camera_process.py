@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.drivers.camera.frame_watchdog import FIRST_FRAME_S, FrameWatchdog
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
-from gazerig.drivers.camera.process import CameraProcess
-from gazerig.drivers.camera.recording_writer import RecordingWriter
-from gazerig.drivers.camera.shared_detections import SharedDetections
-from gazerig.drivers.camera.shared_frames import SlotReader, SlotWriter
+from gazerig.drivers.camera.process import FIRST_FRAME_S, CameraProcess, FrameWatchdog
+from gazerig.drivers.camera.recorder import RecordingWriter
+from gazerig.drivers.camera.shared_frames import SharedDetections, SlotReader, SlotWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts

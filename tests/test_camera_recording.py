@@ -17,12 +17,10 @@ from present import present
 from stand_in import StandIn
 
 from gazerig.drivers.camera import recording_format as fmt
-from gazerig.drivers.camera import recording_writer as recording_write
+from gazerig.drivers.camera import recorder as recording_write
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.playback import CameraReplay
-from gazerig.drivers.camera.recorder import CameraRecorder
-from gazerig.drivers.camera.recording_reader import Recording
-from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.playback import CameraReplay, Recording
+from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import CameraTurn, DetectedFace
@@ -411,7 +409,7 @@ def test_killed_program_leaves_what_it_wrote(tmp_path):
         "import sys, threading, time, numpy as np\n"
         "from pathlib import Path\n"
         "from gazerig.drivers.camera.source import Shot\n"
-        "from gazerig.drivers.camera.recording_writer import RecordingWriter\n"
+        "from gazerig.drivers.camera.recorder import RecordingWriter\n"
         "writer = RecordingWriter(Path(sys.argv[1]), {})\n"
         "for k in range(1000):\n"
         "    writer.write(Shot(1.0 + k / 30, k + 1, np.full((48, 64, 3), k % 256, np.uint8)))\n"

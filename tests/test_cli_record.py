@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from gazerig.drivers.camera.recording_reader import Recording
+from gazerig.drivers.camera.playback import Recording
 from gazerig.robot.cli.record import app
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from seeing.row_09_identities import LENS, SIZE, Crowd, detected
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Clothing, DetectedFace, DetectedPerson, ImageArray
 from gazerig.drivers.vision.clothing import ClothingReader

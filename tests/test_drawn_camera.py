@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.pose_slot import PoseSlot
+from gazerig.drivers.camera.double_buffer import PoseSlot
 from gazerig.drivers.camera.source import Shot
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.borrowed_camera import BorrowedCamera

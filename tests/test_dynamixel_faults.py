@@ -15,7 +15,7 @@ from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 IDS = (1, 2, 3)
 GROUP_READS = (0x82, 0x8A)

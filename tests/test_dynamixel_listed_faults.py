@@ -59,14 +59,14 @@ from present import present
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.servo_bus.adaptive_timeout import RESERVE_S
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
+from gazerig.drivers.servo_bus.transaction import RESERVE_S
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 
 @pytest.fixture(scope="module")

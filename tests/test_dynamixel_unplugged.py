@@ -17,7 +17,7 @@ from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 IDS = (1, 2, 3)
 SPECS = [ServoSpec(i, "xl330-m077", 1200) for i in IDS]

@@ -10,8 +10,8 @@ from expressive_rig import started
 
 from gazerig.config.load import shipped
 from gazerig.config.parameters import changed, parameters
+from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun

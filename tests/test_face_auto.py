@@ -8,7 +8,7 @@ from seeing.material import background, carphone, eyes_at, noisy, paste, portrai
 from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
 from gazerig.drivers.vision.face.auto import AutoDetector
 from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.drivers.vision.face.mtcnn_networks import package_folder
+from gazerig.drivers.vision.face.mtcnn import package_folder
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 WIDTH_PX, HEIGHT_PX, FIELD_DEG = 640, 400, 69.0

@@ -14,7 +14,7 @@ from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import ModelFileError, SetupError
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray, Pixels
 from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.drivers.vision.face.mtcnn_networks import package_folder, read_model
+from gazerig.drivers.vision.face.mtcnn import package_folder, read_model
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import prepare
 

@@ -16,7 +16,7 @@ from seeing.row_07_who_looks import LENS
 from test_face_pose import CAMERA, angle_between, turned
 from test_gaze_at_head import AT_EYES, percept_of, standing
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, Detections, FaceMesh

@@ -7,7 +7,7 @@ import pytest
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.types import Feedback, ServoConfig
-from gazerig.testing.rows import Row, feedback_of, rows
+from gazerig.testing.bus_bench import Row, feedback_of, rows
 
 
 def row(steps, at_s, torque=True, rearmed=False):

@@ -19,7 +19,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 SPECS = (
     ServoSpec(3, "sts3215", 1800),

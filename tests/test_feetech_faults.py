@@ -26,7 +26,7 @@ from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.torque import read_positions
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from present import present
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
-from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError

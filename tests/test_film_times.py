@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from present import present
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.video_timestamps import (
     VideoTimestamps,

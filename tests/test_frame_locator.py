@@ -13,7 +13,7 @@ from present import present
 from retuned_run import started
 from test_perception import STILL, face_at, picture, standing
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.process import offset_ids
 from gazerig.drivers.camera.source import Shot

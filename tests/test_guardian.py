@@ -31,7 +31,7 @@ from gazerig.robot.guardian.heartbeat import (
     shared_file,
 )
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 

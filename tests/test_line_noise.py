@@ -4,7 +4,7 @@ import pytest
 from line_noise import Noisy
 from present import present
 
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 SMART = ("dynamixel", "dynamixel direct", "feetech")
 

@@ -3,11 +3,11 @@
 import pytest
 from numpy.random import default_rng
 
-from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
-from gazerig.testing.rows import rows
+from gazerig.testing.bus_bench import rows
 
 SPEED = 12_000.0
 LOW, HIGH = 4400, 7600

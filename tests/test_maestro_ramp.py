@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.hobby_board.ramp import Ramp
-from gazerig.drivers.maestro.limits import accel_units, speed_units
+from gazerig.drivers.hobby_board.channel import Ramp
+from gazerig.drivers.maestro.commands import accel_units, speed_units
 
 
 def moved(ramp, goal, seconds, tick_s=0.01):

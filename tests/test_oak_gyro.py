@@ -11,10 +11,10 @@ import pytest
 from oak_packets import R_CAMERA_IMU, at_rest, calibrated, imu_message, packet, readings
 
 from gazerig.drivers.camera.oak.calibration import imu_to_camera, rotation_of
+from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import Outputs
-from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.types import CameraTurn
 

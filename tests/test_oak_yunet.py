@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from present import present
 
+from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import Outputs
-from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.source import OakSource
-from gazerig.drivers.camera.oak.yunet_decoder import STRIDES, UnreadableOutputs, decode
-from gazerig.drivers.camera.oak.yunet_node import yunet_faces
+from gazerig.drivers.camera.oak.yunet_decoder import STRIDES, UnreadableOutputs, decode, yunet_faces
 
 SHARED = Path(__file__).parents[1] / "../shared"
 MODEL = SHARED / "models/face_detection_yunet_2026may.onnx"

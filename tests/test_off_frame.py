@@ -7,9 +7,8 @@ import pytest
 from test_face_pose import CAMERA, image_of, turned
 from test_gaze_at_head import AT_EYES, standing
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer, is_off_frame
 from gazerig.drivers.camera.guarded_camera import GuardedCamera
-from gazerig.drivers.camera.off_frame import is_off_frame
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.robot.model.track_params import TrackParams

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.oak.calibration import OakCalibration
 from gazerig.drivers.camera.orientation import (
     AS_DELIVERED,

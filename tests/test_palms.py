@@ -13,7 +13,7 @@ from present import present
 from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
 from test_perception import seen as percept_at
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray

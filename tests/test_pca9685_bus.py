@@ -11,8 +11,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.hobby_board.release import stop_pulses
 from gazerig.drivers.i2c.bridge import READ_STATUS, I2cMessage, commands, read, write
-from gazerig.drivers.pca9685.board import Pca9685Board
-from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Bus, Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
 from gazerig.drivers.servo_bus.torque import disable_torque

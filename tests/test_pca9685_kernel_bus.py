@@ -11,10 +11,9 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.i2c import port as i2c_port
 from gazerig.drivers.i2c.port import I2cPort, explain
-from gazerig.drivers.pca9685.bus import Pca9685Bus
-from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.serial.port_by_path import port_of
-from gazerig.drivers.serial.port_owner import check_owner
+from gazerig.drivers.pca9685.board import Pca9685Bus
+from gazerig.drivers.serial.list_ports import check_owner
+from gazerig.drivers.serial.port import BlockingPort, port_of
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus

@@ -15,7 +15,7 @@ from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
 from test_perception import seen as percept_at
 from test_scanpath import walker
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob

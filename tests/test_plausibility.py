@@ -14,7 +14,7 @@ from gazerig.drivers.bus.plausibility import (
 )
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.read_windows import Sample
+from gazerig.drivers.servo_bus.read_plan import Sample
 from gazerig.drivers.servo_bus.sync_read import ServoReply
 from gazerig.drivers.types import ServoConfig
 

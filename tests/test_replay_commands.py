@@ -8,8 +8,8 @@ import pytest
 from replayed_run import RATE_HZ, ticks_of
 from typer.testing import CliRunner
 
+from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import replay as cli_replay

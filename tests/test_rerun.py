@@ -13,8 +13,8 @@ from stand_in import StandIn
 
 from gazerig.config.load import load
 from gazerig.config.rig import Rig
+from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Percept
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble

@@ -30,8 +30,8 @@ from recorded_run import (
 from scipy.spatial.transform import Rotation
 
 from gazerig.config.load import load
+from gazerig.config.save_text import params_text
 from gazerig.config.schema import Rig, load_rig
-from gazerig.config.text import params_text
 from gazerig.drivers.types import Detections
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath.scanpath import Walk

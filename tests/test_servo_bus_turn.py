@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.servo_bus.turn import nearest_turn as nearest
+from gazerig.drivers.servo_bus.feedback import nearest_turn as nearest
 
 STEPS = st.integers(-40000, 40000)
 RANGE = st.tuples(st.integers(0, 4095), st.integers(0, 4095)).map(lambda pair: tuple(sorted(pair)))

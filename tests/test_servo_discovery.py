@@ -8,11 +8,9 @@ from stand_in import StandIn
 from sts_rig import Rig
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.protocol_1 import protocol_1_ids
+from gazerig.drivers.dynamixel.family import DYNAMIXEL, protocol_1_ids
 from gazerig.drivers.errors import ServoFault, ServoMissing
-from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.homing import set_middle
+from gazerig.drivers.feetech.family import FEETECH, set_middle
 from gazerig.drivers.servo_bus.discovery import FoundServo, count_corrupt, ping, scan, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers, transact
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.read_plan import DIRECT, direct_windows
-from gazerig.drivers.dynamixel.sync_packets import FastSyncRead
+from gazerig.drivers.dynamixel.read_plan import DIRECT, FastSyncRead, direct_windows
 from gazerig.drivers.feetech.family import FEETECH, window
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import checksum

@@ -14,7 +14,7 @@ from recorded_run import info_for
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig, load_rules, load_walk
-from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_limited
 from gazerig.drivers.files.file_output import output_file, output_text, refuse_existing, write_file

@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gazerig.drivers.camera.video_file import VideoFile
-from gazerig.drivers.camera.video_reader import usable_rate_hz
+from gazerig.drivers.camera.video_file import VideoFile, usable_rate_hz
 from gazerig.drivers.errors import CameraError
 
 SHARED = Path(__file__).parents[2] / "shared"

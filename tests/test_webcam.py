@@ -12,7 +12,7 @@ import pytest
 from present import present
 from stand_in import StandIn
 
-from gazerig.drivers.camera import v4l2_controls
+from gazerig.drivers.camera import webcam as v4l2_controls
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import CameraError

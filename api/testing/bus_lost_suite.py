@@ -4,8 +4,8 @@ import pytest
 
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.testing.bus_bench import rows, well
 from gazerig.testing.bus_suite import BusBenches
-from gazerig.testing.rows import rows, well
 
 
 class BusLossSuite(BusBenches):

@@ -22,8 +22,10 @@ from gazerig.testing.bus_bench import (
     InProcessBench,
     create_in_process_bench,
     held_bus,
+    present,
+    rows,
+    well,
 )
-from gazerig.testing.rows import present, rows, well
 
 ANY = st.integers(-(2**40), 2**40) | st.floats(allow_nan=True, allow_infinity=True)
 FAULTS = ("", "lose all count 2", "delay all 15 count 3", "corrupt all count 3", "unplug for 0.05")

@@ -7,9 +7,9 @@ from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
-from gazerig.drivers.maestro.bus import MaestroBus
+from gazerig.drivers.maestro.board import MaestroBus
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.pca9685.board import Pca9685Bus
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.plugins import BusPlugin, Evidence
 from gazerig.drivers.serial.port import BusPort

@@ -10,7 +10,7 @@ from gazerig.drivers.dynamixel.control_table import DynamixelModel
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechModel
-from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS
+from gazerig.drivers.hobby_board.params import HOBBY, US_STEPS
 
 if TYPE_CHECKING:
     from gazerig.drivers.types import ServoConfig

@@ -6,7 +6,7 @@ from math import radians
 
 import numpy as np
 
-from gazerig.drivers.camera.jpeg_slot import JpegSlot
+from gazerig.drivers.camera.double_buffer import JpegSlot
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import Shot, to_bgr
 

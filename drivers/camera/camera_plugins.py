@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, cast
 
 from gazerig.drivers.camera.oak.params import OakParams
@@ -125,3 +126,31 @@ def _is_turn(turn: object) -> bool:
         return isinstance(turn, CameraTurn) and turn.is_rotation
     except Exception:  # its parts may be anything
         return False
+
+
+def recording(file: Path) -> FrameSource:
+    """Return a recording of a camera."""
+    from gazerig.drivers.camera.playback import CameraReplay
+
+    return CameraReplay(file)
+
+
+def film(path: str) -> FrameSource:
+    """Return a film or photo."""
+    from gazerig.drivers.camera.video_file import VideoFile
+
+    return VideoFile(path)
+
+
+def oak(params: OakParams) -> FrameSource:
+    """Return an OAK-D."""
+    from gazerig.drivers.camera.oak.source import OakSource
+
+    return OakSource(params)
+
+
+def webcam(number: int, params: WebcamParams) -> FrameSource:
+    """Return a webcam."""
+    from gazerig.drivers.camera.webcam import Webcam
+
+    return Webcam(number, params)

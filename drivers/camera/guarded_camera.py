@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
-from gazerig.drivers.camera.off_frame import OffFrameReport
+from gazerig.drivers.camera.capture_loop import OffFrameReport
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.plugins import describe_error

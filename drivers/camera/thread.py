@@ -8,8 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from gazerig.drivers.camera.capture_loop import CaptureLoop, detection_error
-from gazerig.drivers.camera.frame_analysis import Locate, Motion
+from gazerig.drivers.camera.capture_loop import CaptureLoop, Locate, Motion, detection_error
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.worker import Retune

@@ -10,8 +10,7 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
-from gazerig.drivers.camera.capture_loop import CaptureLoop, detection_error
-from gazerig.drivers.camera.frame_analysis import Locate, Motion
+from gazerig.drivers.camera.capture_loop import CaptureLoop, Locate, Motion, detection_error
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
 from gazerig.drivers.camera.source import FrameSource

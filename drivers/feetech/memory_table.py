@@ -10,7 +10,7 @@ Sources: Feetech memory table STS3215, and for missing entries the tables of pub
 
 from typing import Literal, NamedTuple
 
-from gazerig.drivers.servo_bus.read_windows import from_sign_magnitude
+from gazerig.drivers.servo_bus.read_plan import from_sign_magnitude
 
 Access = Literal["r", "rw"]
 

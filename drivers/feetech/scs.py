@@ -30,8 +30,7 @@ from gazerig.drivers.feetech.memory_table import (
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import GoalWrite
 from gazerig.drivers.servo_bus.family import Arming
-from gazerig.drivers.servo_bus.read_plan import ReadPlan
-from gazerig.drivers.servo_bus.read_windows import ReadWindow
+from gazerig.drivers.servo_bus.read_plan import ReadPlan, ReadWindow
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig

@@ -22,9 +22,8 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
-from gazerig.drivers.hobby_board.silence import SilenceMonitor
 from gazerig.drivers.hobby_board.start import enable_channels
-from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
+from gazerig.drivers.hobby_board.supervisor import BoardSupervisor, SilenceMonitor
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
 

@@ -9,14 +9,19 @@ from math import inf
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing, goals_of
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.start import read_every_pulse
 from gazerig.drivers.maestro.commands import (
+    ACCEL_STEPS_S2,
     ERRORS,
+    MICRO,
     MOST_INPUT,
+    SPEED_STEPS_S,
+    accel_units,
     name_errors,
+    speed_units,
 )
-from gazerig.drivers.maestro.limits import ACCEL_STEPS_S2, SPEED_STEPS_S, accel_units, speed_units
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
@@ -152,3 +157,45 @@ class MaestroBoard:
     def wait(self, until_s: float) -> None:
         """Wait."""
         self.line.wait(until_s)
+
+
+class MaestroBus(HobbyBoardBus):
+    """The channels of one Maestro; implements gazerig.drivers.types.ServoBus.
+
+    Args:
+        port: gazerig.drivers.serial.port.BlockingPort, or an emulated port with its methods.
+        setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
+            are quarter microseconds.
+        params: Communication parameters.
+
+    Raises:
+        ValueError: a servo has a channel or a pulse width that the board does not have.
+    """
+
+    def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: MaestroParams) -> None:
+        self._maestro = MaestroBoard(port, params)
+        super().__init__(self._maestro, setups)
+
+    def go_home(self) -> None:
+        """Send all channels to their home as set in Pololu's program, and release them.
+
+        Home may be a position, to which servos move at the armed speed, or no pulses at all.
+
+        Raises:
+            BusLost: the port is lost.
+        """
+        self._supervisor.stop_supervision()
+        self._maestro.line.send(self._maestro.line.speech.go_home())
+
+    def moving(self) -> bool | None:
+        """Return whether any channel with a limit is moving; None if unknown.
+
+        The Micro Maestro has no such request.
+
+        Raises:
+            BusLost: the port is lost.
+        """
+        if self._maestro.params.channels <= MICRO:
+            return None
+        answer = self._maestro.line.ask(self._maestro.line.speech.moving(), 1)
+        return None if answer is None else bool(answer[0])

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing
+from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.start import read_every_pulse
 from gazerig.drivers.i2c import bridge
@@ -343,3 +344,20 @@ class Pca9685Board:
     def wait(self, until_s: float) -> None:
         """Wait."""
         self.line.wait(until_s)
+
+
+class Pca9685Bus(HobbyBoardBus):
+    """The channels of the boards on one I2C bus; implements gazerig.drivers.types.ServoBus.
+
+    Args:
+        port: gazerig.drivers.i2c.port.I2cPort, or a serial or emulated port with a bridge.
+        setups: The servos, in the order of all sequences; a servo's id is its channel, and steps
+            are quarter microseconds.
+        params: Addresses and timing of the boards.
+
+    Raises:
+        ValueError: a servo has a channel or a pulse width that the boards do not have.
+    """
+
+    def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: Pca9685Params) -> None:
+        super().__init__(Pca9685Board(port, params), setups)

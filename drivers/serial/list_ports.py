@@ -5,14 +5,18 @@ others.
 """
 
 import contextlib
+import errno
 import os
+import re
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from serial.tools import list_ports
+
+from gazerig.drivers.errors import PortError
 
 RECOMMENDED_LATENCY_MS = 1
 
@@ -164,3 +168,59 @@ def set_latency(file: Path, ms: int = RECOMMENDED_LATENCY_MS) -> bool:
     except OSError:
         return False
     return latency_ms(file) == ms
+
+
+def explain(port_name: str, code: int | None) -> str:
+    """Return in one line why a port cannot be opened, with the remedy."""
+    if code == errno.ENOENT or code == errno.ENODEV or code == errno.ENXIO:
+        return f"no serial port {port_name}: plug the adapter in; ports here: {name_ports()}"
+    if code in (errno.EACCES, errno.EPERM):
+        return (
+            f"no permission to open {port_name}: join its group with "
+            "'sudo usermod -aG dialout $USER' and log in again"
+        )
+    if code in (errno.EBUSY, errno.EAGAIN):
+        held = ", ".join(port_users(port_name))
+        who = f", {held}," if held else ""
+        return f"{port_name} is busy: close the other program{who} that uses it"
+    reason = os.strerror(code) if code else "not a serial port"
+    return f"cannot open {port_name} ({reason}); ports here: {name_ports()}"
+
+
+def name_ports() -> str:
+    """Return the names of the serial ports as text."""
+    ports = [f"{port.device} ({port.description})" for port in list_ports.comports()]
+    return ", ".join(ports) or "none"
+
+
+POLOLU = "1ffb:"
+"""USB vendor of Pololu."""
+
+
+def is_i2c(device: str) -> bool:
+    """Return whether the name of a path is that of an I2C bus."""
+    return re.fullmatch(r"i2c-\d+", os.path.basename(os.path.realpath(device))) is not None
+
+
+def usb_id_of(device: str, ports: Sequence[SerialPort]) -> str:
+    """Return the USB vendor and product id of a port, "" if it has none or is not listed."""
+    real = os.path.realpath(device)
+    return next((port.usb for port in ports if os.path.realpath(port.device) == real), "")
+
+
+def check_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
+    """Check that packets of this kind of bus may be sent to a port.
+
+    Raises:
+        PortError: the port belongs to a board whose servos they would move.
+    """
+    if is_i2c(device) and kind != "pca9685":
+        raise PortError(
+            f"{device} is an I2C bus, not a serial port: name the adaptor's port with --port or in "
+            "the YAML, or set the kind of the bus to pca9685"
+        )
+    if kind != "maestro" and usb_id_of(device, ports).startswith(POLOLU):
+        raise PortError(
+            f"{device} is a board of Pololu: {kind} packets would move its servos; name the "
+            "adaptor's port with --port or in the YAML, or set its kind to maestro"
+        )

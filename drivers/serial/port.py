@@ -14,8 +14,7 @@ from dynamixel_sdk import PortHandler
 from serial import Serial, SerialException
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.serial.list_ports import persistent_name
-from gazerig.drivers.serial.open_error import explain
+from gazerig.drivers.serial.list_ports import explain, is_i2c, persistent_name
 
 try:
     import termios
@@ -398,3 +397,14 @@ def request_low_latency(port: Any) -> None:
         # Only some drivers have the setting (a terminal returns ENOTTY). Without it the bus works,
         # but more slowly.
         return
+
+
+def port_of(
+    path: str, exclusive: bool = True, on_traffic: Callable[[], None] | None = None
+) -> BusPort:
+    """Return the port at a path: an I2C bus of the kernel, or a serial port."""
+    if is_i2c(path):
+        from gazerig.drivers.i2c.port import I2cPort  # only Linux has such buses
+
+        return I2cPort(path, exclusive, on_traffic)
+    return BlockingPort(path, exclusive, on_traffic)

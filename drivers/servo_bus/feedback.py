@@ -11,10 +11,24 @@ from typing import TypeVar
 
 from gazerig.drivers.bus.plausibility import Plausibility
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.sync_packets import Expected, GroupRead
+from gazerig.drivers.servo_bus.read_plan import Expected, GroupRead
 from gazerig.drivers.servo_bus.sync_read import ServoReply
-from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import Feedback, ServoConfig
+
+
+def nearest_turn(steps: int, low: int, high: int, turn: int) -> int:
+    """Return the position with whole turns added so that it is nearest to the range low..high."""
+    if low <= steps <= high:
+        return steps
+    above = low + (steps - low) % turn
+    below = above - turn
+    if above <= high or above - high < low - below:
+        return above
+    if above - high > low - below:
+        return below
+    # Both are equally far: the servo's own count decides if it is one of them.
+    return below if steps < low else above
+
 
 ALIKE_C, ALIKE_TENTH_V = 3, 10
 """Largest difference of temperature and voltage between two consecutive answers."""

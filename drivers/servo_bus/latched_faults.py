@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 from math import inf
 from typing import Any
 
-from gazerig.drivers.servo_bus.read_windows import Sample
+from gazerig.drivers.servo_bus.read_plan import Sample
 from gazerig.drivers.servo_bus.supervisor import AGAIN_S, Supervisor
 from gazerig.drivers.servo_bus.torque import TRIPPED
 

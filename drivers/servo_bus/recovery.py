@@ -6,10 +6,11 @@ present position, and only then is torque switched on.
 
 from collections.abc import Collection, Mapping, Sequence
 
-from gazerig.drivers.bus.limit_recovery import entry_speed_steps_s
+from gazerig.drivers.bus.goal_limits import entry_speed_steps_s
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.servo_bus.faults import ServoHealth
+from gazerig.drivers.servo_bus.feedback import nearest_turn
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.torque import (
     find_faults,
@@ -19,7 +20,6 @@ from gazerig.drivers.servo_bus.torque import (
     write_verified,
 )
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import ServoConfig
 
 FAR_SIDE = "is beyond its encoder's zero: turn it into its range by hand"

@@ -4,12 +4,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from math import inf
 
-from gazerig.drivers.bus.limit_recovery import LimitRecovery
+from gazerig.drivers.bus.goal_limits import LimitRecovery
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.read_plan import ReadPlan
-from gazerig.drivers.servo_bus.read_windows import Sample
+from gazerig.drivers.servo_bus.read_plan import ReadPlan, Sample
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.torque import rearm_tripped
 from gazerig.drivers.servo_bus.transaction import TRIES, Transactions

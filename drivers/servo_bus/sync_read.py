@@ -10,9 +10,15 @@ from typing import NamedTuple
 
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.poll_list import PollList, silent_servos
-from gazerig.drivers.servo_bus.read_plan import ReadPlan
-from gazerig.drivers.servo_bus.read_windows import ReadWindow, Sample, WindowSchedule
-from gazerig.drivers.servo_bus.sync_packets import GroupRead, PartialReply, WholeAnswer
+from gazerig.drivers.servo_bus.read_plan import (
+    GroupRead,
+    PartialReply,
+    ReadPlan,
+    ReadWindow,
+    Sample,
+    WholeAnswer,
+    WindowSchedule,
+)
 from gazerig.drivers.servo_bus.transaction import Transactions
 
 MOST_GROUPS = 64

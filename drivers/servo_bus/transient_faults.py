@@ -4,7 +4,7 @@ from collections.abc import Collection
 from typing import Any
 
 from gazerig.drivers.bus.plausibility import DISTURBED_S
-from gazerig.drivers.servo_bus.read_windows import Sample
+from gazerig.drivers.servo_bus.read_plan import Sample
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 

@@ -13,9 +13,8 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
-from gazerig.drivers.vision.face.crops import crop_square
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import as_bgr
+from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
 from gazerig.drivers.vision.people import Network, anchors, confidences
 
 _SIDE_PX = 192

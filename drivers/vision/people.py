@@ -19,9 +19,8 @@ from gazerig.drivers.types import (
     DetectedPerson,
     ImageArray,
 )
-from gazerig.drivers.vision.face.crops import crop_square
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import as_bgr
+from gazerig.drivers.vision.face.preprocess import as_bgr, crop_square
 
 Floats = NDArray[np.float32]
 

@@ -23,8 +23,8 @@ from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
+from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.servo_bus.discovery import FoundServo, scan
 from gazerig.features.bringup.servo_families import KINDS
 

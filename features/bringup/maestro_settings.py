@@ -13,9 +13,8 @@ from math import ceil, floor
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from gazerig.drivers.bus.servo_models import servo_label
-from gazerig.drivers.hobby_board.models import US_STEPS
-from gazerig.drivers.maestro.commands import MICRO
-from gazerig.drivers.maestro.limits import accel_units, speed_units
+from gazerig.drivers.hobby_board.params import US_STEPS
+from gazerig.drivers.maestro.commands import MICRO, accel_units, speed_units
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoConfig
 

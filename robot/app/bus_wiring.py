@@ -8,8 +8,7 @@ from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.plugins import BUS, BusPlugin, describe_error, find, is_ours, load
-from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.port_by_path import port_of
+from gazerig.drivers.serial.port import BusPort, port_of
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import setups

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from gazerig.drivers.camera.pose_slot import PoseAt, PoseSlot
+from gazerig.drivers.camera.double_buffer import PoseAt, PoseSlot
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread

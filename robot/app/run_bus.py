@@ -4,8 +4,7 @@ import hashlib
 from collections.abc import Mapping
 
 from gazerig.config.rig import Rig
-from gazerig.drivers.serial.list_ports import serial_ports
-from gazerig.drivers.serial.port_owner import check_owner
+from gazerig.drivers.serial.list_ports import check_owner, serial_ports
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
 from gazerig.robot.app.emulation import emulated_lines, ideal_bus, place_of
 from gazerig.robot.app.options import RunOptions

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from gazerig.drivers.camera.pose_buffer import PoseBuffer
+from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.types import ServoBus
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 

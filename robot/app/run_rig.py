@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 from typing import TypeVar
 
 from gazerig.config.rig import Rig
+from gazerig.config.save_text import gestures_text, params_text, walk_text
 from gazerig.config.schema import load_rig, load_rules
-from gazerig.config.text import gestures_text, params_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from operator import add, mul, sub
 
-from gazerig.drivers.bus.limit_recovery import ENTRY_DEG_S
+from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.control.coupled_servos import CoupledServos

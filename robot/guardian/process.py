@@ -26,8 +26,7 @@ from typing import Any
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.port_by_path import port_of
+from gazerig.drivers.serial.port import BusPort, port_of
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, HangDetector, Heartbeat
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe
 from gazerig.robot.model.clock import RealClock

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import ceil, degrees, floor, radians
 from typing import Annotated, Literal, NamedTuple
 
-from gazerig.drivers.bus.limit_recovery import ENTRY_DEG_S
+from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
 from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.types import Vec3
 from gazerig.params import Bounds, Unit

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera import depth_roi
-from gazerig.drivers.camera.off_frame import is_off_frame
+from gazerig.drivers.camera.capture_loop import is_off_frame
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import (
     DetectedFace,

@@ -1,7 +1,7 @@
 """Motion detection in images, compensated for the camera's turn by the head's pose."""
 
-from gazerig.drivers.camera.frame_analysis import Motion
-from gazerig.drivers.camera.pose_buffer import PoseBuffer
+from gazerig.drivers.camera.capture_loop import Motion
+from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import CameraTurn, MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gazerig.drivers.camera.frame_analysis import Locate
+from gazerig.drivers.camera.capture_loop import Locate
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit

@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.camera.frame_analysis import Locate
+from gazerig.drivers.camera.capture_loop import Locate
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
 from gazerig.gaze.angles import norm, sub

@@ -6,7 +6,7 @@ Frames are not blurred, distorted, dropped or reordered, and the delay is consta
 from collections.abc import Callable
 from typing import Protocol
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Locate, Motion
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer, Locate, Motion
 from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector

@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
-from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
+from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build

@@ -32,10 +32,9 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
-from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
-from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
-from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.serial.port_by_path import port_of
+from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
+from gazerig.drivers.serial.port import BlockingPort, port_of
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.control.body import Body, setups

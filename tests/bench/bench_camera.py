@@ -20,10 +20,10 @@ import cv2
 import numpy as np
 from all_processors import on_all_processors
 
+from gazerig.drivers.camera.playback import Recording
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.recorder import CameraRecorder
 from gazerig.drivers.camera.recording_format import encode_shot
-from gazerig.drivers.camera.recording_reader import Recording
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.video_file import VideoFile

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from gazerig.drivers.i2c.port import I2cPort
-from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
+from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
 from gazerig.drivers.types import ServoConfig
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

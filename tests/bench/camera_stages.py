@@ -26,7 +26,7 @@ from seeing.material import MODELS, at_hand, background, eyes_at, noisy, paste, 
 from seeing.row_05_finding_and_placing import YUNET  # noqa: E402
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer  # noqa: E402
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer  # noqa: E402
 from gazerig.drivers.camera.source import Shot  # noqa: E402
 from gazerig.drivers.types import ImageArray  # noqa: E402
 from gazerig.drivers.vision.face.detector import face_detector  # noqa: E402

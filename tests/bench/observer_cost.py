@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text, walk_text
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore

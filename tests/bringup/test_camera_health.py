@@ -11,7 +11,7 @@ import pytest
 from present import present
 from seeing.material import background, carphone, noisy, paste, portrait
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.health import (
     FIELD_TEXT,

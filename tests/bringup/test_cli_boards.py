@@ -9,7 +9,7 @@ from served_rigs import hide_real_ports, rig_files, served
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.drivers.serial.port_by_path import port_of
+from gazerig.drivers.serial.port import port_of
 from gazerig.features.bringup.cli import ports
 from gazerig.sim_mock.devices import MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus

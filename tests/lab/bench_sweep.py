@@ -13,8 +13,8 @@ import time
 from rich.console import Console
 from rich.table import Table
 
+from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text
 from gazerig.features.lab.sweep.axes import Point
 from gazerig.features.lab.sweep.worker_pool import Job, WorkerPool
 from gazerig.robot.app.options import BUSES, RunOptions

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text, walk_text
 from gazerig.features.lab.cli.report import app
 from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import chance, compare, differences_of

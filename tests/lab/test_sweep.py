@@ -18,8 +18,8 @@ from child_processes import running
 from command_line import Invoked, invoked
 
 from gazerig.config.load import shipped
+from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import params_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.features.lab.simulated_run import simulate

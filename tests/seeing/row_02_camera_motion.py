@@ -39,7 +39,7 @@ from seeing.moving_room import (
     turn,
 )
 
-from gazerig.drivers.camera.pose_buffer import PoseBuffer
+from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import CameraTurn, MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
 
 from gazerig.config.load import load, shipped, shipped_names
-from gazerig.config.text import params_text
+from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.run.head_group import compose_group

@@ -4,11 +4,13 @@ Opening an absent device makes depthai search for more than ten seconds; listing
 half a second.
 """
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from gazerig.drivers.errors import CameraError
+from gazerig.drivers.extras import extra_hint
 
 UDEV_RULE = 'SUBSYSTEM=="usb", ATTRS{idVendor}=="03e7", MODE="0666"'
 """Rule that gives all users access to the camera (Luxonis documentation, troubleshooting)."""
@@ -83,3 +85,53 @@ def _plugged_in(usb: Path) -> bool:
         except OSError:  # unplugged at this moment
             continue
     return False
+
+
+_CURES = (
+    (("already_in_use", "already in use"), "another program uses it: end that"),
+    (
+        ("insufficient_permissions", "permission"),
+        "it may not be opened: set up Luxonis' udev rule, and plug it in again",
+    ),
+    (
+        ("after booting", "device_not_found", "no available devices"),
+        "it did not come back after it was started: use a USB 3 cable straight at the computer, "
+        "not a hub, and give it its power supply",
+    ),
+    (
+        ("out of memory", "not enough", "cannot allocate", "insufficient", "shaves", "cmx"),
+        "more is asked than its chip holds: set smaller frames, oak.depth: false or no oak.face_model",
+    ),
+    (
+        ("resolution", "sensor mode", "sensor config", "unsupported size"),
+        "its sensor has no frames of that size or rate: set oak.width_px and oak.height_px to "
+        "640 x 400, and oak.rate_hz to 30",
+    ),
+    (("host only",), "its nodes need a camera"),
+)
+"""Parts of messages, in lower case -> cause and remedy."""
+_OTHERWISE = "unplug it, wait a second, plug it in again; if another program uses it, end that"
+
+
+def start_cure(message: str) -> str:
+    """Return the remedy for an error at the start."""
+    lower = message.lower()
+    for parts, cure in _CURES:
+        if any(part in lower for part in parts):
+            return cure
+    return _OTHERWISE
+
+
+def load_depthai() -> Any:
+    """Import depthai and return the module.
+
+    Raises:
+        CameraError: it is not installed or does not start here.
+    """
+    os.environ["DEPTHAI_TELEMETRY"] = "0"
+    os.environ.setdefault("DEPTHAI_LEVEL", "off")
+    try:
+        import depthai
+    except ImportError as error:
+        raise CameraError(extra_hint("depthai", "oak", error)) from error
+    return depthai

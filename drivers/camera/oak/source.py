@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.camera.clock_sync import ClockSync
-from gazerig.drivers.camera.frame_rate import FrameRateMonitor
+from gazerig.drivers.camera.clock_sync import ClockSync, FrameRateMonitor
 from gazerig.drivers.camera.oak.abilities import full_line_text, supported_settings, usb2_text
 from gazerig.drivers.camera.oak.calibration import (
     OakCalibration,
@@ -19,7 +18,7 @@ from gazerig.drivers.camera.oak.calibration import (
     read_calibration,
     rotation_of,
 )
-from gazerig.drivers.camera.oak.discovery import find_oak
+from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.oak.messages import depth_of, faces_of, image_of, lens_of
 from gazerig.drivers.camera.oak.params import OakParams
@@ -30,8 +29,6 @@ from gazerig.drivers.camera.oak.pipeline import (
     imu_queue,
     join_outputs,
 )
-from gazerig.drivers.camera.oak.sdk import load_depthai
-from gazerig.drivers.camera.oak.start_faults import start_cure
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.affine import affine_residual
-from gazerig.drivers.vision.motion.image import Floats
+from gazerig.drivers.vision.motion.image import Floats, Grey
 from gazerig.drivers.vision.motion.optical_flow import Flow, Mask
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import MotionMask
@@ -189,3 +189,46 @@ def _extend(beyond: NDArray[np.uint8], edge: NDArray[np.uint8]) -> None:
     """Extend a patch that the image's edge cuts beyond it in one piece."""
     at = np.flatnonzero(edge)
     beyond[at[0] : at[-1] + 1] = 1
+
+
+_MARGIN_PX = 4
+# Smallest difference of a thing's pixels from the background (standard deviations, grey levels).
+_UNLIKE, _LEAST_LEVELS = 2.0, 12.0
+# Smallest share of a thing that must differ for its appearance to be used.
+_LEAST_SHARE = 0.25
+# Share of the last image's choice that is kept, so that the point does not jump back and forth.
+_KEPT = 0.5
+
+
+def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
+    """Return a pixel of the thing, (2,), near its centre.
+
+    grey: (h, w) image
+    middle: (2,) centre of the patch
+    offset: (2,) offset of the point from its centre in the previous image
+    """
+    apart = _standing_out(group, grey)
+    if apart.mean() < _LEAST_SHARE:
+        apart[:] = True
+    places = np.column_stack((group.x[apart], group.y[apart])).astype(np.float64)
+    wanted = middle + _KEPT * offset
+    out: Floats = places[int(np.argmin(((places - wanted) ** 2).sum(axis=1)))]
+    return out
+
+
+def _standing_out(group: Group, grey: Grey) -> Mask:
+    """Return a mask (n,) of a patch's pixels that differ in brightness from the background."""
+    x, y, width, height = group.box
+    left, top = max(0, x - _MARGIN_PX), max(0, y - _MARGIN_PX)
+    crop = grey[top : y + height + _MARGIN_PX, left : x + width + _MARGIN_PX].astype(np.float32)
+    outside = np.ones(crop.shape, dtype=np.float32)
+    outside[group.y - top, group.x - left] = 0.0
+    window = width + 2 * _MARGIN_PX, 2 * _MARGIN_PX + 1  # background is in horizontal strips
+    edge = cv2.BORDER_CONSTANT
+    count = np.maximum(cv2.blur(outside, window, borderType=edge), 1e-6)
+    mean = cv2.blur(crop * outside, window, borderType=edge) / count
+    square = cv2.blur(crop * crop * outside, window, borderType=edge) / count
+    spread = np.sqrt(np.maximum(square - mean * mean, 0.0))
+    unlike = np.abs(cv2.blur(crop, (3, 3)) - mean) > np.maximum(_UNLIKE * spread, _LEAST_LEVELS)
+    out: Mask = unlike[group.y - top, group.x - left]
+    return out

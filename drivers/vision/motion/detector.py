@@ -20,16 +20,17 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.affine import PatchMotion, fit_affine_warp, patch_motion
-from gazerig.drivers.vision.motion.anchor import anchor
 from gazerig.drivers.vision.motion.backprojection import (
     back_project,
     distance,
+    parallax,
     radius_m,
     small_depth,
     velocity,
 )
 from gazerig.drivers.vision.motion.clustering import (
     Group,
+    anchor,
     cluster_motion,
     fastest_quarter,
     inscribed_px,
@@ -63,7 +64,6 @@ from gazerig.drivers.vision.motion.optical_flow import (
     turn_homography,
     windows_of,
 )
-from gazerig.drivers.vision.motion.parallax import parallax
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import (
     ImageDifference,

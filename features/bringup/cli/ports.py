@@ -11,10 +11,8 @@ from rich.console import Console
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
-from gazerig.drivers.serial.list_ports import Host, SerialPort, serial_ports
-from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.port_by_path import port_of
-from gazerig.drivers.serial.port_owner import check_owner, usb_id_of
+from gazerig.drivers.serial.list_ports import Host, SerialPort, check_owner, serial_ports, usb_id_of
+from gazerig.drivers.serial.port import BusPort, port_of
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
 from gazerig.robot.app.emulation import emulated_lines

@@ -26,14 +26,14 @@ from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.files.file_output import write_file
 from gazerig.drivers.hobby_board.board import Board
-from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.probe import USB_CHANNELS
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.registers import CHANNELS, COUNTS, PulseClock
+from gazerig.drivers.serial.list_ports import POLOLU
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.types import ServoConfig
 from gazerig.features.bringup.channel_test import FINE_STEPS, ChannelPosition, give_pulses, walk
 from gazerig.features.bringup.cli import ports as bench

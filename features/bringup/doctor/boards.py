@@ -13,7 +13,7 @@ from typing import NamedTuple
 from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.maestro.commands import MICRO, MOST_INPUT
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.config.parameters import differences, flattened
+from gazerig.config.save_text import changes_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import changes_text
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.sweep.axes import Axis, Point, latin_shares, point_at
 from gazerig.features.lab.sweep.outcome import REPORT, VERDICT, Outcome, grade

@@ -8,7 +8,7 @@ from pathlib import Path
 import gazerig
 from gazerig.config.parameters import plain
 from gazerig.config.rig import Rig
-from gazerig.config.text import gestures_text, params_text, walk_text
+from gazerig.config.save_text import gestures_text, params_text, walk_text
 from gazerig.features.lab.sweep.axes import Axis, Point
 from gazerig.features.lab.sweep.outcome import Outcome
 from gazerig.features.lab.sweep.run_store import RunStore, run_store

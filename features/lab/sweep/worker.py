@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from gazerig.config.parameters import changed
 from gazerig.config.rig import Rig
-from gazerig.config.text import params_text
+from gazerig.config.save_text import params_text
 from gazerig.errors import Error
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import Point

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from gazerig.config.load import ConfigError, load
-from gazerig.config.text import params_text
+from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.extras import extra_hint
 from gazerig.features.world.figure import Figures

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gazerig.config.rig import Rig
-from gazerig.drivers.camera.frame_analysis import Locate
-from gazerig.drivers.camera.pose_buffer import PoseBuffer
+from gazerig.drivers.camera.capture_loop import Locate
+from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.worker import CameraParts

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from gazerig.drivers.camera.oak.calibration import OakCalibration, read_calibration
+from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import CameraError
