@@ -66,7 +66,10 @@ class BlinkFinder:
         elif t_s <= trace[-1][0]:
             return None
         else:
-            self._learn(opening, t_s - trace[-1][0])
+            if self._shut_s is None:  # quickly up and slowly down
+                share = (t_s - trace[-1][0]) / _OPEN_S
+                self._usual += (opening - self._usual) * min(1.0, 4 * share if opening > self._usual
+                                                             else share)  # fmt: skip
         trace.append((t_s, opening))
         if self._shut_s is None:
             while trace[0][0] < t_s - _BEFORE_S:
@@ -75,13 +78,6 @@ class BlinkFinder:
                 self._shut_s = t_s
             return None
         return self._wait(t_s, opening, self._shut_s)
-
-    def _learn(self, opening: float, dt_s: float) -> None:
-        """Follow the opening between blinks, quickly up and slowly down."""
-        if self._shut_s is None:
-            share = dt_s / _OPEN_S
-            self._usual += (opening - self._usual) * min(1.0, 4 * share if opening > self._usual
-                                                         else share)  # fmt: skip
 
     def _wait(self, t_s: float, opening: float, shut_s: float) -> BlinkEvent | None:
         """Wait for the lids to be open again, and for a little longer."""

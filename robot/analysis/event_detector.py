@@ -10,10 +10,10 @@ from math import degrees
 from typing import NamedTuple, TypeVar
 
 from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
-from gazerig.gaze.types import PARTS, Face, Vec3
+from gazerig.gaze.types import PARTS, Vec3
 from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 from gazerig.robot.analysis.lid_opening import UPPER, openings
-from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
+from gazerig.robot.analysis.saccade_finder import SaccadeFinder
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.types import GAZE_JOINTS
@@ -126,10 +126,6 @@ class EventDetector:
             if not self._saccades.under_way:
                 self._rest.update(tick, way)
             return () if blink is None else (blink,)
-        return self._landed(jump, blink)
-
-    def _landed(self, jump: Jump, blink: BlinkEvent | None) -> tuple[Event, ...]:
-        """Return the fixation that a saccade has ended, and the saccade."""
         events: list[Event] = [] if blink is None else [blink]
         fixation = self._rest.over(jump.onset_s)
         if fixation is not None:
@@ -245,7 +241,10 @@ def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:
     for face in tick.percept.faces:
         moved = scale(face.v_world_m_s, since_s)
         if beside_m(way, sub(add(face.p_world_m, moved), head)) <= NEAR_FACE_M:
-            return _nearest_part(way, face, sub(moved, head)), face.id
+            shift_m = sub(moved, head)
+            apart = [beside_m(way, add(p, shift_m)) for p in face.parts_world_m]
+            least = min(apart)
+            return (PARTS[apart.index(least)] if least <= NEAR_PART_M else None), face.id
     return None, -1
 
 
@@ -254,12 +253,6 @@ def beside_m(way: Vec3, rel_m: Vec3) -> float:
     if dot(way, rel_m) <= 0.0:
         return norm(rel_m)
     return norm(cross(way, rel_m))
-
-
-def _nearest_part(way: Vec3, face: Face, shift_m: Vec3) -> str | None:
-    apart = [beside_m(way, add(p, shift_m)) for p in face.parts_world_m]
-    least = min(apart)
-    return PARTS[apart.index(least)] if least <= NEAR_PART_M else None
 
 
 def _most(counts: Counter[T], otherwise: T) -> T:

@@ -29,7 +29,15 @@ def with_legend(
     ordered = sorted(shares.items(), key=lambda item: (item[0] == "elsewhere", -item[1]))
     largest = max(shares.values())
     for row, (part, share) in enumerate(ordered):
-        _row(panel, _ROWS_TOP + row * _ROW_PX, PART_NAMES.get(part, part), share, largest)
+        top = _ROWS_TOP + row * _ROW_PX
+        _write(panel, PART_NAMES.get(part, part), (28, top + 12), 0.48, _INK)
+        figure = f"{100.0 * share:.1f} %"
+        (wide, _), _ = cv2.getTextSize(figure, cv2.FONT_HERSHEY_SIMPLEX, 0.48, 1)
+        _write(panel, figure, (264 - wide, top + 12), 0.48, _INK)
+        wide = round(236 * share / largest) if largest > 0.0 else 0
+        cv2.rectangle(panel, (28, top + 18), (264, top + 24), (238, 238, 240), -1)
+        if wide > 0:
+            cv2.rectangle(panel, (28, top + 18), (28 + wide, top + 24), _BAR, -1)
     note = (28, _ROWS_TOP + len(ordered) * _ROW_PX + 20)
     _write(panel, "left and right: the face's own", note, 0.42, _SOFT)
     return np.hstack([image, panel])
@@ -45,17 +53,6 @@ def _scale(panel: Image, most_s_cm2: float, total_s: float) -> None:
         row = round(bottom - share * _SCALE_HIGH)
         cv2.line(panel, (62, row), (70, row), _SOFT, 1)
         _write(panel, f"{share * most_s_cm2:.2g}", (78, row + 5), 0.48, _INK)
-
-
-def _row(panel: Image, top: int, name: str, share: float, largest: float) -> None:
-    _write(panel, name, (28, top + 12), 0.48, _INK)
-    figure = f"{100.0 * share:.1f} %"
-    (wide, _), _ = cv2.getTextSize(figure, cv2.FONT_HERSHEY_SIMPLEX, 0.48, 1)
-    _write(panel, figure, (264 - wide, top + 12), 0.48, _INK)
-    wide = round(236 * share / largest) if largest > 0.0 else 0
-    cv2.rectangle(panel, (28, top + 18), (264, top + 24), (238, 238, 240), -1)
-    if wide > 0:
-        cv2.rectangle(panel, (28, top + 18), (28 + wide, top + 24), _BAR, -1)
 
 
 def _write(

@@ -81,7 +81,18 @@ class MutualGazeTrace:
 
     def update(self, number: int, tick: Tick) -> None:
         """Add a tick of the first head (0) or of the other (1)."""
-        self._newest[number] = _seen_head(self._places[number], tick)
+        place = self._places[number]
+        pose = tick.pose
+        middle = scale(add(pose.p_world_eye_left_m, pose.p_world_eye_right_m), 0.5)
+        measures = measures_of(pose.p_world_eye_left_m, pose.p_world_eye_right_m)
+        nose = add(pose.p_world_head_m, rotate(pose.R_world_head, measures.nose_m))
+        self._newest[number] = _SeenHead(
+            add(place.p_m, rotate(place.R, middle)),
+            rotate(place.R, cyclopean(tick)),
+            compose(place.R, pose.R_world_head),
+            add(place.p_m, rotate(place.R, nose)),
+            measures.interocular_m / PUPIL_DISTANCE_M,
+        )
         first, second = self._newest
         if number == 0 and first is not None and second is not None:
             looks = _looks_at(first, second), _looks_at(second, first)
@@ -122,7 +133,15 @@ def mutual_gaze(t_s: Floats, first: Mask, second: Mask) -> dict[str, object]:
     whole = [(b, e) for b, e in episodes if b > 0 and e < len(t_s)]
     lengths = np.array([t_s[e] - t_s[b] for b, e in whole])
     by_first = sum(not first[e] for _, e in whole)
-    answers = np.array(_answers(t_s, first, second))
+    found = []
+    for one, other in ((first, second), (second, first)):
+        for begin, end in zip(*edges(one), strict=True):
+            if begin == 0 or other[begin]:
+                continue
+            back = np.flatnonzero(other[begin:end])
+            if len(back):
+                found.append(float(t_s[begin + back[0]] - t_s[begin]))
+    answers = np.array(found)
     return {
         "seconds": round(float(t_s[-1] - t_s[0]), 3),
         "first_looks": _share(first),
@@ -138,20 +157,6 @@ def mutual_gaze(t_s: Floats, first: Mask, second: Mask) -> dict[str, object]:
         "answered_after_s": _rounded(np.median(answers)) if len(answers) else None,
         "answers": len(answers),
     }
-
-
-def _seen_head(place: HeadPlace, tick: Tick) -> _SeenHead:
-    pose = tick.pose
-    middle = scale(add(pose.p_world_eye_left_m, pose.p_world_eye_right_m), 0.5)
-    measures = measures_of(pose.p_world_eye_left_m, pose.p_world_eye_right_m)
-    nose = add(pose.p_world_head_m, rotate(pose.R_world_head, measures.nose_m))
-    return _SeenHead(
-        add(place.p_m, rotate(place.R, middle)),
-        rotate(place.R, cyclopean(tick)),
-        compose(place.R, pose.R_world_head),
-        add(place.p_m, rotate(place.R, nose)),
-        measures.interocular_m / PUPIL_DISTANCE_M,
-    )
 
 
 def _looks_at(one: _SeenHead, other: _SeenHead) -> bool:
@@ -186,19 +191,6 @@ def _by_chance(first: Mask, second: Mask, shifts: int = 50) -> float:
     """Return the mean share of both when the second's looks are moved around in time."""
     steps = np.linspace(0, len(first), shifts + 2)[1:-1].astype(int)
     return _rounded(np.mean([np.mean(first & np.roll(second, step)) for step in steps]))
-
-
-def _answers(t_s: Floats, first: Mask, second: Mask) -> list[float]:
-    """Return how long after one's look began the other looked back, while that look lasted."""
-    found = []
-    for one, other in ((first, second), (second, first)):
-        for begin, end in zip(*edges(one), strict=True):
-            if begin == 0 or other[begin]:
-                continue
-            back = np.flatnonzero(other[begin:end])
-            if len(back):
-                found.append(float(t_s[begin + back[0]] - t_s[begin]))
-    return found
 
 
 def _share(mask: Mask) -> float:

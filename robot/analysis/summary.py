@@ -70,7 +70,13 @@ class Summary:
                 continue
             # A fixation is judged by the speed of the gaze, as an eye tracker does.
             if angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s:
-                error_rad = _gaze_error_rad(t_s, pose, target, left, right)
+                # Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
+                point = add(
+                    target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s))
+                )
+                off_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
+                off_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
+                error_rad = 0.5 * (off_left + off_right)
                 self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
         self._waiting.clear()
 
@@ -99,17 +105,6 @@ class Summary:
 def cyclopean(tick: Tick) -> Vec3:
     """Return the mean of both measured lines of sight: a unit vector in the world."""
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
-
-
-def _gaze_error_rad(t_s: float, pose: GazeState, target: Target, left: Vec3, right: Vec3) -> float:
-    """Return the mean angle of both measured lines of sight off the intended point.
-
-    Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
-    """
-    point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s)))
-    off_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
-    off_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
-    return 0.5 * (off_left + off_right)
 
 
 def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:

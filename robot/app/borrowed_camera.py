@@ -12,7 +12,7 @@ from functools import partial
 
 from gazerig.drivers.camera.browser_source import FIELD_DEG, BrowserSource
 from gazerig.drivers.camera.capture_loop import BACK, LOST
-from gazerig.drivers.camera.jpeg_slot import JpegSlot
+from gazerig.drivers.camera.double_buffer import JpegSlot
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import SetupError
@@ -95,7 +95,12 @@ class BorrowedCamera:
         if process is None:
             return self.own.latest(now_s)
         if self._now_s() - self._pictures.came_s > SILENT_S:
-            self._give_back(process)
+            self._process = None
+            threading.Thread(target=process.close, name="browser camera", daemon=True).start()
+            if self.lent:
+                self.lent = False
+                self._place()
+                self._events.append(_ENDS)
             return self.own.latest(now_s)
         found = process.latest(now_s)
         if found is None:  # its networks are loading
@@ -105,14 +110,6 @@ class BorrowedCamera:
             self._place()
             self._events.append(_BEGINS)
         return found
-
-    def _give_back(self, process: CameraProcess) -> None:
-        self._process = None
-        threading.Thread(target=process.close, name="browser camera", daemon=True).start()
-        if self.lent:
-            self.lent = False
-            self._place()
-            self._events.append(_ENDS)
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""

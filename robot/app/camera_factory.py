@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from gazerig.config.rig import Rig
-from gazerig.drivers.camera import sources
+from gazerig.drivers.camera import camera_plugins
 from gazerig.drivers.camera.browser_source import FIELD_DEG
 from gazerig.drivers.camera.camera_plugins import (
     CheckedSource,
@@ -17,7 +17,8 @@ from gazerig.drivers.camera.camera_plugins import (
     create_plugin_source,
     is_source,
 )
-from gazerig.drivers.camera.frame_analysis import Locate, Motion
+from gazerig.drivers.camera.capture_loop import Locate, Motion
+from gazerig.drivers.camera.double_buffer import PoseBuffer, PoseSlot
 from gazerig.drivers.camera.guarded_camera import (
     CLOSE_PROCESS_S,
     OPEN_PROCESS_S,
@@ -25,8 +26,6 @@ from gazerig.drivers.camera.guarded_camera import (
 )
 from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S
 from gazerig.drivers.camera.orientation import FrameOrientation, UprightSource, upright
-from gazerig.drivers.camera.pose_buffer import PoseBuffer
-from gazerig.drivers.camera.pose_slot import PoseSlot
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
@@ -431,13 +430,13 @@ def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
 def _raw_source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return a factory of the source of frames as the camera delivers them."""
     if options.replay is not None:
-        return partial(sources.recording, options.replay)
+        return partial(camera_plugins.recording, options.replay)
     if options.video is not None:
-        return partial(sources.film, _path(options))
+        return partial(camera_plugins.film, _path(options))
     if options.oak or options.camera == "oak":
-        return partial(sources.oak, rig.oak)
+        return partial(camera_plugins.oak, rig.oak)
     number = options.camera if isinstance(options.camera, int) else 0
-    return partial(sources.webcam, number, rig.webcam)
+    return partial(camera_plugins.webcam, number, rig.webcam)
 
 
 def _path(options: RunOptions) -> str:

@@ -120,20 +120,16 @@ def _keys(
     else:
         times = times_s - start_s
     if joint in LIDS:
-        values = _factors(rig, joint, float(angles_deg[0]), values)
+        first_deg = float(angles_deg[0])
+        shut, wide = rig.lid_joints.ends_deg(joint)
+        if shut is None or wide is None:
+            raise SetupError(f"{joint}: the rig does not define its shut and open angles")
+        opening = (first_deg - shut) / (wide - shut)
+        if opening < 0.2:
+            raise SetupError(f"{joint}: it begins nearly shut; begin with open lids")
+        values = np.clip(1.0 + values / (wide - shut) / opening, 0.0, 3.0)
     pairs = {round(float(t) / GRID_S): float(v) for t, v in zip(times, values, strict=True)}
     return [(round(k * GRID_S, 3), round(v, 3)) for k, v in pairs.items() if k > 0]
-
-
-def _factors(rig: Rig, lid: str, first_deg: float, values_deg: Floats) -> Floats:
-    """Return openings over the first opening, of a lid at these angles."""
-    shut, wide = rig.lid_joints.ends_deg(lid)
-    if shut is None or wide is None:
-        raise SetupError(f"{lid}: the rig does not define its shut and open angles")
-    opening = (first_deg - shut) / (wide - shut)
-    if opening < 0.2:
-        raise SetupError(f"{lid}: it begins nearly shut; begin with open lids")
-    return np.clip(1.0 + values_deg / (wide - shut) / opening, 0.0, 3.0)
 
 
 def _mean(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -45,7 +45,6 @@ from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.model.coupling_params import pairs_of, partners
 from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles
@@ -167,27 +166,24 @@ class LiveParams:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         before, self.rig = self.rig, ready.rig
         walk = ready.walk or self._walk
-        self._put_gaze(before, self.rig, walk)
-        self._walk = walk
-        said = self._put_machine(before, self.rig)
-        return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)
-
-    def _put_gaze(self, old: Rig, new: Rig, walk: Walk) -> None:
-        parts, was, now = self.parts, old.gaze, new.gaze
+        new, parts, was, now = ready.rig, self.parts, before.gaze, ready.rig.gaze
         for name in _ALIKE:
             if getattr(now, name) != getattr(was, name):
                 getattr(parts, name).retune(getattr(now, name))
         if now.scanpath != was.scanpath or walk != self._walk:
             parts.scanpath.retune(now.scanpath, walk)
-        bounds = (new.joints, new.ranges) != (old.joints, old.ranges)
-        if now.oculomotor != was.oculomotor or (bounds and eye_limits(new) != eye_limits(old)):
+        bounds = (new.joints, new.ranges) != (before.joints, before.ranges)
+        if now.oculomotor != was.oculomotor or (bounds and eye_limits(new) != eye_limits(before)):
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
-        if now.head != was.head or (bounds and head_limits(new) != head_limits(old)):
+        if now.head != was.head or (bounds and head_limits(new) != head_limits(before)):
             parts.head.retune(now.head, *head_limits(new))
-        if (tables := animation_tables(new)) != animation_tables(old):
+        if (tables := animation_tables(new)) != animation_tables(before):
             parts.animation.retune(tables)
-        if now.gestures != was.gestures or new.lid_joints != old.lid_joints:
+        if now.gestures != was.gestures or new.lid_joints != before.lid_joints:
             parts.gestures.retune(now.gestures, lid_spans(new))
+        self._walk = walk
+        said = self._put_machine(before, new)
+        return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)
 
     def _put_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
         parts = self.parts
@@ -226,7 +222,18 @@ class LiveParams:
             parts.guard.retune(new.guard, limits(joints))
         if not others:
             return ()
-        return _exceeding_joints(parts.body.names, limits(joints), parts.body.reach())
+        more = [
+            name
+            for name, desired, most in zip(
+                parts.body.names, limits(joints), parts.body.reach(), strict=True
+            )
+            if desired.low_rad < most.low_rad - 1e-6
+            or desired.high_rad > most.high_rad + 1e-6
+            or desired.speed_rad_s > most.speed_rad_s + 1e-6
+        ]
+        if not more:
+            return ()
+        return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)
 
     def _keep_servos(self, rig: Rig) -> dict[str, JointParams]:
         """Return the joints with the servos that the bus was opened with."""
@@ -262,19 +269,3 @@ def _prepare(command: Tune, base: Rig, rig: Rig) -> _Ready:
     name = rig.gaze.scanpath.transition_matrix
     walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
     return _Ready(command.changes, base, rig, walk)
-
-
-def _exceeding_joints(
-    joints: tuple[str, ...], wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]
-) -> tuple[str, ...]:
-    """Return the joints whose limits exceed the setup of their servos."""
-    more = [
-        name
-        for name, desired, most in zip(joints, wanted, reach, strict=True)
-        if desired.low_rad < most.low_rad - 1e-6
-        or desired.high_rad > most.high_rad + 1e-6
-        or desired.speed_rad_s > most.speed_rad_s + 1e-6
-    ]
-    if not more:
-        return ()
-    return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)

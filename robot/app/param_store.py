@@ -204,7 +204,16 @@ class ParamStore:
                     self._reload()
             state = self._state
             wanted = flattened(state.rig, differences(state.saved, state.rig))
-            _refuse_lists(wanted)
+            # These do not fit in a single line.
+            faults = [
+                ConfigFault(
+                    "", None, key, "", "holds mappings: change it in the file, which is read again"
+                )
+                for key, value in wanted.items()
+                if isinstance(value, tuple) and any(isinstance(item, Mapping) for item in value)
+            ]
+            if faults:
+                raise ConfigError(faults)
             layers, good = self._layers(state), state.files.own
             target = rig_file(state.name)
             if copied:
@@ -257,7 +266,10 @@ class ParamStore:
         kept = {
             key: value
             for key, value in differences(before.saved, before.rig).items()
-            if not any(_overlap(key, other) for other in edited)
+            if not any(
+                f"{key}.".startswith(f"{other}.") or f"{other}.".startswith(f"{key}.")
+                for other in edited
+            )
         }
         return self._put(state, changed(state.saved, kept))
 
@@ -291,17 +303,6 @@ def _defaults(rig: Rig) -> Rig:
     return load_rig(rig.name if rig.name in shipped_names("rigs") else _DEFAULTS)
 
 
-def _refuse_lists(wanted: Mapping[str, Value]) -> None:
-    """Refuse values that do not fit in a single line."""
-    faults = [
-        ConfigFault("", None, key, "", "holds mappings: change it in the file, which is read again")
-        for key, value in wanted.items()
-        if isinstance(value, tuple) and any(isinstance(item, Mapping) for item in value)
-    ]
-    if faults:
-        raise ConfigError(faults)
-
-
 def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ParamChange, ...]:
     """Return each value that differs, as YAML; was: the former values."""
     found = flattened(after, differences(before, after))
@@ -321,8 +322,3 @@ def _text(value: Value) -> str:
         return written(value)
     except EditRefused:
         return str(value)
-
-
-def _overlap(one: str, other: str) -> bool:
-    """Return whether two keys are the same or one contains the other."""
-    return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")

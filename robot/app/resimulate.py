@@ -14,8 +14,8 @@ from typing import Literal, NamedTuple
 
 from gazerig.config.load import ConfigError, load, shipped
 from gazerig.config.rig import Rig
+from gazerig.config.save_text import gesture_files, params_text
 from gazerig.config.schema import load_rig
-from gazerig.config.text import gesture_files, params_text
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Substitutes, assemble
@@ -223,7 +223,9 @@ class _Comparison:
         self.ticks += 1
         self._was.update(was)
         self._is.update(now)
-        differs = _difference(was, now)
+        pairs = zip(_Decisions._fields, _decisions(was), _decisions(now), strict=True)
+        name = next((name for name, then, again in pairs if then != again), None)
+        differs = f"{name}: {_short(was, now, name)}" if name is not None else ""
         if not differs:
             self._agreeing += 1
         elif self._first_s is None:
@@ -261,13 +263,6 @@ def _decisions(tick: Tick) -> _Decisions:
         repr(tick.guard_result.command_rad),
         tick.guard_result.level,
     )
-
-
-def _difference(was: Tick, now: Tick) -> str:
-    """Return the first difference of two ticks, "" if there is none."""
-    pairs = zip(_Decisions._fields, _decisions(was), _decisions(now), strict=True)
-    name = next((name for name, then, again in pairs if then != again), None)
-    return f"{name}: {_short(was, now, name)}" if name is not None else ""
 
 
 def _short(was: Tick, now: Tick, name: str) -> str:

@@ -25,8 +25,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
 from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.dashboard.feed.param_feed import ParamFeed
-from gazerig.robot.dashboard.feed.publisher import Publisher
+from gazerig.robot.dashboard.feed.publisher import ParamFeed, Publisher
 from gazerig.robot.dashboard.feed.status_line import StatusLine
 from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
 from gazerig.robot.dashboard.requests.request_handler import PageRequestHandler

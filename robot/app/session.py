@@ -26,7 +26,7 @@ from gazerig.robot.app.surroundings import RunRoom
 from gazerig.robot.control.event_text import group_events, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
-from gazerig.robot.control.loop import LoopCount, Robot, Tick, TickLoop
+from gazerig.robot.control.loop import LoopCount, Tick, TickLoop
 from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.control.real_time import SWITCH_INTERVAL
@@ -130,12 +130,17 @@ class Session:
     ) -> None:
         options, made = composed.options, composed.made
         self._options, self._made, self._stopped = options, made, stopped
-        self._say = say = _suppress_errors(say)
+
+        def tried(line: str) -> None:  # a failed message ends nothing
+            with contextlib.suppress(Exception):
+                say(line)
+
+        self._say = tried
         self._run_observers = RunObservers(
-            made, options, say, status, composed.tuning, composed.recorder, browse=browse
+            made, options, tried, status, composed.tuning, composed.recorder, browse=browse
         )
         self._summary = Summary() if summarised else None
-        self._faults = JointFaults(say, self._run_observers.busy)
+        self._faults = JointFaults(tried, self._run_observers.busy)
         scene = made.scene
         self._score = SceneScore.of(scene) if summarised and scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
@@ -144,14 +149,6 @@ class Session:
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
         self._unreleased: tuple[str, ...] = ()
-        self._observers = self._all_observers()
-        if watch is not None:
-            self._observers.add("the program", watch)
-        _send_initial(made.robot, options)
-        self._longest_s = _longest_s(made, options)
-        self._interrupts = Interrupts.of(stopped)
-
-    def _all_observers(self) -> Observers:
         observers = Observers(self._say)
         if self._summary is not None:
             observers.add("the summary", self._summary.update)
@@ -163,7 +160,16 @@ class Session:
         if self._face_gaze is not None:
             observers.add("the heat map", self._face_gaze.update)
         observers.add("the log", self._log)
-        return observers
+        if watch is not None:
+            observers.add("the program", watch)
+        try:
+            for menu, choice in options.choices:
+                made.robot.ask(menu, choice)
+        except ValueError as error:
+            raise SetupError(str(error)) from error
+        self._observers = observers
+        self._longest_s = _longest_s(made, options)
+        self._interrupts = Interrupts.of(stopped)
 
     def _log(self, tick: Tick) -> None:
         """Print the events of a tick."""
@@ -225,7 +231,10 @@ class Session:
                 leaving.switch_on(lambda: made.robot.start(made.clock, self._interrupts.refuse))
                 begun = True
                 self._start_s = made.clock.now_s()
-                for note in (*made.notes, *self._start_events()):
+                events, options = self._made.robot.body.bus.events(), self._options
+                if options.mock and not options.verbose:  # without registers of emulated servos
+                    events = tuple([event for event in events if not is_register_change(event)])
+                for note in (*made.notes, *group_events(events)):
                     say(note)
                 run_observers.open()
                 loop = TickLoop(
@@ -242,13 +251,6 @@ class Session:
             else:
                 run_observers.give_up()
 
-    def _start_events(self) -> list[str]:
-        """Return the events of the bus at the start; without the registers of emulated servos."""
-        events, options = self._made.robot.body.bus.events(), self._options
-        if options.mock and not options.verbose:
-            events = tuple([event for event in events if not is_register_change(event)])
-        return group_events(events)
-
     def _unwritten_heatmap(self) -> Path | None:
         """Write the heat map if requested; return its file if that failed."""
         out = self._options.heatmap
@@ -262,30 +264,11 @@ class Session:
         return None
 
 
-def _suppress_errors(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Return ``say`` without its exceptions, so that a failed message ends nothing."""
-
-    def tried(line: str) -> None:
-        with contextlib.suppress(Exception):
-            say(line)
-
-    return tried
-
-
 def _longest_s(made: Assembly, options: RunOptions) -> float | None:
     """Return the duration of the run, s: as given, or a scene's round in simulated time."""
     if options.seconds is None and options.fast and made.scene is not None:
         return made.scene.round_s + 1.0  # and the end of the round
     return options.seconds
-
-
-def _send_initial(robot: Robot, options: RunOptions) -> None:
-    """Send the commands that apply from the start of the run."""
-    try:
-        for menu, choice in options.choices:
-            robot.ask(menu, choice)
-    except ValueError as error:
-        raise SetupError(str(error)) from error
 
 
 def _draw_heatmap(

@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from math import inf
 from typing import Annotated, Any
 
@@ -52,7 +52,11 @@ def level(
 ) -> None:
     """Set a level, such as a jaw by loudness, while this command runs; then it falls to 0."""
     with clear_errors():
-        values = _lines(sys.stdin) if value == "-" else _kept(_number(value), seconds)
+        values = (
+            (_number(line) for line in sys.stdin if line.strip())
+            if value == "-"
+            else _kept(_number(value), seconds)
+        )
         with RobotClient.connect(pid, "gazerig ctl level") as rig:
             with contextlib.suppress(KeyboardInterrupt):
                 for one in values:
@@ -100,11 +104,6 @@ def _kept(value: float, seconds: float | None) -> Iterator[float]:
     while (now_s := clock.now_s()) < end_s:
         clock.sleep_until(min(end_s, now_s + _SET_EVERY_S))
         yield value
-
-
-def _lines(lines: Iterable[str]) -> Iterator[float]:
-    """Return the number of every line as it comes."""
-    return (_number(line) for line in lines if line.strip())
 
 
 def _number(text: str) -> float:

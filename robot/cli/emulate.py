@@ -67,7 +67,10 @@ def emulate(
             raise SetupError(
                 f"name a rig, or its servos: --servos {EXAMPLE}, --maestro 12 or --pca9685 0x40"
             )
-        _see_what_fits(maestro is not None, firmware, device, crc)
+        if maestro is not None and firmware is not None:
+            raise SetupError("--firmware: a Maestro does not tell its version over this line")
+        if maestro is None and (crc or device is not None):
+            raise SetupError(f"{'--crc' if crc else '--device'}: only with --maestro")
         if servos is not None:
             devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, options.DEFAULT_BAUD)}
         elif maestro is not None:
@@ -77,7 +80,11 @@ def emulate(
         else:
             devices = _of_rig(rig or "", firmware)
         line = LineOptions(baud, any_baud, wire_time, turnaround_us, link)
-        _serve(ServerSettings(_chosen(_buses(devices, line), case or []), until_eof))
+        served = ServerSettings(_chosen(_buses(devices, line), case or []), until_eof)
+        try:
+            run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
+        except ValueError as error:
+            raise SetupError(str(error)) from None
 
 
 class LineOptions(NamedTuple):
@@ -109,30 +116,6 @@ def _buses(devices: Mapping[str, Emulated], line: LineOptions) -> list[BusSettin
         )
         for name, device in devices.items()
     ]
-
-
-def _serve(served: ServerSettings) -> None:
-    """Answer until Ctrl-C, or the end of standard input.
-
-    Raises:
-        SetupError: the settings do not fit the servos.
-    """
-    try:
-        run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
-    except ValueError as error:
-        raise SetupError(str(error)) from None
-
-
-def _see_what_fits(board: bool, firmware: int | None, device: int | None, crc: bool) -> None:
-    """Refuse options that mean nothing for what is emulated.
-
-    Raises:
-        SetupError: names the option.
-    """
-    if board and firmware is not None:
-        raise SetupError("--firmware: a Maestro does not tell its version over this line")
-    if not board and (crc or device is not None):
-        raise SetupError(f"{'--crc' if crc else '--device'}: only with --maestro")
 
 
 def _board(channels: int, device: int | None, crc: bool) -> MaestroLine:

@@ -24,7 +24,10 @@ def main() -> None:
     hold_standard_files()
     try:
         if is_quick(sys.argv[1:], os.environ):
-            _quick()
+            from gazerig.robot.cli.terminal import run_app
+            from gazerig.robot.cli.tune import app
+
+            run_app(app, sys.argv[1:], "try with --debug")
         else:
             from gazerig.robot.cli.main import main as whole
 
@@ -69,10 +72,3 @@ def is_quick(arguments: Sequence[str], environ: Mapping[str, str]) -> bool:
         named = len(begun) > 1 or typed.endswith(" ")
         return named and begun[:1] != [] and begun[0] in QUICK
     return bool(arguments) and arguments[0] in QUICK and not _ELSEWHERE & set(arguments)
-
-
-def _quick() -> None:
-    from gazerig.robot.cli.terminal import run_app
-    from gazerig.robot.cli.tune import app
-
-    run_app(app, sys.argv[1:], "try with --debug")

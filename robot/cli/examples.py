@@ -131,7 +131,7 @@ def add_examples(app: typer.Typer, given: Mapping[str, Examples], within: str = 
         within: the group that it is in, "" for none.
     """
     for command in app.registered_commands:
-        name = command.name or _dashed(command.callback)
+        name = command.name or str(getattr(command.callback, "__name__", "")).replace("_", "-")
         examples = given.get(f"{within} {name}") or given.get(name)
         if examples:
             command.epilog = epilog(examples)
@@ -172,7 +172,3 @@ def complete_world(incomplete: str) -> list[str]:
     from gazerig.robot.app.surroundings import surroundings_names
 
     return [name for name in surroundings_names() if name.startswith(incomplete)]
-
-
-def _dashed(callback: object) -> str:
-    return str(getattr(callback, "__name__", "")).replace("_", "-")

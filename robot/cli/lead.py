@@ -65,14 +65,12 @@ def look(
                 say("it looks freely")
                 return
             reply = rig.give(command._replace(who=rig.who, stay=stay))
-            until = "gazerig ctl look free" if stay else _until(seconds)
+            until = "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
+            if stay:
+                until = "gazerig ctl look free"
             say(f"{reply.text()}, until: {until}")
             if not stay:
                 _lead_on(rig, inf if seconds is None else seconds)
-
-
-def _until(seconds: float | None) -> str:
-    return "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
 
 
 def _lead_on(rig: RobotClient, seconds: float) -> None:

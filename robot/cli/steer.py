@@ -96,7 +96,10 @@ def lead(
         try:
             for gesture in pressed:
                 if gesture in GESTURES:
-                    _play(rig, gesture)
+                    if gesture == "wink":
+                        rig.ask("lids", "wink left")
+                    else:
+                        rig.play(gesture)
             if wanted is not None and (wanted != looks or not rig.leads):
                 rig.give(LookAtDirection(wanted, "world", _FAR_M, rig.who))
             elif wanted is None and looks is not None:
@@ -106,14 +109,6 @@ def lead(
             show(str(error))
         looks = wanted
         clock.sleep_until(now_s + _EVERY_S)
-
-
-def _play(rig: RobotClient, gesture: str) -> None:
-    """Play a gesture, or wink."""
-    if gesture == "wink":
-        rig.ask("lids", "wink left")
-    else:
-        rig.play(gesture)
 
 
 class KeyControls:

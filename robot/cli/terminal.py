@@ -115,7 +115,8 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
                 signal.signal(signal.SIGINT, signal.default_int_handler)
             app(arguments)
         finally:
-            _flush_stdout()
+            if sys.stdout is not None:
+                sys.stdout.flush()
     except SystemExit as end:
         code = end.code
         if code == INTERRUPTED:
@@ -142,11 +143,6 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
     finally:
         threading.excepthook = before
     sys.exit(code)
-
-
-def _flush_stdout() -> None:
-    if sys.stdout is not None:
-        sys.stdout.flush()
 
 
 def _drop_stdout() -> None:

@@ -93,7 +93,9 @@ class _Builder:
                 self._add_lid(name)
         for name in further(rig.joints):
             if name not in LOWER_NECK:
-                self._add_further(name)
+                place, axis = parts.further_axis(name, self._measures)
+                joint = self._joint(name, axis)
+                self._links.append(parts.further(link_of(name), HEAD, place, joint, self._measures))
         self._links.insert(first, self._head(neck, self._links[first:]))
         camera = self._add_camera()
         # The links of the neck overlap each other, the shoulders and the head.
@@ -221,11 +223,6 @@ class _Builder:
             )
         ]
         return parts.meeting_rad(spans[0], spans[1])
-
-    def _add_further(self, name: str) -> None:
-        place, axis = parts.further_axis(name, self._measures)
-        joint = self._joint(name, axis)
-        self._links.append(parts.further(link_of(name), HEAD, place, joint, self._measures))
 
     def _add_camera(self) -> CameraFrame:
         camera = self._rig.camera

@@ -5,7 +5,6 @@ about the axis in its extras, and moves its children. y is up, as glTF wants it,
 under a root that turns z up.
 """
 
-from collections.abc import Collection
 from math import atan, tan
 from typing import Any
 
@@ -46,7 +45,9 @@ def gltf(description: Description) -> bytes:
         parent = link.parent or _ROOT
         R, p = (link.R, link.p_m) if link.parent else (_Y_UP, ORIGIN)
         if link.joint is not None:
-            node = _free(link.joint.name, {*names, *joints})
+            node = link.joint.name  # may be called as a link is
+            while node in names or node in joints:
+                node += "_"
             R = compose(R, turn_about(link.joint.axis, link.joint.awake_rad))
             scene.graph.update(frame_from=parent, frame_to=node, matrix=_matrix(R, p))
             joints[node] = {
@@ -71,7 +72,12 @@ def gltf(description: Description) -> bytes:
             if node["name"] in joints:
                 node["extras"] = joints[node["name"]]
         _add_camera(tree, description)
-        _mark_buffers(tree)
+        # Which parts of the buffer are vertices and which are faces; trimesh leaves that open.
+        views, accessors = tree["bufferViews"], tree["accessors"]
+        for primitive in (one for mesh in tree["meshes"] for one in mesh["primitives"]):
+            for accessor in primitive["attributes"].values():
+                views[accessors[accessor]["bufferView"]]["target"] = _VERTICES
+            views[accessors[primitive["indices"]]["bufferView"]]["target"] = _FACES
 
     exported: Any = export_glb(  # type: ignore[no-untyped-call]
         scene, include_normals=True, tree_postprocessor=complete
@@ -90,23 +96,6 @@ def _add_camera(tree: dict[str, Any], description: Description) -> None:
     tree["nodes"].append(node)
     (optical,) = (node for node in tree["nodes"] if node["name"] == camera.optical)
     optical.setdefault("children", []).append(len(tree["nodes"]) - 1)
-
-
-def _mark_buffers(tree: dict[str, Any]) -> None:
-    """Mark which parts of the buffer are vertices and which are faces; trimesh leaves that open."""
-    for mesh in tree["meshes"]:
-        for primitive in mesh["primitives"]:
-            for accessor in primitive["attributes"].values():
-                tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = _VERTICES
-            view = tree["accessors"][primitive["indices"]]["bufferView"]
-            tree["bufferViews"][view]["target"] = _FACES
-
-
-def _free(name: str, taken: Collection[str]) -> str:
-    """Return a node's name that is not taken; a joint may be called as a link is."""
-    while name in taken:
-        name += "_"
-    return name
 
 
 def _mesh(visual: Visual) -> Any:

@@ -119,19 +119,13 @@ def measures_of(left_m: Vec3, right_m: Vec3, pivot_m: Vec3 | None = None) -> Hea
 
 def field(points: Floats) -> Floats:
     """Return how far points (n, 3) are outside the head."""
-    folded = _folded(points)
+    folded = points * (1.0, 1.0, 1.0)
+    folded[:, 1] = np.abs(folded[:, 1])
     solid = carve(_unopened(folded), _SOCKET(folded), 0.06)
     folded[:, 2] = smiling(folded[:, 1], folded[:, 2])
     for part, round_by in _LIPS:
         solid = union(solid, part(folded), round_by)
     return solid
-
-
-def _folded(points: Floats) -> Floats:
-    """Return points moved to the left half, which the right one mirrors."""
-    folded = points * (1.0, 1.0, 1.0)
-    folded[:, 1] = np.abs(folded[:, 1])
-    return folded
 
 
 def _unopened(points: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.mesh import Mesh
 from gazerig.robot.description.paint import Painted
-from gazerig.robot.description.texture import TexturedMesh, textured
+from gazerig.robot.description.texture import textured
 
 
 def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:
@@ -18,7 +18,10 @@ def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:
     obj = f"mtllib {name}.mtl\no {name}\n{written.points}usemtl {name}\n{written.faces}"
     return {
         f"{name}.obj": obj.encode(),
-        f"{name}.mtl": _material(name).encode(),
+        f"{name}.mtl": (
+            f"newmtl {name}\nKa 1 1 1\nKd 1 1 1\nKs 0.1 0.1 0.1\nNs 20\nillum 2\n"
+            f"map_Kd {name}.png\n"
+        ).encode(),
         f"{name}.png": written.image,
     }
 
@@ -53,7 +56,18 @@ class _Written(NamedTuple):
 @lru_cache(maxsize=64)
 def _written(content: _Content) -> _Written:
     mesh = textured(content.painted)
-    return _Written(*_obj(mesh), png(mesh.image))
+    points, point_of = _once(mesh.vertices, 6)
+    normals, normal_of = _once(mesh.normals, 3)
+    # In this format an image begins at its left lower corner.
+    corners, corner_of = _once(mesh.uv * (1.0, -1.0) + (0.0, 1.0), 5)
+    table = np.stack((point_of, corner_of, normal_of), axis=-1)[mesh.faces] + 1
+    return _Written(
+        _rows("v %.6f %.6f %.6f\n", points)
+        + _rows("vt %.5f %.5f\n", corners)
+        + _rows("vn %.3f %.3f %.3f\n", normals),
+        _rows("f %d/%d/%d %d/%d/%d %d/%d/%d\n", table),
+        png(mesh.image),
+    )
 
 
 def plain_obj(name: str, mesh: Mesh) -> bytes:
@@ -68,21 +82,6 @@ def png(image: np.ndarray) -> bytes:
     order = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA
     _, data = cv2.imencode(".png", cv2.cvtColor(image, order), [cv2.IMWRITE_PNG_COMPRESSION, 9])
     return bytes(data)
-
-
-def _obj(mesh: TexturedMesh) -> tuple[str, str]:
-    """Return points and faces as text: points and normals that are the same are written once."""
-    points, point_of = _once(mesh.vertices, 6)
-    normals, normal_of = _once(mesh.normals, 3)
-    # In this format an image begins at its left lower corner.
-    corners, corner_of = _once(mesh.uv * (1.0, -1.0) + (0.0, 1.0), 5)
-    table = np.stack((point_of, corner_of, normal_of), axis=-1)[mesh.faces] + 1
-    return (
-        _rows("v %.6f %.6f %.6f\n", points)
-        + _rows("vt %.5f %.5f\n", corners)
-        + _rows("vn %.3f %.3f %.3f\n", normals),
-        _rows("f %d/%d/%d %d/%d/%d %d/%d/%d\n", table),
-    )
 
 
 def _once(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
@@ -101,7 +100,3 @@ def _once(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
 def _rows(line: str, values: np.ndarray) -> str:
     """Return a line for each row; all at once, which takes a third of the time of one by one."""
     return (line * len(values)) % tuple(values.ravel().tolist())
-
-
-def _material(name: str) -> str:
-    return f"newmtl {name}\nKa 1 1 1\nKd 1 1 1\nKs 0.1 0.1 0.1\nNs 20\nillum 2\nmap_Kd {name}.png\n"

@@ -44,27 +44,8 @@ def read_mesh(params: MeshParams) -> Painted:
         raise MeshUnusable(f"{path}: {len(mesh.faces)} triangles; {cure}")
     if not np.isfinite(mesh.vertices).all():
         raise MeshUnusable(f"{path}: points that are no numbers; export it again")
-    return _painted(mesh, params, y_up=path.suffix.lower() in _Y_UP)
-
-
-def _loaded(path: Path) -> Any:
-    """Return all of a file as one mesh of trimesh.
-
-    Raises:
-        MeshUnusable: it cannot be read.
-    """
-    import trimesh  # takes a while to import, and few rigs need it
-
-    try:
-        scene: Any = trimesh.load_scene(path)
-        return scene.to_mesh()
-    except Exception as error:  # the readers of many formats raise what they like
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise MeshUnusable(f"{path}: cannot be read ({reason[:120]}); export it again") from None
-
-
-def _painted(mesh: Any, params: MeshParams, *, y_up: bool) -> Painted:
-    """Return every corner of every triangle as a point of its own, as edges need it."""
+    y_up = path.suffix.lower() in _Y_UP
+    # Every corner of every triangle becomes a point of its own, as edges need it.
     look: Any = mesh.visual
     if look.kind == "texture":
         look = look.to_color()
@@ -85,3 +66,19 @@ def _painted(mesh: Any, params: MeshParams, *, y_up: bool) -> Painted:
     return Painted(
         Mesh(vertices.reshape(-1, 3), corners), colours.reshape(-1, 3), normals.reshape(-1, 3)
     )
+
+
+def _loaded(path: Path) -> Any:
+    """Return all of a file as one mesh of trimesh.
+
+    Raises:
+        MeshUnusable: it cannot be read.
+    """
+    import trimesh  # takes a while to import, and few rigs need it
+
+    try:
+        scene: Any = trimesh.load_scene(path)
+        return scene.to_mesh()
+    except Exception as error:  # the readers of many formats raise what they like
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise MeshUnusable(f"{path}: cannot be read ({reason[:120]}); export it again") from None

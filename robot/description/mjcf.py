@@ -14,9 +14,6 @@ from gazerig.robot.description.links import (
     IDENTITY,
     CollisionShape,
     Description,
-    Inertia,
-    Link,
-    LinkJoint,
     Visual,
     turn_about,
 )
@@ -73,10 +70,47 @@ def mjcf(
     for link in description.links:
         body = ET.SubElement(bodies[link.parent or ""], "body", name=prefix + link.name)
         bodies[link.name] = body
-        _fill(body, link, prefix, awake)
+        at_rad, R = 0.0, link.R
+        if awake and link.joint is not None and link.joint.awake_rad:
+            at_rad = link.joint.awake_rad
+            R = compose(R, turn_about(link.joint.axis, at_rad))
+        _place(body, link.p_m, R)
+        if link.inertia is not None:
+            inertia = link.inertia
+            (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor_kg_m2
+            ET.SubElement(
+                body, "inertial", pos=numbers(inertia.com_m), mass=numbers((inertia.mass_kg,)),
+                fullinertia=numbers((xx, yy, zz, xy, xz, yz)),
+            )  # fmt: skip
+        if link.joint is not None:
+            joint = link.joint
+            element = ET.SubElement(
+                body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
+                range=numbers((joint.low_rad, joint.high_rad)),
+            )  # fmt: skip
+            if at_rad:
+                element.set("ref", numbers((at_rad,)))
+        for shape in link.collisions:
+            _add_shape(body, shape)
+        for visual in link.visuals:
+            geom = ET.SubElement(
+                body, "geom", name=f"{prefix}{visual.name}", type="mesh", mesh=prefix + visual.name,
+                material=prefix + visual.name, contype="0", conaffinity="0", group=_LOOKS_GROUP,
+                mass="0",
+            )  # fmt: skip
+            _place(geom, visual.p_m, visual.R)
         if link.name == description.camera.optical:
-            _add_camera(body, description, prefix)
-    _add_contacts(ET.SubElement(root, "contact"), description, prefix)
+            # MuJoCo's camera looks along -z with y up, the optical frame along z, y down.
+            camera = description.camera
+            share = camera.height_px / camera.width_px
+            field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) * share)
+            ET.SubElement(
+                body, "camera", name=f"{prefix}camera", fovy=numbers((degrees(field_y),)),
+                xyaxes="1 0 0 0 -1 0", resolution=f"{camera.width_px} {camera.height_px}",
+            )  # fmt: skip
+    contacts = ET.SubElement(root, "contact")
+    for one, other in description.may_touch:
+        ET.SubElement(contacts, "exclude", body1=prefix + one, body2=prefix + other)
     _add_linkages(ET.SubElement(root, "equality"), description, prefix)
     _add_motors(ET.SubElement(root, "actuator"), description, prefix)
     ET.indent(root)
@@ -102,51 +136,11 @@ def _visuals(description: Description) -> Iterator[Visual]:
         yield from link.visuals
 
 
-def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
-    """Write what a body consists of, its joint first."""
-    at_rad, R = 0.0, link.R
-    if awake and link.joint is not None and link.joint.awake_rad:
-        at_rad = link.joint.awake_rad
-        R = compose(R, turn_about(link.joint.axis, at_rad))
-    _place(body, link.p_m, R)
-    if link.inertia is not None:
-        _add_inertia(body, link.inertia)
-    if link.joint is not None:
-        _add_joint(body, link.joint, prefix, at_rad)
-    for shape in link.collisions:
-        _add_shape(body, shape)
-    for visual in link.visuals:
-        geom = ET.SubElement(
-            body, "geom", name=f"{prefix}{visual.name}", type="mesh", mesh=prefix + visual.name,
-            material=prefix + visual.name, contype="0", conaffinity="0", group=_LOOKS_GROUP,
-            mass="0",
-        )  # fmt: skip
-        _place(geom, visual.p_m, visual.R)
-
-
 def _place(element: ET.Element, p_m: tuple[float, ...], R: object) -> None:
     if any(p_m):
         element.set("pos", numbers(p_m))
     if R != IDENTITY:
         element.set("quat", numbers(quaternion(R)))  # type: ignore[arg-type]
-
-
-def _add_inertia(body: ET.Element, inertia: Inertia) -> None:
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor_kg_m2
-    ET.SubElement(
-        body, "inertial", pos=numbers(inertia.com_m), mass=numbers((inertia.mass_kg,)),
-        fullinertia=numbers((xx, yy, zz, xy, xz, yz)),
-    )  # fmt: skip
-
-
-def _add_joint(body: ET.Element, joint: LinkJoint, prefix: str, at_rad: float) -> None:
-    """Write a joint; at_rad: its angle in the pose that the body is written in."""
-    element = ET.SubElement(
-        body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
-        range=numbers((joint.low_rad, joint.high_rad)),
-    )  # fmt: skip
-    if at_rad:
-        element.set("ref", numbers((at_rad,)))
 
 
 def _add_shape(body: ET.Element, shape: CollisionShape) -> None:
@@ -157,22 +151,6 @@ def _add_shape(body: ET.Element, shape: CollisionShape) -> None:
         conaffinity=layer, group=_COLLISIONS_GROUP, rgba="0.8 0.4 0.2 0.4", mass="0",
     )  # fmt: skip
     _place(geom, shape.p_m, shape.R)
-
-
-def _add_camera(body: ET.Element, description: Description, prefix: str) -> None:
-    """Write the camera: MuJoCo's looks along -z with y up, the optical frame along z, y down."""
-    camera = description.camera
-    share = camera.height_px / camera.width_px
-    field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) * share)
-    ET.SubElement(
-        body, "camera", name=f"{prefix}camera", fovy=numbers((degrees(field_y),)),
-        xyaxes="1 0 0 0 -1 0", resolution=f"{camera.width_px} {camera.height_px}",
-    )  # fmt: skip
-
-
-def _add_contacts(parent: ET.Element, description: Description, prefix: str) -> None:
-    for one, other in description.may_touch:
-        ET.SubElement(parent, "exclude", body1=prefix + one, body2=prefix + other)
 
 
 def _add_linkages(parent: ET.Element, description: Description, prefix: str) -> None:

@@ -14,7 +14,10 @@ def joint_torques_nm(
 
     Of a pair that two servos move together each joint gets what both do for it alone.
     """
-    own = {name: _shaft_nm(joint) * _turns(joint) for name, joint in joints.items()}
+    own = {
+        name: (joint.facts.stall_torque_nm * (joint.torque_limit or 1.0)) * _turns(joint)
+        for name, joint in joints.items()
+    }
     found = dict(own)
     for pair in pairs_of(couplings):
         if pair.first in joints and pair.second in joints:
@@ -29,11 +32,6 @@ def _pair_nm(pair: CoupledPair, own: Mapping[str, float]) -> dict[str, float]:
         joint: sum(abs(rates[k][j]) * own[names[k]] for k in (0, 1))
         for j, joint in enumerate(names)
     }
-
-
-def _shaft_nm(joint: JointParams) -> float:
-    """Return the torque of the servo's own shaft."""
-    return joint.facts.stall_torque_nm * (joint.torque_limit or 1.0)
 
 
 def _turns(joint: JointParams) -> float:

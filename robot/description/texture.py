@@ -63,19 +63,16 @@ def textured(painted: Painted) -> TexturedMesh:
         uv.append((part.uv + (column + _MARGIN, row + _MARGIN)) / (size[1], size[0]))
         faces.append(part.faces + first)
         first += len(part.vertices)
+    normals = np.concatenate([part.normals for part in parts])
+    # Of length one; up for those of points without a face of any size.
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
     return TexturedMesh(
         np.concatenate([part.vertices for part in parts]),
-        _of_length_one(np.concatenate([part.normals for part in parts])),
+        np.where(length > 1e-6, normals / np.maximum(length, 1e-6), (0.0, 0.0, 1.0)),
         np.concatenate(uv),
         np.concatenate(faces).astype(np.uint32),
         np.rint(np.clip(image, 0.0, 255.0)).astype(np.uint8),
     )
-
-
-def _of_length_one(normals: Floats) -> Floats:
-    """Return normals as they are, but up for those of points without a face of any size."""
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), (0.0, 0.0, 1.0))
 
 
 def _pieces(painted: Painted) -> Iterator[Painted]:

@@ -17,7 +17,6 @@ from gazerig.robot.description.links import (
     Description,
     Inertia,
     Link,
-    LinkJoint,
 )
 from gazerig.robot.description.mesh import ellipsoid
 from gazerig.robot.description.mesh_files import mesh_files, plain_obj
@@ -115,15 +114,11 @@ def _add_joint(root: ET.Element, link: Link, parent: str, taken: Collection[str]
     ET.SubElement(element, "child", link=link.name)
     _place(element, link.p_m, link.R)
     if joint is not None:
-        _add_hinge(element, joint)
-
-
-def _add_hinge(element: ET.Element, joint: LinkJoint) -> None:
-    ET.SubElement(element, "axis", xyz=numbers(joint.axis))
-    ET.SubElement(
-        element, "limit", lower=numbers((joint.low_rad,)), upper=numbers((joint.high_rad,)),
-        effort=numbers((joint.max_torque_nm,)), velocity=numbers((joint.max_speed_rad_s,)),
-    )  # fmt: skip
-    if joint.follows is not None:
-        leader, ratio = joint.follows
-        ET.SubElement(element, "mimic", joint=leader, multiplier=numbers((ratio,)), offset="0")
+        ET.SubElement(element, "axis", xyz=numbers(joint.axis))
+        ET.SubElement(
+            element, "limit", lower=numbers((joint.low_rad,)), upper=numbers((joint.high_rad,)),
+            effort=numbers((joint.max_torque_nm,)), velocity=numbers((joint.max_speed_rad_s,)),
+        )  # fmt: skip
+        if joint.follows is not None:
+            leader, ratio = joint.follows
+            ET.SubElement(element, "mimic", joint=leader, multiplier=numbers((ratio,)), offset="0")

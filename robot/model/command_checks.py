@@ -53,14 +53,29 @@ def check(command: Command) -> None:
             _check_look(command)
             _check_lead(command)
         case Jog(angles):
-            _check_angles(angles)
+            if not isinstance(angles, tuple) or len(angles) > MAX_JOINTS:
+                raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
+            for pair in angles:
+                if not (
+                    isinstance(pair, tuple) and len(pair) == 2 and _within(pair[1], MAX_ANGLE_RAD)
+                ):
+                    raise ValueError(
+                        "angles are pairs of a joint and a finite angle in radians within +-360 deg"
+                    )
+                if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
+                    raise ValueError(f"{pair[0]!r:.40} is not a joint name such as neck_yaw or jaw")
             _check_lead(command)
         case Express(expression, strength):
             _check_share("an expression", "strength", expression, strength)
         case SetLevel(level, value):
             _check_share("a level", "value", level, value)
         case Play(gesture, speed, times, who):
-            _check_play(gesture, speed, times)
+            if not isinstance(gesture, str) or len(gesture) > MAX_WORDS:
+                raise ValueError("a gesture is given by its name")
+            if not _within(speed, MAX_SPEED) or speed < MIN_SPEED:
+                raise ValueError(f"the speed of a gesture is a number {MIN_SPEED:g}..{MAX_SPEED:g}")
+            if type(times) is not int or not 0 <= times <= MAX_COUNT:
+                raise ValueError(f"the times of a gesture are a whole number 0..{MAX_COUNT}")
             _check_who(who)
         case Renew(who):
             _check_who(who)
@@ -137,27 +152,6 @@ def _check_who(who: object, flag: object = False) -> None:
         raise ValueError(f"who asks is text of at most {MAX_WORDS} characters")
     if not isinstance(flag, bool):
         raise ValueError("stay and confirmed are true or false")
-
-
-def _check_angles(angles: object) -> None:
-    if not isinstance(angles, tuple) or len(angles) > MAX_JOINTS:
-        raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
-    for pair in angles:
-        if not (isinstance(pair, tuple) and len(pair) == 2 and _within(pair[1], MAX_ANGLE_RAD)):
-            raise ValueError(
-                "angles are pairs of a joint and a finite angle in radians within +-360 deg"
-            )
-        if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
-            raise ValueError(f"{pair[0]!r:.40} is not a joint name such as neck_yaw or jaw")
-
-
-def _check_play(gesture: object, speed: object, times: object) -> None:
-    if not isinstance(gesture, str) or len(gesture) > MAX_WORDS:
-        raise ValueError("a gesture is given by its name")
-    if not _within(speed, MAX_SPEED) or speed < MIN_SPEED:  # type: ignore[operator]
-        raise ValueError(f"the speed of a gesture is a number {MIN_SPEED:g}..{MAX_SPEED:g}")
-    if type(times) is not int or not 0 <= times <= MAX_COUNT:
-        raise ValueError(f"the times of a gesture are a whole number 0..{MAX_COUNT}")
 
 
 def _check_share(what: str, key: str, name: object, value: object) -> None:

@@ -139,7 +139,9 @@ class PushRods:
 
     def _horn_rad(self, joints: Pair, side: float) -> float:
         """Return the angle of one horn, on the branch of the level head."""
-        (x, _, z), gap2 = self._gap(joints, side)
+        at_x, at_y, at_z = _tilt(self._anchor, joints, side)
+        x, y, z = at_x - self._servo[0], at_y - side * self._servo[1], at_z - self._servo[2]
+        gap2 = x * x + y * y + z * z
         along, up = self._horn * x, abs(self._horn) * z
         cosine = 0.5 * (gap2 + self._horn**2 - self._rod**2) / hypot(along, up)
         if abs(cosine) > 1.0:
@@ -148,12 +150,6 @@ class PushRods:
             raise Unreachable("the rod is in line with its horn there")
         turn = atan2(up, along) + self._branch * acos(cosine)
         return turn - 2.0 * pi * round(turn / (2.0 * pi))
-
-    def _gap(self, joints: Pair, side: float) -> tuple[Vec3, float]:
-        """Return the vector from the horn's axis to the rod's anchor, and its squared length."""
-        at_x, at_y, at_z = _tilt(self._anchor, joints, side)
-        x, y, z = at_x - self._servo[0], at_y - side * self._servo[1], at_z - self._servo[2]
-        return (x, y, z), x * x + y * y + z * z
 
     def _tip(self, horn_rad: float, side: float) -> Vec3:
         """Return the position of the end of a horn."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import ceil, floor, pi, radians
 from typing import Annotated, Literal
 
-from gazerig.drivers.bus.limit_recovery import ENTRY_DEG_S
+from gazerig.drivers.bus.goal_limits import ENTRY_DEG_S
 from gazerig.drivers.bus.servo_models import SERVOS, ServoModelInfo
 from gazerig.drivers.types import ServoConfig
 from gazerig.params import Bounds, Unit
@@ -50,14 +50,6 @@ class JointParams:
             raise ValueError(f"min_deg {self.min_deg} must be below max_deg {self.max_deg}")
         if not self.min_deg <= 0.0 <= self.max_deg:
             raise ValueError("0 deg, the centre, must lie between min_deg and max_deg")
-        self._check_reach()
-
-    def _check_reach(self) -> None:
-        """Check that the servo reaches the joint's range; unknown models are checked elsewhere.
-
-        Raises:
-            ValueError: It does not, or the linkage was measured over a smaller range.
-        """
         facts = SERVOS.get(self.model)
         if facts is None:
             return

@@ -146,18 +146,14 @@ class EgomotionResidual:
             turn = self._turns[id_]
             same = norm(sub(views[id_], turn.view)) < _STILL_RAD
             if same and t_s - turn.since_s <= _LONGEST_S and any(s[3] for s in turn.shifts):
-                self._add_turn(turn)
+                for shift, change, dt_s, fast in turn.shifts:
+                    self._shift_by_turn = _FORGET * self._shift_by_turn + dot(shift, change)
+                    self._turn_by_turn = _FORGET * self._turn_by_turn + dot(change, change)
+                    if fast:
+                        self._speeds.append(norm(shift) / dt_s)
         self._turns = {
             s.id: _Turn(t_s, views[s.id]) for s in seen if norm(s.v_world_m_s) < _STILL_M_S
         }
-
-    def _add_turn(self, turn: _Turn) -> None:
-        """Update the estimate with the apparent motion of one still thing."""
-        for shift, change, dt_s, fast in turn.shifts:
-            self._shift_by_turn = _FORGET * self._shift_by_turn + dot(shift, change)
-            self._turn_by_turn = _FORGET * self._turn_by_turn + dot(change, change)
-            if fast:
-                self._speeds.append(norm(shift) / dt_s)
 
 
 def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:

@@ -61,7 +61,13 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     if array.shape != (5, 2) or not _shows_front(points):
         return None
     rays = _rays(points, intrinsics)
-    R_face_camera = _camera_to_face(rays)
+    # The camera turned to the face and rolled until the eyes are level: poses near "looks at me"
+    # are small rotations wherever the face appears.
+    a, b, c, d, e = rays
+    z = unit((a[0] + b[0] + c[0] + d[0] + e[0], a[1] + b[1] + c[1] + d[1] + e[1], 5.0))
+    eyes = sub(b, a)
+    x = unit(sub(eyes, scale(z, dot(eyes, z))))
+    R_face_camera = x, cross(z, x), z
     try:
         found = fit_face(
             _project(R_face_camera, rays),
@@ -101,18 +107,6 @@ def _rays(points: list[list[float]], lens: Intrinsics) -> list[Vec3]:
         return [(x, y, z) for x, y, z in rays_through(points, lens).tolist()]
     fx, fy, cx, cy = lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px
     return [((x - cx) / fx, (y - cy) / fy, 1.0) for x, y in points]
-
-
-def _camera_to_face(rays: list[Vec3]) -> Mat3:
-    """Return the rotation that turns the camera to the face and rolls it until the eyes are level.
-
-    In this view, poses near "looks at me" are small rotations wherever the face appears.
-    """
-    a, b, c, d, e = rays
-    z = unit((a[0] + b[0] + c[0] + d[0] + e[0], a[1] + b[1] + c[1] + d[1] + e[1], 5.0))
-    eyes = sub(b, a)
-    x = unit(sub(eyes, scale(z, dot(eyes, z))))
-    return x, cross(z, x), z
 
 
 def _project(R_face_camera: Mat3, rays: list[Vec3]) -> Points:

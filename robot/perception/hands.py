@@ -246,7 +246,7 @@ class Hands:
         if arm is None:
             return thing
         p_face, v_face = arm.face[0], arm.face[1] or (0.0, 0.0, 0.0)
-        speed = _speed_across(arm, v_face, p_camera)
+        speed = norm(perpendicular(sub(arm.tip_m_s, v_face), unit(sub(arm.tip_m, p_camera))))
         named = known is not None and known.frames >= _FRAMES
         begins = _BEFORE_HEAD_M_S if hypot(*_off(arm.tip_m, p_face)) < _HEAD_M else _BEGINS_M_S
         # Relative to a walking person, their legs and parts of the trunk are no faster than that.
@@ -455,8 +455,3 @@ def _approaches(thing: LocalisedDetection, p_camera: Vec3) -> bool:
     way = sub(thing.p_world_m, p_camera)
     closing_m_s = -dot(thing.v_world_m_s, unit(way)) - _SURE_SD * thing.along_sd_m_s
     return closing_m_s > _COMES_1_S * norm(way)
-
-
-def _speed_across(arm: _Arm, v_face: Vec3, p_camera: Vec3) -> float:
-    """Return the speed of a hand across the view, relative to the person."""
-    return norm(perpendicular(sub(arm.tip_m_s, v_face), unit(sub(arm.tip_m, p_camera))))

@@ -216,7 +216,10 @@ class Perception:
         R = track.R_world_face
         assert R is not None  # faces that are seen are tracked with their pose
         p = track.p_world_m
-        across_sd, along_sd = _deviations(track)
+        across, along = track.filter.across.p, track.filter.along.p
+        unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * track.filter.range_m
+        # The filter covers errors that change; the unknown size of this person's face is constant.
+        across_sd, along_sd = sqrt(across), hypot(sqrt(along), unknown_size)
         found = track.detection
         eyes = _eyes(track)
         gaze = found.gaze_world if eyes is None else eyes.gaze_world
@@ -285,17 +288,6 @@ def _at_head(thing: LocalisedDetection) -> LocalisedDetection:
     if thing.kind != UNNAMED or thing.upper_m is None:
         return thing
     return replace(thing, p_world_m=thing.upper_m)
-
-
-def _deviations(track: Track) -> tuple[float, float]:
-    """Return how well a face's position is known, across and along the view.
-
-    The filter covers errors that change from frame to frame; the unknown size of this person's face
-    is a constant error.
-    """
-    across, along = track.filter.across.p, track.filter.along.p
-    unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * track.filter.range_m
-    return sqrt(across), hypot(sqrt(along), unknown_size)
 
 
 def _eyes(track: Track) -> SeenEyes | None:

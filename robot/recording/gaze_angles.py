@@ -161,7 +161,18 @@ class GazeAnglesBuilder:
             lids = (lost_lids[0], lost_lids[1], lost_lids[2], lost_lids[3])
         time_s = tick.t_s - self._start_s
         self._angles.extend((time_s, *left, *right, *cyclopean, *head, *lids, *planned))
-        self._note_orders(tick, time_s)
+        self._messages += [(time_s, event) for event in tick.events]
+        for command in tick.commands:
+            if isinstance(command, REPEATED):
+                continue
+            self._messages.append((time_s, command_text(command)))
+            if isinstance(command, Jog):
+                self._jogged = bool(command.angles_rad)
+            elif isinstance(command, Stop):
+                self._jogged = False
+        if self._led and not tick.led:  # a timeout, for which there is no command
+            self._jogged = False
+        self._led = tick.led
         known = not (tick.stopped or self._jogged)
         movement = _CODE[tick.gaze.phase] if known else 0
         self._codes.extend((movement, tick.gaze.blink and known, self._number(tick)))
@@ -184,21 +195,6 @@ class GazeAnglesBuilder:
             a[:, 14:16], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
             tuple(self._messages), a[:, 12:14], self._joints, tuple(self._estimated),
         )  # fmt: skip
-
-    def _note_orders(self, tick: Tick, time_s: float) -> None:
-        """Record messages and commands, and whether the joints are moved by hand."""
-        self._messages += [(time_s, event) for event in tick.events]
-        for command in tick.commands:
-            if isinstance(command, REPEATED):
-                continue
-            self._messages.append((time_s, command_text(command)))
-            if isinstance(command, Jog):
-                self._jogged = bool(command.angles_rad)
-            elif isinstance(command, Stop):
-                self._jogged = False
-        if self._led and not tick.led:  # a timeout, for which there is no command
-            self._jogged = False
-        self._led = tick.led
 
     def _number(self, tick: Tick) -> int:
         """Return the number of the target that the eyes are on or move to.

@@ -185,8 +185,13 @@ class RunRecording:
                         del percepts[next(iter(percepts))]
                     continue
                 moment = from_json(message, percepts)
-                _check_time(before_s, moment.tick.t_s)
-                before_s = moment.tick.t_s
+                t_s = moment.tick.t_s
+                # Exports fill gaps, and would fill years.
+                if not isfinite(t_s) or (
+                    before_s is not None and not 0.0 <= t_s - before_s < _LONGEST_GAP_S
+                ):
+                    raise ValueError(f"a tick at {t_s} s after {before_s} s")
+                before_s = t_s
             yield moment
 
     def frames(self) -> Iterator[tuple[float, bytes]]:
@@ -284,12 +289,6 @@ class RunRecording:
             offset += _HEAD + length
         if closed:
             raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it again")
-
-
-def _check_time(before_s: float | None, t_s: float) -> None:
-    """Refuse impossible times: exports fill gaps, and would fill years."""
-    if not isfinite(t_s) or (before_s is not None and not 0.0 <= t_s - before_s < _LONGEST_GAP_S):
-        raise ValueError(f"a tick at {t_s} s after {before_s} s")
 
 
 def _select_messages(

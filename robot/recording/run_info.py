@@ -129,12 +129,6 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
         info = RunInfo(**found)
     except TypeError as error:
         raise ValueError(str(error)) from None
-    _check_values(info)
-    return info
-
-
-def _check_values(info: RunInfo) -> None:
-    """Refuse impossible settings, as exports use these numbers and names."""
     texts = ("rig", "profile", "config_yaml", "walk_yaml", "gestures_yaml", "eyes", "bus")
     optional = [key for key in ("character", "scene") if getattr(info, key) is not None]
     if not all(isinstance(getattr(info, key), str) for key in (*texts, *optional)):
@@ -153,6 +147,7 @@ def _check_values(info: RunInfo) -> None:
     if not all(_within(number, -1000.0, 1000.0) for number in pose):
         raise ValueError("an invalid pose of the neck base")
     started_ns(info)
+    return info
 
 
 def _within(value: object, low: float, high: float) -> bool:

@@ -70,7 +70,28 @@ class SnapshotIndex:
         self._events: list[SeenEvent] = []
         self._events_at = array("l")  # number of each event's snapshot
         self._start_s, self.duration_s = 0.0, 0.0
-        self._read_ticks(ticks, SnapshotBuilder(rate_hz, rig), character, progress)
+        snapshots = SnapshotBuilder(rate_hz, rig)
+        detector, due_s = MarkDetector(), 0.0
+        for number, tick in enumerate(ticks):
+            self._start_s = tick.t_s if number == 0 else self._start_s
+            at_s = tick.t_s - self._start_s
+            self.marks += detector.update(tick, at_s)
+            self.duration_s = at_s
+            snapshots.update(tick)
+            if at_s < due_s - 1e-9:
+                continue
+            due_s = max(due_s + SNAPSHOT_EVERY_S, at_s)
+            perception = perception_text(tick, _NO_RESIDUAL)
+            said = SnapshotTexts(
+                "recorded", detector.behaviour, perception, character, detector.conversation
+            )
+            if (shown := snapshots.take(said)) is not None:
+                self._events += shown.events
+                self._events_at.extend([len(self._packed)] * len(shown.events))
+                self._times.append(at_s)
+                self._packed.append(zlib.compress(pack(shown), 1))
+            if len(self._packed) % _PROGRESS_EVERY == 0:
+                progress(at_s)
         if not self._packed:
             raise SetupError("the recording contains no tick: there is nothing to show")
         self._frame_times, self._places = array("d"), array("Q", (0,))
@@ -134,35 +155,6 @@ class SnapshotIndex:
     def close(self) -> None:
         """Free the frames."""
         self._frames.close()
-
-    def _read_ticks(
-        self,
-        ticks: Iterable[Tick],
-        snapshots: SnapshotBuilder,
-        character: str,
-        progress: Callable[[float], None],
-    ) -> None:
-        detector, due_s = MarkDetector(), 0.0
-        for number, tick in enumerate(ticks):
-            self._start_s = tick.t_s if number == 0 else self._start_s
-            at_s = tick.t_s - self._start_s
-            self.marks += detector.update(tick, at_s)
-            self.duration_s = at_s
-            snapshots.update(tick)
-            if at_s < due_s - 1e-9:
-                continue
-            due_s = max(due_s + SNAPSHOT_EVERY_S, at_s)
-            perception = perception_text(tick, _NO_RESIDUAL)
-            said = SnapshotTexts(
-                "recorded", detector.behaviour, perception, character, detector.conversation
-            )
-            if (shown := snapshots.take(said)) is not None:
-                self._events += shown.events
-                self._events_at.extend([len(self._packed)] * len(shown.events))
-                self._times.append(at_s)
-                self._packed.append(zlib.compress(pack(shown), 1))
-            if len(self._packed) % _PROGRESS_EVERY == 0:
-                progress(at_s)
 
 
 class MarkDetector:

@@ -33,7 +33,7 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.command_json import signed
 from gazerig.robot.model.commands import REPEATED, Command
 from gazerig.robot.model.leader import sentence
-from gazerig.robot.model.reply import CommandReply, Ticket
+from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import LoopFigures
 
 _TAKEN_UP_S = 1.0
@@ -202,7 +202,16 @@ class RequestHandler:
                 changes = as_changes(saved.changes)
                 return {"path": str(saved.path), "backup": backup, "changes": changes}
             case PendingCommand(command, ticket):
-                return self._wait_for_reply(command, ticket)
+                if ticket is None:
+                    return self._wait_until_applied(())
+                reply = ticket.wait(_TAKEN_UP_S)
+                if reply is None:
+                    raise ValueError(_HANGS)
+                if reply.refused:
+                    raise _NotDone(reply)
+                if not isinstance(command, REPEATED):
+                    self._pulse.taken_up(ticks=1)  # so that the status includes it
+                return {"notes": [], "reply": reply.as_json()}
 
     def _status(self) -> dict[str, object]:
         version = self._params.version if self._params is not None else 0
@@ -211,19 +220,6 @@ class RequestHandler:
             self._unsaved = version, len(tuple(unsaved))
         about = {**self._about, "version": version, "unsaved": self._unsaved[1]}
         return {**about, **self._pulse.as_json()}
-
-    def _wait_for_reply(self, command: Command, ticket: Ticket | None) -> object:
-        """Wait for the tick that executes a command; return its reply."""
-        if ticket is None:
-            return self._wait_until_applied(())
-        reply = ticket.wait(_TAKEN_UP_S)
-        if reply is None:
-            raise ValueError(_HANGS)
-        if reply.refused:
-            raise _NotDone(reply)
-        if not isinstance(command, REPEATED):
-            self._pulse.taken_up(ticks=1)  # so that the status includes it
-        return {"notes": [], "reply": reply.as_json()}
 
     def _wait_until_applied(self, notes: tuple[str, ...]) -> dict[str, object]:
         """Wait for the tick that applies the values; return the notes for the user."""

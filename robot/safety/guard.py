@@ -164,10 +164,20 @@ class Guard:
             t_s: Present time.
         """
         if any(joints.rearmed):
-            self._rearm(joints)
+            for i, (angle, rearmed) in enumerate(
+                zip(joints.position_rad, joints.rearmed, strict=True)
+            ):
+                if rearmed and isfinite(angle):
+                    self._change.begin(i, angle)
+                    self._stuck.forget(i)
+                    self._retreat[i] = None
+                    self._slow_down(i)
         since_s = t_s - self._t_s
         if not (since_s > 0.0 and isfinite(since_s)):
-            return _standstill(tuple(self._motion.command), desired_rad, self._names)
+            command = tuple(self._motion.command)
+            reasons = ("all: time stands still",)
+            why = ("time stands still",) * len(command)
+            return GuardResult(command, "hold", reasons, desired_rad, why, reasons, self._names)
         self._t_s = t_s
         if self._change.waiting or self._change.outside:
             self._calm = False
@@ -215,7 +225,10 @@ class Guard:
                 short[i] = outcome
         self._calm = followed
         if followed:
-            return _passed(desired_rad, self._names)
+            # Avoids the call of the class's constructor, a Python function.
+            return tuple.__new__(
+                GuardResult, (desired_rad, "ok", (), desired_rad, (), (), self._names)
+            )
         if short != self._short:  # findings last for many ticks
             self._short, self._findings = short, _findings(short, self._names)
         level, reasons, why, critical = self._findings
@@ -252,15 +265,6 @@ class Guard:
             or (joints.fault and joints.fault[i])
         )
 
-    def _rearm(self, joints: JointState) -> None:
-        """Start at the goals that the bus has set for joints whose torque came on again."""
-        for i, (angle, rearmed) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
-            if rearmed and isfinite(angle):
-                self._change.begin(i, angle)
-                self._stuck.forget(i)
-                self._retreat[i] = None
-                self._slow_down(i)
-
     def _slow_down(self, i: int) -> None:
         """Make a joint continue slowly, as after torque-on."""
         self._calm = False
@@ -284,7 +288,15 @@ class Guard:
         if fault:  # a joint that still moves is parking
             self._slow_down(i)
         if hold is not None:
-            self._apply_hold(i, hold, dt_s)
+            if hold.again == "slowly":
+                self._slow_down(i)
+            if hold.goal is None:
+                self._motion.brake(i, dt_s)
+            elif hold.slowly:
+                self._seek_gently(i, hold.goal, dt_s)
+            else:
+                limit = self._limits[i]
+                self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
             rank, reason = 2, hold.reason
         else:
             reason = self._move_towards(i, desired, position, dt_s)
@@ -349,18 +361,6 @@ class Guard:
             self._retreat[i] = back = position
         return _Hold(reason, back, again="slowly")
 
-    def _apply_hold(self, i: int, hold: _Hold, dt_s: float) -> None:
-        """Stop a joint, or move it to the goal of its hold."""
-        if hold.again == "slowly":
-            self._slow_down(i)
-        if hold.goal is None:
-            self._motion.brake(i, dt_s)
-        elif hold.slowly:
-            self._seek_gently(i, hold.goal, dt_s)
-        else:
-            limit = self._limits[i]
-            self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
-
     def _seek_gently(
         self, i: int, goal: float, dt_s: float, top: float = inf, accel: float = inf
     ) -> None:
@@ -396,21 +396,6 @@ class Guard:
             return "after a late tick"
         fast = abs(target - began) > limit.speed_rad_s * dt_s
         return self._health.why[i] or ("too fast" if fast else "too hard")
-
-
-def _standstill(
-    command: JointAngles, desired_rad: JointAngles, joints: tuple[str, ...]
-) -> GuardResult:
-    """Return the result of a tick without motion, as no time has passed."""
-    reasons = ("all: time stands still",)
-    why = ("time stands still",) * len(command)
-    return GuardResult(command, "hold", reasons, desired_rad, why, reasons, joints)
-
-
-def _passed(desired_rad: JointAngles, joints: tuple[str, ...]) -> GuardResult:
-    """Return the result of a tick in which every joint follows its desired angle."""
-    # Avoids the call of the class's constructor, a Python function.
-    return tuple.__new__(GuardResult, (desired_rad, "ok", (), desired_rad, (), (), joints))
 
 
 class _Findings(NamedTuple):
