@@ -22,8 +22,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.control.tick_text import perception_text
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections, ground
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, RunState, gaze_pixel
-from gazerig.robot.dashboard.feed.page_feed import drain
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, RunState, drain, gaze_pixel
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts

@@ -15,8 +15,7 @@ from shown_page import PARAM, wait_for
 from stand_in import StandIn
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed
-from gazerig.robot.dashboard.feed.page_feed import drain
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, drain
 from gazerig.robot.dashboard.feed.page_process import (
     ALL_USERS,
     CHOICES,
@@ -25,7 +24,7 @@ from gazerig.robot.dashboard.feed.page_process import (
     VALUES,
     PageProcess,
 )
-from gazerig.robot.dashboard.feed.param_feed import ParamFeed
+from gazerig.robot.dashboard.feed.publisher import ParamFeed
 from gazerig.robot.dashboard.requests.inbox import (
     MESSAGE_BYTES,
     REQUEST,

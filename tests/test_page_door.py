@@ -21,7 +21,7 @@ from websockets.sync.client import ClientConnection
 
 from gazerig.robot.dashboard.door import page_files
 from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
-from gazerig.robot.dashboard.door.connection_limits import MOST as MOST_CONNECTIONS
+from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
 from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES, browser_of
 
 BROWSER = Path(page_files.__file__).parents[1] / "browser"

@@ -9,8 +9,7 @@ from desk import GAZE_JOINTS
 
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis.heatmap_face import on_canvas
-from gazerig.robot.analysis.human_norms import fastest_peak, slowest_peak
-from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.analysis.human_norms import BY_KEY, fastest_peak, slowest_peak
 from gazerig.robot.dashboard.panels.dwell_chart import BIN_S, BINS, DwellChart
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.panels.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face

@@ -17,8 +17,7 @@ from gazerig.drivers.types import BusHealth
 from gazerig.gaze.types import Salience
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.control.tick_text import health_text
-from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
-from gazerig.robot.dashboard.feed.page_feed import News
+from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices
 from gazerig.robot.dashboard.feed.page_process import REPLAY
 from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.panels.attention_panel import saliences, winner

@@ -9,8 +9,7 @@ import pytest
 from page_at_the_door import opened
 
 from gazerig.robot.dashboard.door.browsers import TabLimits
-from gazerig.robot.dashboard.requests.browser_requests import from_browser
-from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
+from gazerig.robot.dashboard.requests.outbox import TokenBucket, from_browser
 
 
 def test_a_place_is_left_by_the_browser_with_the_most() -> None:

@@ -44,8 +44,8 @@ from gazerig.robot.dashboard.panels.status import (
 from gazerig.robot.dashboard.view.people import fixated_part
 from gazerig.robot.dashboard.view.scene_node import along, turned_up, upright_along
 from gazerig.robot.description.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.leader import Leader
-from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import OtherHead, SeenFace, Snapshot, Trail
 

@@ -13,7 +13,7 @@ from six_joints import SIX, of_six
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.robot.control.command_handler import plain
-from gazerig.robot.dashboard.feed.page_feed import News
+from gazerig.robot.dashboard.feed.live_feed import News
 from gazerig.robot.dashboard.panels.controls import LeadPanel
 from gazerig.robot.dashboard.panels.jog_panel import ESTIMATED, JogPanel, estimated_joints_note
 from gazerig.robot.dashboard.panels.param_control import (
@@ -30,9 +30,8 @@ from gazerig.robot.dashboard.requests.inbox import (
     parse_request,
     request_message,
 )
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.widget import Slider, TextField
-from gazerig.robot.dashboard.widgets.widgets import Widgets
+from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
 from gazerig.robot.model.command_json import as_json, from_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt
 from gazerig.robot.model.parameter import JsonValue, Parameter

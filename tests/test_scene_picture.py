@@ -12,7 +12,7 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Mat3
 from gazerig.robot.dashboard.feed.camera_overlay import draw_heat
-from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
+from gazerig.robot.dashboard.feed.live_feed import GazeTrail
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.scenes.picture import ScenePicture
 from gazerig.sim_mock.scenes.registry import scenes

@@ -31,8 +31,7 @@ from gazerig.robot.dashboard.door.admission import page_url
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.door.browsers import Browsers
 from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, open_server
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed
-from gazerig.robot.dashboard.feed.page_feed import drain
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, drain
 from gazerig.robot.dashboard.feed.page_process import (
     CANNOT_OPEN,
     FOLDER_VARIABLE,
@@ -44,7 +43,7 @@ from gazerig.robot.dashboard.feed.page_process import (
 from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.requests.outbox import DOOR, Outbox
 from gazerig.robot.dashboard.requests.pointer_to_look import PointerToLook
-from gazerig.robot.dashboard.requests.stop_sender import StopSender
+from gazerig.robot.dashboard.requests.stop_channel import StopSender
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.command_json import as_json
@@ -114,9 +113,16 @@ def serve(
     open_port = free_port(host, port)
     server, inside = open_server(folder / "page.sock")
     browsers, widgets = Browsers(token), Widgets()
+
+    def name(client: str) -> str:
+        """Return the name of a client's browser; client: its number, maybe with a suffix."""
+        number = client.partition(":")[0]
+        in_view = browser_of(server, int(number)) if number.isdecimal() else ""
+        return widgets.browser(client) or in_view
+
     outbox = Outbox(
         feed,
-        name=lambda client: widgets.browser(client) or _browser_name(server, client),
+        name=name,
         leads=browsers.led_by,
     )
     pointer = PointerToLook(
@@ -134,12 +140,6 @@ def serve(
         text.append(f"port {port} is busy, using {open_port}")
     url = f"{page_url(host, open_port)}/?token={token}"
     return Served(server, door, outbox, pointer, url, "; ".join(text) or None)
-
-
-def _browser_name(server: viser.ViserServer, client: str) -> str:
-    """Return the name of a client's browser; client: its number, maybe with a suffix."""
-    number = client.partition(":")[0]
-    return browser_of(server, int(number)) if number.isdecimal() else ""
 
 
 def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> None:
@@ -177,8 +177,9 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
             view.silent()
 
 
-def _limit_process() -> None:
-    """Lower the priority of this process below the loop, and limit the cost of bad input."""
+def main(arguments: list[str]) -> int:
+    """Run the page; return the exit code of the process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):  # Windows has other priorities
         os.nice(_NICENESS)
     with contextlib.suppress(ImportError):  # nor a limit on open files
@@ -188,12 +189,6 @@ def _limit_process() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
     # Standard error is in memory, and a client that sends malformed data fills it with errors.
     logging.disable(logging.CRITICAL)
-
-
-def main(arguments: list[str]) -> int:
-    """Run the page; return the exit code of the process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _limit_process()
     fd, stop_fd, parent, host, port = arguments
     token = os.environ.pop(TOKEN_VARIABLE)
     # Not closed explicitly: its end makes the other side read this process's last messages,
@@ -203,35 +198,22 @@ def main(arguments: list[str]) -> int:
     stop = StopSender(message_link.open_link(stop_fd, shown))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
     try:
-        return _serve_page(feed, stop, (host, int(port)), token, folder, int(parent))
+        try:
+            served = serve(host, int(port), token, folder, feed, stop)
+        except OSError as error:
+            sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
+            return CANNOT_OPEN
+        served.door.once = os.environ.pop(ONCE_VARIABLE, "")
+        if served.words is not None:
+            feed.send(NOTICE + served.words.encode())
+        view = PageView(served.server, served.door.widgets, served.outbox, served.door.tell)
+        feed.send(URL + served.url.encode())
+        watch(feed, view, int(parent), served)
+        served.door.close()
+        served.server.stop()
+        return 0
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def _serve_page(
-    feed: MessageLink,
-    stop: StopSender,
-    address: tuple[str, int],
-    token: str,
-    folder: Path,
-    parent: int,
-) -> int:
-    """Serve the page until the rig ends; return the exit code of the process."""
-    try:
-        served = serve(*address, token, folder, feed, stop)
-    except OSError as error:
-        host, port = address
-        sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
-        return CANNOT_OPEN
-    served.door.once = os.environ.pop(ONCE_VARIABLE, "")
-    if served.words is not None:
-        feed.send(NOTICE + served.words.encode())
-    view = PageView(served.server, served.door.widgets, served.outbox, served.door.tell)
-    feed.send(URL + served.url.encode())
-    watch(feed, view, parent, served)
-    served.door.close()
-    served.server.stop()
-    return 0
 
 
 if __name__ == "__main__":

@@ -7,9 +7,7 @@ import viser
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.door.viser_server import browser_of
 from gazerig.robot.dashboard.feed.camera_overlay import without_pictures
-from gazerig.robot.dashboard.feed.live_feed import WorldNow
-from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
-from gazerig.robot.dashboard.feed.page_feed import News
+from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices, WorldNow
 from gazerig.robot.dashboard.feed.page_process import (
     ALL_USERS,
     CHOICES,
@@ -132,7 +130,15 @@ class PageView:
         """Apply messages of the rig other than snapshots and frames."""
         if kind == MESSAGE and isinstance(data, list):
             who, text = data
-            self._show_reply(who, text)
+            self._controls.answered(who)
+            if text:
+                client = who.partition(":")[0]
+                self._widgets.notify(
+                    text.removeprefix(_REFUSED),
+                    client,
+                    self._outbox.name(client),
+                    refused=text.startswith(_REFUSED),
+                )
         elif kind == PARAMS and isinstance(data, list):
             self._controls.params(data)
         elif isinstance(data, dict):
@@ -142,34 +148,19 @@ class PageView:
             elif kind == VALUES:
                 self._controls.values(data)
             elif kind == REPLAY:
-                self._show_replay(data)
-
-    def _show_reply(self, who: str, text: str | None) -> None:
-        """Show the rig's reply to its client; other messages go to all users."""
-        self._controls.answered(who)
-        if text:
-            client = who.partition(":")[0]
-            self._widgets.notify(
-                text.removeprefix(_REFUSED),
-                client,
-                self._outbox.name(client),
-                refused=text.startswith(_REFUSED),
-            )
-
-    def _show_replay(self, state: Mapping[str, object]) -> None:
-        if self._replay is None:
-            duration_s = state.get("duration_s")
-            assert isinstance(duration_s, int | float)  # the rig's side writes it first
-            self._controls.leave()
-            self._tell({"recording": True})
-            self._replay = ReplayView(
-                self._widgets.panel("replay"),
-                lambda client, asked: self._outbox.ask(asked, client),
-                float(duration_s),
-            )
-        if state.get("pictures") is False:
-            self._image = without_pictures()
-        self._replay.show(state)
+                if self._replay is None:
+                    duration_s = data.get("duration_s")
+                    assert isinstance(duration_s, int | float)  # the rig's side writes it first
+                    self._controls.leave()
+                    self._tell({"recording": True})
+                    self._replay = ReplayView(
+                        self._widgets.panel("replay"),
+                        lambda client, asked: self._outbox.ask(asked, client),
+                        float(duration_s),
+                    )
+                if data.get("pictures") is False:
+                    self._image = without_pictures()
+                self._replay.show(data)
 
     def _draw(self) -> None:
         if self._newest is not None:

@@ -21,7 +21,7 @@ from gazerig.features.study.pages.study_files import FOLDER, HEADERS
 from gazerig.features.study.records import Closed, Consented, ItemAnswered, TrialBegan, TrialEnded
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.shipped import HOME
-from gazerig.robot.dashboard.door import connection_limits
+from gazerig.robot.dashboard.door import browsers
 from gazerig.robot.dashboard.door.admission import page_url
 
 STUDIES = sorted(path.stem for path in (HOME / "studies").glob("*.yaml"))
@@ -396,7 +396,7 @@ def test_what_listens_is_not_cut_off_as_a_slow_request_is(
     studies: dict[str, LoadedStudy], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("BUSY_S", "IDLE_S", "_LOOK_EVERY_S"):
-        monkeypatch.setattr(connection_limits, name, 0.05)
+        monkeypatch.setattr(browsers, name, 0.05)
     monkeypatch.setattr(server, "_BEAT_S", 0.1)
     study = studies["nakamoto_1"]
     with serving(study, tmp_path / CODE, {}) as pages:

@@ -27,8 +27,8 @@ from gazerig.features.study.screens import (
     Screen,
 )
 from gazerig.features.study.study_run import StudyRun
-from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, close_socket, until_one_ends
-from gazerig.robot.dashboard.requests.browser_requests import ASKED_BYTES, from_browser
+from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
+from gazerig.robot.dashboard.requests.outbox import ASKED_BYTES, from_browser
 
 WHO = "the experimenter"
 _BEAT_S = 1.0

@@ -28,9 +28,8 @@ from gazerig.features.study.pages.participant_page import Json, page_json
 from gazerig.features.study.pages.study_files import HEADERS, StudyFiles
 from gazerig.features.study.study_run import StudyRun
 from gazerig.robot.dashboard.door.admission import Admission, page_url
-from gazerig.robot.dashboard.door.browsers import TabLimits
-from gazerig.robot.dashboard.door.connection_limits import Connections
-from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, until_one_ends
+from gazerig.robot.dashboard.door.browsers import Connections, TabLimits
+from gazerig.robot.dashboard.door.sockets import TAKES_S, until_one_ends
 
 SENT_BYTES = 256 * 1024
 """Largest page of answers."""

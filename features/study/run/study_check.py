@@ -12,7 +12,7 @@ from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.rules import objective_rules
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.study_run import WHOLE_SHARE
-from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.surroundings import surroundings_names
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.sim_mock.scenes.registry import scenes

@@ -26,8 +26,8 @@ from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.gaze.types import Face
 from gazerig.robot.analysis.gaze_on_face import on_face
+from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.analysis.mutual_gaze import HALF_HIGH_M, HALF_WIDE_M
-from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording.read import RunRecording, used

@@ -6,7 +6,7 @@ Viser itself listens where no other program can reach it
 
 It serves the page itself (``gazerig.robot.dashboard.door.page_files``), so that the stop button and
 what it talks to work whatever viser does; viser draws the view in a frame of the page
-(``gazerig.robot.dashboard.door.view_proxy``).
+(``gazerig.robot.dashboard.door.viser_server``).
 """
 
 import asyncio
@@ -21,22 +21,25 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
 from gazerig.robot.dashboard.door.admission import Admission
-from gazerig.robot.dashboard.door.browsers import Browsers, TabLimits
-from gazerig.robot.dashboard.door.connection_limits import Connections
+from gazerig.robot.dashboard.door.browsers import Browsers, Connections, TabLimits
 from gazerig.robot.dashboard.door.page_files import PageFiles
-from gazerig.robot.dashboard.door.view_proxy import VIEW, ViewProxy, client_of
-from gazerig.robot.dashboard.door.viser_server import ViewAddress
-from gazerig.robot.dashboard.door.webcam_socket import TakePicture, WebcamSocket
-from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, close_socket, until_one_ends
-from gazerig.robot.dashboard.door.widget_socket import WidgetSocket
-from gazerig.robot.dashboard.requests.browser_requests import (
+from gazerig.robot.dashboard.door.sockets import (
+    TAKES_S,
+    TakePicture,
+    WebcamSocket,
+    WidgetSocket,
+    close_socket,
+    until_one_ends,
+)
+from gazerig.robot.dashboard.door.viser_server import VIEW, ViewAddress, ViewProxy, client_of
+from gazerig.robot.dashboard.requests.outbox import (
     ASKED_BYTES,
+    TokenBucket,
     compact,
     from_browser,
     leads,
 )
-from gazerig.robot.dashboard.requests.stop_sender import StopSender
-from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
+from gazerig.robot.dashboard.requests.stop_channel import StopSender
 from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES, Widgets
 
 MOST_LINES = 32
@@ -224,24 +227,20 @@ class AuthProxy:
                 if why_not is not None:
                     return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
                 if "token" in request.query:
-                    return self._with_cookie(request)
+                    answer = self._admission.with_cookie(request, _HEADERS)
+                    if self._name_cookie not in request.cookies:
+                        answer.set_cookie(
+                            self._name_cookie,
+                            secrets.token_urlsafe(9),
+                            httponly=True,
+                            samesite="Strict",
+                            path="/",
+                            max_age=_DAY_S,
+                        )
+                    return answer
                 return await handler(request)
 
         return admit
-
-    def _with_cookie(self, request: web.Request) -> web.Response:
-        """Move the token to a cookie, and set another cookie with the browser's name."""
-        answer = self._admission.with_cookie(request, _HEADERS)
-        if self._name_cookie not in request.cookies:
-            answer.set_cookie(
-                self._name_cookie,
-                secrets.token_urlsafe(9),
-                httponly=True,
-                samesite="Strict",
-                path="/",
-                max_age=_DAY_S,
-            )
-        return answer
 
     @property
     def _name_cookie(self) -> str:

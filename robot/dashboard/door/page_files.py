@@ -38,16 +38,15 @@ class PageFiles:
 
     def add_to(self, router: web.UrlDispatcher) -> None:
         """Add the routes of all files."""
-        router.add_get("/", self._document)
+
+        async def answer(request: web.Request) -> web.Response:
+            name = request.path.rpartition("/")[2] or _DOCUMENT
+            return file_answer(self._files[name], self._headers)
+
+        router.add_get("/", answer)
         for name in self._files:
             if name != _DOCUMENT:
-                router.add_get(f"/rig/{name}", self._file)
-
-    async def _document(self, request: web.Request) -> web.Response:
-        return file_answer(self._files[_DOCUMENT], self._headers)
-
-    async def _file(self, request: web.Request) -> web.Response:
-        return file_answer(self._files[request.path.rpartition("/")[2]], self._headers)
+                router.add_get(f"/rig/{name}", answer)
 
 
 def file_answer(path: Path, headers: Mapping[str, str]) -> web.Response:

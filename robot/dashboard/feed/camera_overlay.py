@@ -6,16 +6,9 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import (
-    Depth,
-    DetectedFace,
-    DetectedPerson,
-    Detections,
-    ImageArray,
-    MovingBlob,
-)
+from gazerig.drivers.types import Depth, Detections, ImageArray
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.feed.gaze_trail import EVERY_S
+from gazerig.robot.dashboard.feed.live_feed import EVERY_S
 from gazerig.robot.model.intrinsics import project
 
 IMAGE_WIDTH_PX = 640
@@ -56,16 +49,37 @@ def draw_detections(
     if heat_px is not None:
         draw_heat(drawn, scale * heat_px)
     for person in detections.people if faces else ():
-        _draw_person(drawn, person, scale)
+        x, y, width, height = person.box_px
+        corner = _pixel(x, y, scale)
+        cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 1, cv2.LINE_AA)
+        cv2.circle(drawn, _pixel(*person.head_px, scale), 4, _FACE, 1, cv2.LINE_AA)
+        _write(drawn, f"person {person.confidence:.2f}", corner, _FACE)
     for palm in (detections.palms or ()) if faces else ():
         radius = max(2, round(0.5 * palm.size_px * scale))
         cv2.circle(drawn, _pixel(*palm.centre_px, scale), radius, _BLOB, 1, cv2.LINE_AA)
     for face in detections.faces if faces else ():
-        _draw_face(drawn, face, scale)
+        x, y, width, height = face.box_px
+        corner = _pixel(x, y, scale)
+        cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 2, cv2.LINE_AA)
+        _write(drawn, f"{face.confidence:.2f}", corner, _FACE)
+        for landmark_x, landmark_y in face.landmarks_px:
+            cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
     for blob in detections.blobs if faces else ():
-        _draw_blob(drawn, blob, lens, scale)
+        z = blob.p_camera_m[2]
+        if z <= 0.0:  # behind the camera
+            continue
+        u, v = project([blob.p_camera_m], lens)[0].tolist()
+        radius = max(2, _clip(lens.fx_px * blob.radius_m / z * scale))
+        centre = _pixel(u, v, scale)
+        cv2.circle(drawn, centre, radius, _BLOB, 1, cv2.LINE_AA)
+        _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
     if gaze_px is not None:
-        _draw_gaze(drawn, _pixel(gaze_px[0], gaze_px[1], scale))
+        share = drawn.shape[1] / IMAGE_WIDTH_PX  # small images are shown in the same size
+        ring, edge, line, dot = (max(2, round(share * px)) for px in (14, 5, 3, 3))
+        at = _pixel(*gaze_px, scale)
+        cv2.circle(drawn, at, ring, _GAZE_EDGE, edge, cv2.LINE_AA)
+        cv2.circle(drawn, at, ring, _GAZE, line, cv2.LINE_AA)
+        cv2.circle(drawn, at, dot, _GAZE, -1, cv2.LINE_AA)
     return drawn
 
 
@@ -109,11 +123,6 @@ def depth_image(depth_m: Depth) -> ImageArray:
     share = np.log(FARTHEST_M / metres) / np.log(FARTHEST_M / NEAREST_M)
     drawn = cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_TURBO)
     drawn[~known] = _DARK_GROUND
-    _draw_scale(drawn)
-    return np.asarray(drawn, np.uint8)
-
-
-def _draw_scale(drawn: ImageArray) -> None:
     height, width = drawn.shape[:2]
     ramp = np.linspace(255, 0, width).astype(np.uint8)[None].repeat(_SCALE_PX, axis=0)
     foot = drawn[max(0, height - _SCALE_PX) :]
@@ -123,6 +132,7 @@ def _draw_scale(drawn: ImageArray) -> None:
             drawn, text, (x, height - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1,
             cv2.LINE_AA,
         )  # fmt: skip
+    return np.asarray(drawn, np.uint8)
 
 
 def encode(image: ImageArray) -> bytes:
@@ -141,41 +151,6 @@ def _small(image: ImageArray | None, detections: Detections, scale: float) -> Im
     if image.shape[:2] == (height, width):
         return image.copy()
     return cast(ImageArray, cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
-
-
-def _draw_face(drawn: ImageArray, face: DetectedFace, scale: float) -> None:
-    x, y, width, height = face.box_px
-    corner = _pixel(x, y, scale)
-    cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 2, cv2.LINE_AA)
-    _write(drawn, f"{face.confidence:.2f}", corner, _FACE)
-    for landmark_x, landmark_y in face.landmarks_px:
-        cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
-
-
-def _draw_person(drawn: ImageArray, person: DetectedPerson, scale: float) -> None:
-    x, y, width, height = person.box_px
-    corners = _pixel(x, y, scale), _pixel(x + width, y + height, scale)
-    cv2.rectangle(drawn, *corners, _FACE, 1, cv2.LINE_AA)
-    cv2.circle(drawn, _pixel(*person.head_px, scale), 4, _FACE, 1, cv2.LINE_AA)
-    _write(drawn, f"person {person.confidence:.2f}", corners[0], _FACE)
-
-
-def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: float) -> None:
-    z = blob.p_camera_m[2]
-    if z <= 0.0:  # behind the camera
-        return
-    u, v = project([blob.p_camera_m], lens)[0].tolist()
-    radius = max(2, _clip(lens.fx_px * blob.radius_m / z * scale))
-    centre = _pixel(u, v, scale)
-    cv2.circle(drawn, centre, radius, _BLOB, 1, cv2.LINE_AA)
-    _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
-
-
-def _draw_gaze(drawn: ImageArray, at: Point) -> None:
-    share = drawn.shape[1] / IMAGE_WIDTH_PX  # small images are shown in the same size
-    ring, edge, line, dot = (max(2, round(share * px)) for px in (14, 5, 3, 3))
-    for radius, thick, colour in ((ring, edge, _GAZE_EDGE), (ring, line, _GAZE), (dot, -1, _GAZE)):
-        cv2.circle(drawn, at, radius, colour, thick, cv2.LINE_AA)
 
 
 def _write(drawn: ImageArray, text: str, at: Point, colour: tuple[int, int, int]) -> None:

@@ -5,16 +5,19 @@ that was commanded, what was found drawn into the camera's image. The control lo
 ticks, and other data (``RunState``) when it has changed.
 """
 
+import json
 import pickle
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.process.passed_image import PassedImage, taken
+from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
+from gazerig.drivers.process.passed_image import PassedImage, receive, taken
 from gazerig.drivers.types import (
     BusHealth,
     DetectedFace,
@@ -25,11 +28,20 @@ from gazerig.drivers.types import (
 )
 from gazerig.gaze.types import Floats, Mat3, Percept, Vec3
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_stream import TickRow, decode_plain, decode_rows, encode
+from gazerig.robot.control.tick_stream import decode_plain, decode_rows, encode
 from gazerig.robot.control.tick_text import health_text, perception_text
-from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
-from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.feed.page_process import (
+    CHOICES,
+    FRAME,
+    MESSAGE,
+    PARAMS,
+    REPLAY,
+    SNAPSHOT,
+    VALUES,
+    unpack,
+)
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
+from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
 from gazerig.robot.description.build import RigShape
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.frames import PoseHistory
@@ -195,7 +207,17 @@ class LiveFeed:
         elif kind == STATE:
             self._state = RunState(*decode_plain(body))
         elif kind == RIG:
-            self._take_rig(LiveRig(*pickle.loads(body)))
+            rig = LiveRig(*pickle.loads(body))
+            if self._builder is None:
+                self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
+                self._poses = PoseHistory(rig.shown.kinematics)
+            self._builder.rig = rig.shown
+            self._builder.retune(rig.rate_hz)
+            self.emulated = rig.emulated
+            self._picture, self._detector = rig.picture, rig.detector
+            # Sent again with every change of the rig; what is equal stays, for it is drawn already.
+            if pickle.dumps(rig.world) != pickle.dumps(self._world):
+                self._world = rig.world
         elif kind == DETECTED:
             self._take_frame(FrameHead(*decode_plain(body)), fd)
         elif kind == PIXELS:
@@ -222,12 +244,12 @@ class LiveFeed:
                 state.character,
                 state.conversation,
                 tuple(OtherHead(*other) for other in state.others),
-            )  # fmt: skip
+            )
         )
 
     @property
     def shape(self) -> RigShape | None:
-        """Return the geometry of the rig's parts; None if unknown."""
+        """Geometry of the rig's parts; None if unknown."""
         rig = self._builder.rig if self._builder is not None else None
         return rig.shape if rig is not None else None
 
@@ -250,7 +272,11 @@ class LiveFeed:
         field_rad = builder.rig.horizontal_rad
         lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
         R, p_m = builder.rig.mount.pose(*poses.head_pose(found.captured_s))
-        found = self._pictured(found, lens, R, p_m)
+        start_s = self._state.scene_start_s
+        if _blank(found) and self._picture is not None and start_s is not None:
+            size_px = found.width_px, found.height_px
+            seen_by = PinholeView(found.captured_s - start_s, lens, size_px, R, p_m)
+            found = replace(found, image=self._picture.draw(seen_by).image)
         # The page's process draws; the control loop's imports this module too, without OpenCV.
         from gazerig.robot.dashboard.feed.camera_overlay import draw_detections, ground
 
@@ -265,50 +291,31 @@ class LiveFeed:
             heat_px=None if points_m is None else pixels(points_m, R, p_m, lens),
         )
 
-    def _pictured(self, found: Detections, lens: Intrinsics, R: Mat3, p_m: Vec3) -> Detections:
-        """Return detections with a drawn image of the scene if they have no image."""
-        start_s = self._state.scene_start_s
-        if not _blank(found) or self._picture is None or start_s is None:
-            return found
-        size_px = found.width_px, found.height_px
-        seen_by = PinholeView(found.captured_s - start_s, lens, size_px, R, p_m)
-        return replace(found, image=self._picture.draw(seen_by).image)
-
-    def _take_rig(self, rig: LiveRig) -> None:
-        if self._builder is None:
-            self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
-            self._poses = PoseHistory(rig.shown.kinematics)
-        self._builder.rig = rig.shown
-        self._builder.retune(rig.rate_hz)
-        self.emulated = rig.emulated
-        self._picture, self._detector = rig.picture, rig.detector
-        # Sent again with every change of the rig; what is equal stays, for it is drawn already.
-        if pickle.dumps(rig.world) != pickle.dumps(self._world):
-            self._world = rig.world
-
     def _take_ticks(self, data: bytes) -> None:
         if self._builder is None or self._poses is None:
             return
         percepts, rows = decode_rows(data)
         for row in rows:
-            tick = self._tick(row, percepts)
+            if row.percept is None:
+                self._percept = None
+            else:  # the previous percept replaces one that is not in the batch
+                self._percept = percepts.get(row.percept, self._percept)
+            tick = Tick(
+                row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
+                row.desired_rad, row.guard_result, row.events, (), row.stopped, row.led, row.lead,
+                row.gesture, row.parking,
+            )  # fmt: skip
             self._builder.update(tick)
             self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
             self._newest, self.shown_s = tick, tick.t_s
             self._trail.add(tick.t_s, tick.gaze.gaze_point_world_m)
         self._new_ticks = True
 
-    def _tick(self, row: TickRow, percepts: Mapping[int, Percept]) -> Tick:
-        """Return a tick; the previous percept replaces one that is not in the batch."""
-        number = row.percept
-        self._percept = None if number is None else percepts.get(number, self._percept)
-        return Tick(
-            row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
-            row.desired_rad, row.guard_result, row.events, (), row.stopped, row.led, row.lead,
-            row.gesture, row.parking,
-        )  # fmt: skip
-
     def _take_frame(self, head: FrameHead, fd: int, pixels: bytes | None = None) -> None:
+        lens = None
+        if head.lens is not None:
+            fx_px, fy_px, cx_px, cy_px, k1, k2, p1, p2, k3 = head.lens
+            lens = Intrinsics(fx_px, fy_px, cx_px, cy_px, (k1, k2, p1, p2, k3))
         found = Detections(
             head.captured_s,
             head.number,
@@ -316,7 +323,7 @@ class LiveFeed:
             head.height_px,
             tuple([DetectedFace(box, np.array(marks), sure) for box, marks, sure in head.faces]),
             tuple([MovingBlob(*blob) for blob in head.blobs]),
-            lens=None if head.lens is None else _intrinsics(*head.lens),
+            lens=lens,
             people=tuple([DetectedPerson(*one) for one in head.people]),
             conditions=tuple(head.conditions),
         )
@@ -346,9 +353,99 @@ def pixels(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics) -> Floa
     return np.asarray(project(seen[seen[:, 2] >= _NEAREST_M], lens), np.float64).reshape(-1, 2)
 
 
-def _intrinsics(
-    fx_px: float, fy_px: float, cx_px: float, cy_px: float, *distortion: float
-) -> Intrinsics:
-    """Return a lens from the numbers that came with a frame."""
-    k1, k2, p1, p2, k3 = distortion
-    return Intrinsics(fx_px, fy_px, cx_px, cy_px, (k1, k2, p1, p2, k3))
+KEPT_S, EVERY_S = 12.0, 0.05
+"""Duration of the trail and time between its points, s."""
+
+
+class GazeTrail:
+    """Gaze points of the last seconds in the world frame, m."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[float, Vec3]] = deque(maxlen=int(KEPT_S / EVERY_S))
+
+    def add(self, t_s: float, p_world_m: Vec3) -> None:
+        """Add a point; one with an earlier time than the last clears the trail."""
+        if self._points and t_s < self._points[-1][0]:
+            self._points.clear()
+        if not self._points or t_s - self._points[-1][0] >= EVERY_S:
+            self._points.append((t_s, p_world_m))
+
+    def points(self) -> Floats:
+        """Return the points (n, 3), oldest first."""
+        return np.array([p for _, p in self._points], dtype=np.float64).reshape(-1, 3)
+
+
+@dataclass
+class OverlayChoices:
+    """Selected layers; users of the page change them."""
+
+    gaze: bool = True
+    faces: bool = False
+    heat: bool = False
+    ghost: bool = False
+    sight: bool = False
+    camera: bool = False
+    eyes: bool = False
+    parts: bool = False
+
+    NAMES: ClassVar[dict[str, str]] = {
+        "gaze": "picture: where the head looks",
+        "faces": "picture: faces and what moves, as found",
+        "heat": "picture: where the head has looked",
+        "ghost": "ghost of the desired pose",
+        "sight": "lines of sight",
+        "camera": "what the camera covers",
+        "eyes": "what the eyes can attend to",
+        "parts": "the eight parts of a face",
+    }
+
+
+class News(NamedTuple):
+    """Messages that waited on the socket: all snapshots, the last frame, whether it has closed.
+
+    jpeg: a recording's frame; image: a running rig's, with what was found in it, BGR
+    world: the simulated world about the rig, if there is one
+    shape: how the rig is built, if it is known
+    others: what must not be lost or passed over, as (kind, what its JSON holds), oldest first
+    """
+
+    snapshots: tuple[Snapshot, ...]
+    jpeg: bytes | None
+    ended: bool
+    others: tuple[tuple[bytes, object], ...] = ()
+    image: ImageArray | None = None
+    world: WorldNow | None = None
+    shape: RigShape | None = None
+
+
+def drain(feed: MessageLink, live: LiveFeed) -> News:
+    """Return everything that waits, without waiting for more.
+
+    live: takes what a running rig sends
+    """
+    snapshots: list[Snapshot] = []
+    others: list[tuple[bytes, object]] = []
+    jpeg, ended = None, False
+    while not ended:
+        try:
+            message, fd = receive(feed, MESSAGE_BYTES, DONT_WAIT)
+        except BlockingIOError:
+            break
+        except ConnectionResetError:
+            message, fd = b"", -1
+        ended = not message
+        kind, body = message[:1], message[1:]
+        if kind == SNAPSHOT:
+            snapshots.append(unpack(message))
+            live.shown_s = snapshots[-1].t_s
+        elif kind == FRAME:
+            jpeg = body
+        elif kind in (CHOICES, PARAMS, VALUES, MESSAGE, REPLAY):
+            others.append((kind, json.loads(body)))
+        else:
+            live.take(message, fd)
+    if (newest := live.snapshot()) is not None:
+        snapshots.append(newest)
+    return News(
+        tuple(snapshots), jpeg, ended, tuple(others), live.image(), live.world(), live.shape
+    )

@@ -197,8 +197,15 @@ class PageProcess:
         """
         link.setblocking(False)
         self._socket = link
-        self._inbox = Inbox(link, self._take, self._handle_loss, self._refuse)
-        self._stops = StopListener(stops, self._stop) if stops is not None else None
+
+        def refuse(message: bytes) -> None:
+            self._answer(parse_request(message)[0], "refused: too many requests at once; try again")
+
+        def stop(asked: Mapping[str, object]) -> str:
+            return self._handle(json.dumps(asked).encode()) or ""
+
+        self._inbox = Inbox(link, self._take, self._handle_loss, refuse)
+        self._stops = StopListener(stops, stop) if stops is not None else None
 
     def show(self, snapshot: Snapshot) -> None:
         """Send a snapshot; if the page does not accept it, it is dropped and counted."""
@@ -267,30 +274,20 @@ class PageProcess:
         elif kind == BEAT:
             self._silent_s = 0.0
         elif kind == URL:
-            self._take_url(body.decode())
+            url = body.decode()
+            self._url, self._silent_s = url, 0.0
+            self._port = int(urlsplit(url).port or self._port)
+            self.started += 1
+            if self.started > 1 and self._choices:
+                self.offer(self._choices)
+            if self._mourned and not self._welcomed:
+                self._welcomed = True
+                self._notices.append(f"the page is there again, at {url}")
         elif kind == NOTICE:
             self._notices.append(body.decode())
         elif kind == REQUEST:
             who, data = parse_request(message)
             self._answer(who, self._handle(data))
-
-    def _take_url(self, url: str) -> None:
-        """Record that the page is ready; a restarted page is sent its initial state."""
-        self._url, self._silent_s = url, 0.0
-        self._port = int(urlsplit(url).port or self._port)
-        self.started += 1
-        if self.started > 1 and self._choices:
-            self.offer(self._choices)
-        if self._mourned and not self._welcomed:
-            self._welcomed = True
-            self._notices.append(f"the page is there again, at {url}")
-
-    def _refuse(self, message: bytes) -> None:
-        self._answer(parse_request(message)[0], "refused: too many requests at once; try again")
-
-    def _stop(self, asked: Mapping[str, object]) -> str:
-        """Execute a stop; return "" if it succeeded."""
-        return self._handle(json.dumps(asked).encode()) or ""
 
     def _handle(self, data: bytes) -> str | None:
         """Execute a request; an error in it must not end the handling of requests."""
@@ -316,8 +313,17 @@ class PageProcess:
         """Report once that the page has died, and restart it if that can help."""
         process = self._process
         self._hang_up()
-        text = self._last_lines()
-        self.gone = process is None or _code(process) == CANNOT_OPEN
+        text = "it gave no reason"
+        if self._errors is not None:
+            lines = _end_of(self._errors).decode(errors="replace").strip().splitlines()
+            text = lines[-1].strip() if lines else text
+        code: int | None = CANNOT_OPEN
+        if process is not None:
+            try:
+                code = process.wait(_CLOSE_TIMEOUT_S)
+            except subprocess.TimeoutExpired:  # it has closed its link and hangs
+                code = None
+        self.gone = code == CANNOT_OPEN
         if self._clock.now_s() - self._began_s > _WELL_AFTER_S:
             self._wait_s, self._mourned, self._welcomed = _AGAIN_AFTER_S, False, False
         if not self._mourned:
@@ -354,12 +360,6 @@ class PageProcess:
         self._check_s = now_s + _CHECK_S
         if self._silent_s >= _HANG_S or child_process.is_suspended(process.pid):
             process.kill()
-
-    def _last_lines(self) -> str:
-        if self._errors is None:
-            return "it gave no reason"
-        lines = _end_of(self._errors).decode(errors="replace").strip().splitlines()
-        return lines[-1].strip() if lines else "it gave no reason"
 
     def _hang_up(self) -> None:
         link, self._socket = self._socket, None
@@ -409,11 +409,3 @@ def _end_of(file: BinaryIO) -> bytes:
         return os.pread(file.fileno(), _LAST_LINES_BYTES, start)
     file.seek(start)
     return file.read(_LAST_LINES_BYTES)
-
-
-def _code(process: subprocess.Popen[bytes]) -> int | None:
-    """Return the exit code of a process that has closed its link, None if it hangs."""
-    try:
-        return process.wait(_CLOSE_TIMEOUT_S)
-    except subprocess.TimeoutExpired:
-        return None

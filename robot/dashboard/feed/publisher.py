@@ -4,12 +4,17 @@ Nothing is worked out here that is only shown: the page's process makes of the t
 see (robot/dashboard/feed/live_feed.py). Other data is sent when it has changed.
 """
 
+import json
 import os
+import threading
+from collections import deque
 from collections.abc import Callable, Iterable
 from math import inf
 
 from gazerig.drivers.process.passed_image import CAN_PASS, copied
 from gazerig.drivers.types import Detections
+from gazerig.robot.control.command_handler import ParamAccess, plain
+from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick_stream import TickBatch
 from gazerig.robot.dashboard.feed.live_feed import (
     TICKS,
@@ -20,12 +25,126 @@ from gazerig.robot.dashboard.feed.live_feed import (
     rig_message,
     state_message,
 )
-from gazerig.robot.dashboard.feed.page_process import PageProcess
-from gazerig.robot.dashboard.feed.param_feed import ParamFeed, ParamThread
-from gazerig.robot.model.commands import Command, Tune
+from gazerig.robot.dashboard.feed.page_process import PARAMS, VALUES, PageProcess
+from gazerig.robot.model.commands import Command, Tune, Value
 
 _FRAME_S = 0.08
 _STATE_S = 0.3
+_PIECE = 40  # parameters in a message: some 20 kB, a tenth of the limit
+
+
+class ParamFeed:
+    """Sends the parameters to the page, and after that all changes.
+
+    The first messages are written by the constructor: it takes a moment, so make it before the
+    torque is on.
+
+    Args:
+        send: sends a message to the page; False: not now.
+        tuning: the parameters.
+    """
+
+    def __init__(self, send: Callable[[bytes], bool], tuning: ParamAccess) -> None:
+        self._send = send
+        self._tuning = tuning
+        self._due: deque[bytes] = deque()
+        self._known: dict[str, Value] = {}
+        self._version: int | None = None
+        self._write()
+
+    def restart(self) -> None:
+        """Send everything again to a restarted page."""
+        self._due.clear()
+        self._known, self._version = {}, None
+
+    @property
+    def pending(self) -> bool:
+        """Return whether data waits to be sent."""
+        return bool(self._due) or self._tuning.version != self._version
+
+    def step(self) -> None:
+        """Send waiting data, as far as the page accepts it."""
+        if not self._due and self._tuning.version != self._version:
+            self._write()
+        while self._due and self._send(self._due[0]):
+            self._due.popleft()
+
+    def _write(self) -> None:
+        """Create messages: all parameters the first time, then changed values."""
+        first = self._version is None
+        self._version = self._tuning.version  # before reading: a change meanwhile is seen next
+        if first:
+            params = [plain(param._asdict()) for param in self._tuning.parameters()]
+            for start in range(0, len(params), _PIECE):
+                self._due.append(PARAMS + json.dumps(params[start : start + _PIECE]).encode())
+        now = dict(self._tuning.values())
+        gone = object()
+        changed = [key for key, value in now.items() if self._known.get(key, gone) != value]
+        self._known = now
+        state: dict[str, object] = {
+            "unsaved": [change.key for change in self._tuning.unsaved()],
+            "path": str(self._tuning.path),
+            "character": self._tuning.character_name,
+            "characters": sorted(self._tuning.characters()),
+        }
+        for start in range(0, max(1, len(changed)), _PIECE):
+            piece = {key: plain(now[key]) for key in changed[start : start + _PIECE]}
+            self._due.append(VALUES + json.dumps({**state, "values": piece}).encode())
+
+
+class ParamThread:
+    """Lets a thread send the parameters: writing them takes milliseconds, which a tick has not.
+
+    It waits until there is something to send.
+
+    Args:
+        feed: sends; belongs to the thread from now on.
+        tell: gets a line if that fails.
+    """
+
+    def __init__(self, feed: ParamFeed, tell: Callable[[str], None]) -> None:
+        self._feed, self._tell = feed, tell
+        self._wanted = threading.Event()
+        self._again = self._over = self._failed = False
+        self._thread: threading.Thread | None = None
+
+    def look(self) -> None:
+        """Request that changes are sent; called by the loop."""
+        if self._feed.pending and not self._wanted.is_set():
+            if self._thread is None:
+                self._thread = threading.Thread(
+                    target=self._work, name="page parameters", daemon=True
+                )
+                self._thread.start()
+            self._wanted.set()
+
+    def restart(self) -> None:
+        """Request that everything is sent again to a restarted page."""
+        self._again = True
+        self._wanted.set()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._over = True
+        self._wanted.set()
+        if self._thread is not None:
+            self._thread.join(timeout=2.0)
+
+    def _work(self) -> None:
+        while True:
+            self._wanted.wait()
+            self._wanted.clear()
+            if self._over:
+                return
+            try:
+                if self._again:
+                    self._again = False
+                    self._feed.restart()
+                self._feed.step()
+            except Exception as error:
+                if not self._failed:
+                    self._failed = True
+                    self._tell(failure_text("the page's parameters", error))
 
 
 class Publisher:
@@ -75,10 +194,21 @@ class Publisher:
     def take(self, batch: TickBatch) -> bool:
         """Send ticks and changes; return False if the page did not accept the ticks."""
         page, t_s = self._page, batch.newest.t_s
-        self._tell_notices()
+        if not self._url_told and (url := page.url()) is not None:
+            self._url_told = True
+            self._tell(f"the page is at {url}")
+            if self._browse is not None and (once := page.url_once()) is not None:
+                self._browse(once)
+        while (note := page.notice()) is not None:
+            self._tell(note)
         new = page.started != self._started
         if new:
-            self._restart()
+            # Send everything to a new page: only the one before has received it.
+            if self._params is not None and self._started:
+                self._params.restart()
+            self._started = page.started
+            self._rig_sent, self._sent, self._frame = False, None, 0
+            self._state_s = self._frame_s = -inf
         if self._started == 0:
             return True
         if self._params is not None:
@@ -87,7 +217,9 @@ class Publisher:
             self._rig_sent = page.send(rig_message(self._rig()))
         if abs(t_s - self._state_s) >= _STATE_S:
             self._state_s = t_s
-            self._send_state()
+            state = self._state()
+            if state != self._sent and page.send(state_message(state)):
+                self._sent = state
         taken = page.send(TICKS + batch.data)
         if not taken:
             page.dropped += batch.ticks
@@ -100,30 +232,6 @@ class Publisher:
         """Send no more parameters."""
         if self._params is not None:
             self._params.close()
-
-    def _restart(self) -> None:
-        """Send everything to a new page: only the one before has received it."""
-        if self._params is not None and self._started:
-            self._params.restart()
-        self._started = self._page.started
-        self._rig_sent, self._sent, self._frame = False, None, 0
-        self._state_s = self._frame_s = -inf
-
-    def _tell_notices(self) -> None:
-        """Print the page's address once, and its other messages."""
-        page = self._page
-        if not self._url_told and (url := page.url()) is not None:
-            self._url_told = True
-            self._tell(f"the page is at {url}")
-            if self._browse is not None and (once := page.url_once()) is not None:
-                self._browse(once)
-        while (note := page.notice()) is not None:
-            self._tell(note)
-
-    def _send_state(self) -> None:
-        state = self._state()
-        if state != self._sent and self._page.send(state_message(state)):
-            self._sent = state
 
     def _send_frame(self, found: Detections | None) -> None:
         """Send the newest frame unless it was sent already."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
-from gazerig.gaze.types import GazeState, Vec3
+from gazerig.gaze.types import GazeState
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
@@ -16,7 +16,7 @@ from gazerig.robot.control.tick_text import doing, lead_text, leader
 from gazerig.robot.description.build import RigShape
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.leader import sentence
 from gazerig.robot.model.types import (
@@ -116,7 +116,9 @@ class SnapshotBuilder:
             if self._newest is not None and tick.t_s < self._newest.t_s:
                 self._begin()
             self._newest = tick
-            self._count(tick)
+            self._timing.update(tick.t_s)
+            if tick.joints.missing:
+                self._unanswered.update(tick.joints.missing)
             events += map(_seen, self._events.update(tick))
             if tick.t_s - self._trail_s >= _TRAIL_S:
                 self._trail_s = tick.t_s
@@ -125,12 +127,19 @@ class SnapshotBuilder:
                 worst = tick.guard_result.level
         if self._newest is None:
             return None
-        timing = self._loop_figures(self._newest.t_s)
+        t_s = self._newest.t_s
+        if t_s - self._figures_s >= _TIMING_S:
+            self._figures, self._figures_s = self._timing.figures(), t_s
+        timing = self._figures
         busy = busy_text(timing)
         plain = snapshot(
             self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,
             said.perception, self.rig,
         )  # fmt: skip
+        reasons = plain.reasons
+        others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
+        if busy and len(others) < len(reasons):
+            reasons = (*others, busy)  # a busy computer is why readings are old
         return replace(
             plain,
             character=said.character,
@@ -140,23 +149,12 @@ class SnapshotBuilder:
             ),
             timing=timing,
             busy=busy,
-            reasons=_limit_reasons(plain.reasons, busy),
+            reasons=reasons,
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),
             others=said.others,
         )
-
-    def _count(self, tick: Tick) -> None:
-        self._timing.update(tick.t_s)
-        if tick.joints.missing:
-            self._unanswered.update(tick.joints.missing)
-
-    def _loop_figures(self, t_s: float) -> LoopFigures | None:
-        """Return the timing of the loop, computed twice a second."""
-        if t_s - self._figures_s >= _TIMING_S:
-            self._figures, self._figures_s = self._timing.figures(), t_s
-        return self._figures
 
 
 def snapshot(
@@ -173,7 +171,11 @@ def snapshot(
     """
     pose, percept, target = tick.pose, tick.percept, tick.target
     does, leads = doing(tick), leader(tick)
-    joints = joint_names(tick, rig)
+    joints, measured = joint_names(tick, rig), tick.joints.measured
+    field = rig.field if rig is not None else None
+    pivot = None
+    if rig is not None:
+        pivot = rig.kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)[0].start_m
     return Snapshot(
         t_s=tick.t_s,
         measured_rad=tick.joints.position_rad,
@@ -209,21 +211,21 @@ def snapshot(
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,
-        field_deg=None if rig is None else _field_deg(rig.field),
+        field_deg=(
+            (field.temporal_deg, field.nasal_deg, field.up_deg, field.down_deg) if field else None
+        ),
         servos=_servos(tick, rig),
         worst=tick.guard_result.level,
         trail=(_trail(tick),),
         joints=joints,
-        estimated=_estimated(tick.joints, joints),
+        estimated=tuple(
+            [name for name, is_measured in zip(joints, measured, strict=True) if not is_measured]
+            if measured
+            else ()
+        ),
         lower_lids=_lower_lids(pose, joints),
-        p_world_pivot_m=_pivot(pose, rig),
+        p_world_pivot_m=pivot,
     )
-
-
-def _limit_reasons(reasons: tuple[str, ...], busy: str) -> tuple[str, ...]:
-    """Return why joints are limited; a busy computer replaces joints with old readings."""
-    others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
-    return (*others, busy) if busy and len(others) < len(reasons) else reasons
 
 
 def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
@@ -233,24 +235,8 @@ def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
     return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
 
 
-def _estimated(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the joints whose position is not measured; none if it is unknown."""
-    if not joints.measured:
-        return ()
-    pairs = zip(names, joints.measured, strict=True)
-    return tuple([name for name, measured in pairs if not measured])
-
-
 def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] | None:
     return None if _LOWER_LIDS.isdisjoint(names) else (pose.lower_left, pose.lower_right)
-
-
-def _pivot(pose: GazeState, rig: ShownRig | None) -> Vec3 | None:
-    """Return the pivot of the neck in the world, m."""
-    if rig is None:
-        return None
-    head, _ = rig.kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
-    return head.start_m
 
 
 def _faces(tick: Tick) -> tuple[SeenFace, ...]:
@@ -280,7 +266,7 @@ def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
         SeenBody(
             bodies.ids[i],
             "person" if kind == "face" else kind,
-            _vec(bodies.p_world_m[i]),
+            tuple(bodies.p_world_m[i].tolist()),
             float(bodies.radius_m[i]),
         )
         for i, kind in enumerate(bodies.kinds)
@@ -314,12 +300,17 @@ def _camera(tick: Tick, rig: ShownRig) -> SeenCamera | None:
     return SeenCamera(R, p, horizontal_rad, found.width_px / found.height_px)
 
 
-def _field_deg(field: FieldOfViewParams) -> tuple[float, float, float, float]:
-    return (field.temporal_deg, field.nasal_deg, field.up_deg, field.down_deg)
-
-
 def _servos(tick: Tick, rig: ShownRig | None) -> Servos:
-    joints = tick.joints
+    joints, limits = tick.joints, None
+    if rig is not None:
+        health, of_joints = rig.health, rig.limits
+        limits = ServoLimits(
+            tuple([limit.hottest_c - health.warm_c for limit in of_joints]),
+            tuple([limit.hottest_c - health.hot_c for limit in of_joints]),
+            tuple([limit.lowest_v + health.voltage_margin_v for limit in of_joints]),
+            tuple([limit.highest_v - health.voltage_margin_v for limit in of_joints]),
+            (health.lasting_load,) * len(of_joints),
+        )
     return Servos(
         joints.temperature_c,
         joints.voltage_v,
@@ -328,18 +319,7 @@ def _servos(tick: Tick, rig: ShownRig | None) -> Servos:
         joints.fault,
         tuple([tick.t_s - at_s for at_s in joints.measured_s]),
         (),
-        _limits(rig) if rig is not None else None,
-    )
-
-
-def _limits(rig: ShownRig) -> ServoLimits:
-    health = rig.health
-    return ServoLimits(
-        tuple([limit.hottest_c - health.warm_c for limit in rig.limits]),
-        tuple([limit.hottest_c - health.hot_c for limit in rig.limits]),
-        tuple([limit.lowest_v + health.voltage_margin_v for limit in rig.limits]),
-        tuple([limit.highest_v - health.voltage_margin_v for limit in rig.limits]),
-        (health.lasting_load,) * len(rig.limits),
+        limits,
     )
 
 
@@ -359,8 +339,3 @@ def _seen(event: Event) -> SeenEvent:
             return SeenFixation(event.start_s, event.duration_s, event.part)
         case BlinkEvent():
             return SeenBlink(event.onset_s, event.duration_s)
-
-
-def _vec(row: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Vec3:
-    x, y, z = row.tolist()
-    return (x, y, z)

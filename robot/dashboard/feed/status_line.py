@@ -38,21 +38,18 @@ class StatusLine:
         """Add a tick; called by the loop."""
         if self._due_s is None or tick.t_s >= self._due_s:
             self._due_s = tick.t_s + _LINE_S
-            self._write(self._line(tick))
-
-    def _line(self, tick: Tick) -> str:
-        if abs(tick.t_s - self._timed_s) >= _RATE_S:
-            self._timed_s, timing = tick.t_s, self._timing()
-            known = timing is not None and timing.over_s >= 0.9 * _RATE_S
-            self._rate = f"{timing.rate_hz:5.1f} Hz" if timing is not None and known else ""
-            self._busy = busy_text(timing)
-        parts = [
-            overdue_text(),
-            self._busy,
-            self._rate,
-            doing(tick).headline,
-            guard_text(tick.guard_result),
-            health_text(self._health()),
-            *[f"camera: {text.partition(':')[0]}" for text in camera_conditions(tick)],
-        ]
-        return " | ".join(filter(None, parts))
+            if abs(tick.t_s - self._timed_s) >= _RATE_S:
+                self._timed_s, timing = tick.t_s, self._timing()
+                known = timing is not None and timing.over_s >= 0.9 * _RATE_S
+                self._rate = f"{timing.rate_hz:5.1f} Hz" if timing is not None and known else ""
+                self._busy = busy_text(timing)
+            parts = [
+                overdue_text(),
+                self._busy,
+                self._rate,
+                doing(tick).headline,
+                guard_text(tick.guard_result),
+                health_text(self._health()),
+                *[f"camera: {text.partition(':')[0]}" for text in camera_conditions(tick)],
+            ]
+            self._write(" | ".join(filter(None, parts)))

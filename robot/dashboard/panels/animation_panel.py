@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from gazerig.gaze.gesture.expression import NEUTRAL
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.widget import Buttons, Slider
+from gazerig.robot.dashboard.widgets.widgets import Container
 from gazerig.robot.model.commands import NO_GESTURE, Express, Play
 
 EXPRESSION = "expression"

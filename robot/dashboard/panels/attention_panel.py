@@ -22,11 +22,18 @@ _LEAST_FULL = 1.0
 
 def winner(snapshot: Snapshot) -> str:
     """Return the target, the reason, and the present behaviour and plan as HTML."""
+    named = (
+        ("behaviour", snapshot.behaviour),
+        ("plan", snapshot.plan.partition(":")[0]),
+        ("character", snapshot.character),
+        ("conversation", snapshot.conversation),
+    )
+    chips = " ".join(chip(f"{what}: {name}") for what, name in named if name)
     return (
         f"<div class='big'>{escape(snapshot.target_name)}</div>"
         f"<div class='tall'>{escape(reason(snapshot))}</div>"
         f"<div class='in-force'>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))} "
-        f"{_present_choices(snapshot)}</div>"
+        f"{chips}</div>"
     )
 
 
@@ -47,37 +54,23 @@ def reason(snapshot: Snapshot) -> str:
     action, _, because = snapshot.plan.partition(": ")
     named = action or snapshot.behaviour
     behaviour = f"behaviour {named}" if named else "behaviour"
+    planned = f": {because}" if because else ""
     if first.rule < _LEAST_TOLD:
         return f"because it {moves}" if moves else snapshot.why
     if not moves:
-        return f"because the {behaviour} asks for it ({first.rule:.2f}){_plan_reason(because)}"
-    return f"because it {moves}, and the {behaviour} adds {first.rule:.2f}{_plan_reason(because)}"
-
-
-def _plan_reason(because: str) -> str:
-    """Return the planner's reason as the end of a sentence, "" without one."""
-    return f": {because}" if because else ""
+        return f"because the {behaviour} asks for it ({first.rule:.2f}){planned}"
+    return f"because it {moves}, and the {behaviour} adds {first.rule:.2f}{planned}"
 
 
 def saliences(snapshot: Snapshot) -> str:
     """Return the saliences by term as HTML, the highest first."""
-    return "" if snapshot.leader.led else _salience_rows(snapshot.saliences)
-
-
-def _present_choices(snapshot: Snapshot) -> str:
-    named = (
-        ("behaviour", snapshot.behaviour),
-        ("plan", snapshot.plan.partition(":")[0]),
-        ("character", snapshot.character),
-        ("conversation", snapshot.conversation),
-    )
-    return " ".join(chip(f"{what}: {name}") for what, name in named if name)
-
-
-def _salience_rows(rows: tuple[Salience, ...]) -> str:
+    if snapshot.leader.led:
+        return ""
+    rows = snapshot.saliences
     if not rows:
         return note("nothing is salient: the gaze wanders")
-    full = max(_LEAST_FULL, *(_sum(one) for one in rows), rows[0].total)
+    sums = [sum(max(0.0, term) for term in one[2:7]) for one in rows]
+    full = max(_LEAST_FULL, *sums, rows[0].total)
     bars = "".join(_row(one, full, winner=row == 0) for row, one in enumerate(rows))
     keys = "".join(
         f"<span><span class='swatch term-{term}'></span>{term}</span>" for term in _TERMS
@@ -113,7 +106,3 @@ def _row(salience: Salience, full: float, *, winner: bool) -> str:
         f"<div class='bar' aria-hidden='true'>{bars}</div>"
         f"<div class='small'>{figures}</div></div>"
     )
-
-
-def _sum(salience: Salience) -> float:
-    return sum(max(0.0, term) for term in salience[2:7])

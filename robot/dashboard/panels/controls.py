@@ -8,10 +8,9 @@ from gazerig.robot.dashboard.panels.animation_panel import EXPRESSION, GESTURE, 
 from gazerig.robot.dashboard.panels.jog_panel import JogPanel
 from gazerig.robot.dashboard.panels.param_panel import ParamState
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Buttons
-from gazerig.robot.dashboard.widgets.widgets import Widgets
+from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
 from gazerig.robot.model.commands import Ask, LookAt
 from gazerig.robot.model.types import Snapshot
 
@@ -109,13 +108,6 @@ class LeadPanel:
             position=self._target_m,
             visible=False,
         )
-        self._listen()
-
-    def leave(self) -> None:
-        """Remove the target."""
-        self._gizmo.remove()
-
-    def _listen(self) -> None:
         self.drag.on_change(lambda on, _: self._show_target(on))
         self.free.on_press(lambda _, client: self._look_freely(client))
 
@@ -125,6 +117,10 @@ class LeadPanel:
             x, y, z = map(float, event.target.position)
             if event.client_id is not None and event.phase != "start":
                 self._outbox.command(LookAt((x, y, z)), str(event.client_id))
+
+    def leave(self) -> None:
+        """Remove the target."""
+        self._gizmo.remove()
 
     def _show_target(self, on: bool) -> None:
         self._gizmo.visible = on

@@ -68,7 +68,11 @@ class Timeline(PagePanel):
         level = "stopped" if snapshot.stopped else snapshot.worst
         self._extend("guard", t_s, level, level)
         self._events += snapshot.events
-        self._forget(t_s - STRIP_S)
+        for stretches in self._rows.values():
+            while stretches[0].end_s < t_s - STRIP_S:
+                stretches.popleft()
+        while self._events and self._events[0][0] < t_s - STRIP_S:
+            self._events.popleft()
 
     def _extend(self, row: str, t_s: float, what: str, kind: str) -> None:
         """Extend a row's last interval, or start a new one if the value has changed."""
@@ -77,13 +81,6 @@ class Timeline(PagePanel):
             stretches[-1] = stretches[-1]._replace(end_s=t_s)
             return
         stretches.append(_Interval(stretches[-1].end_s if stretches else t_s, t_s, what, kind))
-
-    def _forget(self, before_s: float) -> None:
-        for stretches in self._rows.values():
-            while stretches[0].end_s < before_s:
-                stretches.popleft()
-        while self._events and self._events[0][0] < before_s:
-            self._events.popleft()
 
     def intervals(self, row: str) -> tuple[tuple[float, float, str], ...]:
         """Return start, end and value of each interval of a row: target, part or guard."""
@@ -95,17 +92,17 @@ class Timeline(PagePanel):
         if now_s is None:
             return note("waiting for the rig")
         parts = [*_axes(), *self._bands(now_s), *self._marks(now_s)]
-        return svg(_AXIS_PX + 18.0, parts, self._description())
-
-    def _description(self) -> str:
-        """Return the strip as text, for screen readers."""
         targets = dict.fromkeys(stretch.what for stretch in self._rows["target"] if stretch.what)
         saccades = sum(isinstance(event, SeenSaccade) for event in self._events)
         blinks = sum(isinstance(event, SeenBlink) for event in self._events)
         levels = dict.fromkeys(stretch.kind for stretch in self._rows["guard"])
-        return (
-            f"the last {STRIP_S:.0f} seconds: looked at {', '.join(targets) or 'nothing'}; "
-            f"{saccades} saccades, {blinks} blinks; guard {', '.join(levels)}"
+        return svg(
+            _AXIS_PX + 18.0,
+            parts,
+            (
+                f"the last {STRIP_S:.0f} seconds: looked at {', '.join(targets) or 'nothing'}; "
+                f"{saccades} saccades, {blinks} blinks; guard {', '.join(levels)}"
+            ),
         )
 
     def _bands(self, now_s: float) -> Iterable[str]:

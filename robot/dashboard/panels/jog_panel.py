@@ -1,12 +1,13 @@
 """Sliders to jog joints within their limits; the other sliders follow their joints."""
 
 from collections.abc import Mapping
+from functools import partial
 from math import degrees, radians
 
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Slider
+from gazerig.robot.dashboard.widgets.widgets import Container
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.types import Snapshot, in_order
 
@@ -56,25 +57,21 @@ class JogPanel:
             if not (isinstance(low, int | float) and isinstance(high, int | float)):
                 continue
             slider = self.sliders.get(joint)
-            if slider is None:
-                self.sliders[joint] = self._add(joint, float(low), float(high))
-            else:
+            if slider is not None:
                 slider.ends = (float(low), float(high))
-
-    def _add(self, joint: str, low_deg: float, high_deg: float) -> Slider:
-        slider = self._place.slider(
-            joint.replace("_", " "),
-            (low_deg, high_deg),
-            _STEP_DEG,
-            min(max(0.0, low_deg), high_deg),
-            hint=(
-                f"moves the joint, slowly; {low_deg:g} to {high_deg:g} deg, + left, up, open, "
-                "right ear down"
-            ),
-            order=_FIRST + len(self.sliders),
-        )
-        slider.on_change(lambda angle_deg, client: self._jog(joint, angle_deg, client))
-        return slider
+                continue
+            slider = self.sliders[joint] = self._place.slider(
+                joint.replace("_", " "),
+                (float(low), float(high)),
+                _STEP_DEG,
+                min(max(0.0, float(low)), float(high)),
+                hint=(
+                    f"moves the joint, slowly; {low:g} to {high:g} deg, + left, up, open, "
+                    "right ear down"
+                ),
+                order=_FIRST + len(self.sliders),
+            )
+            slider.on_change(partial(self._jog, joint))
 
     def _jog(self, joint: str, angle_deg: float, who: str) -> None:
         self._held[joint] = (angle_deg, self._now_s)
@@ -89,25 +86,19 @@ class JogPanel:
         for joint, slider in self.sliders.items():
             if (i := places.get(joint)) is None:
                 continue
-            self._track_jogged(joint, degrees(snapshot.desired_rad[i]), bool(snapshot.stopped))
+            if (held := self._held.get(joint)) is not None:
+                asked_deg, at_s = held
+                if not snapshot.stopped and (
+                    abs(degrees(snapshot.desired_rad[i]) - asked_deg) < _SAME_DEG
+                ):
+                    self._held[joint] = (asked_deg, self._now_s)
+                elif snapshot.stopped or self._now_s - at_s > _FREE_AFTER_S:
+                    del self._held[joint]  # a stop or another command has released it
             angle_deg = degrees(snapshot.measured_rad[i])
             if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
                 low, high = slider.ends
                 slider.value = round(min(max(angle_deg, low), high), 1)
         self.estimated_joints_note.content = estimated_joints_note(snapshot)
-
-    def _track_jogged(self, joint: str, desired_deg: float, stopped: bool) -> None:
-        """Forget a joint that a stop or another command has released."""
-        held = self._held.get(joint)
-        if held is None:
-            return
-        angle_deg, at_s = held
-        if stopped:
-            del self._held[joint]
-        elif abs(desired_deg - angle_deg) < _SAME_DEG:
-            self._held[joint] = (angle_deg, self._now_s)
-        elif self._now_s - at_s > _FREE_AFTER_S:
-            del self._held[joint]
 
 
 def estimated_joints_note(snapshot: Snapshot) -> str:

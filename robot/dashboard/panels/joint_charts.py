@@ -1,14 +1,14 @@
 """Traces of eyes, head and lids: desired, commanded and measured angles."""
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.widget import Chart
+from gazerig.robot.dashboard.widgets.widgets import Container
 from gazerig.robot.model.types import Snapshot, Trail
 
 TRACE_S = 30.0
@@ -157,19 +157,29 @@ class JointCharts:
         if self.what.options != tuple(menu):
             self.what.options = tuple(menu)
         groups = menu.get(self.what.value) or next(iter(menu.values()))
-        self._make(tuple((g, not traces.estimated.isdisjoint(g.joints)) for g in groups))
+        wanted = tuple((g, not traces.estimated.isdisjoint(g.joints)) for g in groups)
+        if wanted != self._drawn:  # other groups are chosen, or values become estimated
+            self._make(wanted)
         x = np.round(ago_s, 3).tolist()
         for chart, group in zip(self.charts, groups, strict=True):
             columns = np.round(mean_deg(angles_deg, group, traces.joints).T, 2).tolist()
             chart.draw(x, dict(zip(chart.names(), columns, strict=True)))
 
     def _make(self, wanted: tuple[tuple[ChartGroup, bool], ...]) -> None:
-        """Create the charts again if other groups are chosen or values become estimated."""
-        if wanted == self._drawn:
-            return
+        """Create the charts of these groups; True: the values of a group are estimated."""
         for chart in self.charts:
             chart.remove()
-        self.key.content = _key([estimated for _, estimated in wanted])
+        shown = [(*line, "&#8212;") for line in _COMMANDS]
+        estimates = [estimated for _, estimated in wanted]
+        if not all(estimates):
+            shown.append((*_MEASURED, "&#8212;"))
+        if any(estimates):
+            shown.append((*_ESTIMATED, "- -"))
+        names = "".join(
+            f"<span><b class='line-{kind}' aria-hidden='true'>{mark}</b> {name}</span>"
+            for name, kind, mark in shown
+        )
+        self.key.content = f"<div class='key'>{names}</div>"
         self.charts = [
             self._place.chart(
                 f"{group.title}, degrees{'; no feedback' if estimated else ''}",
@@ -181,17 +191,3 @@ class JointCharts:
             for row, (group, estimated) in enumerate(wanted)
         ]
         self._drawn = wanted
-
-
-def _key(estimated: Sequence[bool]) -> str:
-    """Return the names of the lines."""
-    shown = [(*line, "&#8212;") for line in _COMMANDS]
-    if not all(estimated):
-        shown.append((*_MEASURED, "&#8212;"))
-    if any(estimated):
-        shown.append((*_ESTIMATED, "- -"))
-    names = "".join(
-        f"<span><b class='line-{kind}' aria-hidden='true'>{mark}</b> {name}</span>"
-        for name, kind, mark in shown
-    )
-    return f"<div class='key'>{names}</div>"

@@ -84,17 +84,14 @@ def _image(
     band = [at(*point) for point in edge]
     outline = " ".join(f"{u:.1f},{v:.1f}" for u, v in band)
     people = f"<polygon points='{outline}' class='svg-people'/>"
-    dots = [
-        _dot(*at(a, b), newest=i == len(x) - 1) for i, (a, b) in enumerate(zip(x, y, strict=True))
-    ]
+    dots = []
+    for i, (a, b) in enumerate(zip(x, y, strict=True)):
+        (u, v), is_newest = at(a, b), i == len(x) - 1
+        radius, kind = (3.4, "svg-dot newest") if is_newest else (2.0, "svg-dot")
+        dots.append(f"<circle cx='{u:.1f}' cy='{v:.1f}' r='{radius}' class='{kind}'/>")
     inside = sum(low(np.array(a)) <= b <= high(np.array(a)) for a, b in zip(x, y, strict=True))
     says = f"{title}: {inside} of {len(x)} saccades inside the human range"
     return svg(_FOOT_PX + 18.0, (people, *_axes(widest, highest), *dots), says)
-
-
-def _dot(x: float, y: float, *, newest: bool) -> str:
-    radius, kind = (3.4, "svg-dot newest") if newest else (2.0, "svg-dot")
-    return f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{radius}' class='{kind}'/>"
 
 
 def _axes(widest: float, highest: float) -> Iterable[str]:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import PAGE_PANEL, describe_error, registrations
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widget import Html
+from gazerig.robot.dashboard.widgets.widgets import Container
 from gazerig.robot.model.types import Snapshot
 
 

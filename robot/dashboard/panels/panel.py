@@ -9,7 +9,7 @@ import numpy as np
 
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.feed.camera_overlay import encode
-from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
 from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
 from gazerig.robot.dashboard.panels.dwell_chart import DwellChart
 from gazerig.robot.dashboard.panels.gaze_map import GazeMap
@@ -19,7 +19,6 @@ from gazerig.robot.dashboard.panels.package_panels import PagePanels
 from gazerig.robot.dashboard.panels.run_figures import HOW_TO, RunFigures
 from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.dashboard.panels.status import alarms, other_heads, silence
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
@@ -59,7 +58,16 @@ class PanelView:
         heat.html(note("gaze points on the face; yellow has the longest time"))
         self.map = heat.image("heat map: where on a face the gaze has been")
         self.view = watch.section("view", is_open=False, order=7)
-        self.layers = self._add_layers(self.view)
+        layers = self.layers = OverlayChoices()
+
+        def select(name: str, is_on: bool, client: str) -> None:
+            setattr(layers, name, is_on)
+
+        for order, (name, says) in enumerate(OverlayChoices.NAMES.items()):
+            box = self.view.checkbox(says, getattr(layers, name), order=order)
+            box.on_change(partial(select, name))
+        depth = self.view.checkbox("depth instead of the camera image", value=False, order=99)
+        depth.on_change(lambda on, _: self.depth(on))
         self.health = widgets.panel("health").html(note("waiting for the rig"))
         report = widgets.panel("report")
         self.figures = report.html(order=1)
@@ -114,8 +122,14 @@ class PanelView:
             self.traces.show(self._traces)
         if "watch" in self._open:
             self.panels.draw(self._shown)
-        if self._shown % _FIGURES_EVERY == 0:
-            self._draw_figures()
+        if self._shown % _FIGURES_EVERY == 0 and "report" in self._open:
+            self.figures.content = self._figures.table(self._dwell)
+        if self._shown % _FIGURES_EVERY == 0 and "watch" in self._open:
+            self.dwells.content = self._dwell.drawing()
+            self.saccades.content = self._sequence.drawing()
+            if self._map.seconds > 0.0:
+                bgr = cv2.cvtColor(self._map.image(), cv2.COLOR_RGB2BGR)
+                self.map.show(encode(np.asarray(bgr, np.uint8)))
         self._shown += 1
 
     def silent(self) -> None:
@@ -134,27 +148,6 @@ class PanelView:
         """Show the camera image."""
         self.image.show(encode(bgr))
 
-    def _draw_figures(self) -> None:
-        """Draw the statistics of the run."""
-        if "report" in self._open:
-            self.figures.content = self._figures.table(self._dwell)
-        if "watch" not in self._open:
-            return
-        self.dwells.content = self._dwell.drawing()
-        self.saccades.content = self._sequence.drawing()
-        if self._map.seconds > 0.0:
-            bgr = cv2.cvtColor(self._map.image(), cv2.COLOR_RGB2BGR)
-            self.map.show(encode(np.asarray(bgr, np.uint8)))
-
-    def _add_layers(self, place: Container) -> OverlayChoices:
-        layers = OverlayChoices()
-        for order, (name, says) in enumerate(OverlayChoices.NAMES.items()):
-            box = place.checkbox(says, getattr(layers, name), order=order)
-            box.on_change(partial(_set_layer, layers, name))
-        depth = place.checkbox("depth instead of the camera image", value=False, order=99)
-        depth.on_change(lambda on, _: self.depth(on))
-        return layers
-
 
 def estimation_note(snapshot: Snapshot) -> str:
     """Return a note that eye movements are estimated, "" if they are measured."""
@@ -164,7 +157,3 @@ def estimation_note(snapshot: Snapshot) -> str:
         "The eyes' servos give no feedback: these are the movements the eyes should make, "
         "estimated from their goals, and no measurements."
     )
-
-
-def _set_layer(layers: OverlayChoices, name: str, is_on: bool, client: str) -> None:
-    setattr(layers, name, is_on)

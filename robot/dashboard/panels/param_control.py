@@ -5,8 +5,8 @@ from collections.abc import Callable
 from math import floor, isclose, log10
 from typing import cast
 
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.widget import Checkbox, Choice, Slider, TextField
+from gazerig.robot.dashboard.widgets.widgets import Container
 from gazerig.robot.model.parameter import Parameter
 
 Put = Callable[[str, object], None]
@@ -113,7 +113,7 @@ class ParamControl:
         self.param, self.order = param, order
         self._put, self._refuse = put, refuse
         self.field = self._add(place, label(param, unsaved), value, order)
-        self.field.on_change(lambda shown, _: self._asked(shown))
+        self.field.on_change(lambda shown, _: self._ask(shown))
 
     def _add(
         self, place: Container, text: str, value: object, order: float
@@ -125,37 +125,30 @@ class ParamControl:
             names = tuple(map(str, param.choices))
             return place.choice(text, names, str(value), hint=tooltip, order=order)
         if fits_slider(param, value):
-            return self._slider(place, text, value, order)
+            low, high = cast(float, self.param.low), cast(float, self.param.high)
+            now, whole, step = (
+                cast(float, value),
+                self.param.kind == "whole",
+                slider_step(low, high),
+            )
+            if whole:
+                step = max(1, round(step)) if high - low > 500 else 1
+            return place.slider(
+                text, (low, high), step, now, hint=hint(self.param), whole=whole, order=order
+            )
         shown = format_value(param, value)
         return place.text(text, shown, hint=f"{tooltip}; Enter sets it", order=order)
 
-    def _slider(self, place: Container, text: str, value: object, order: float) -> Slider:
-        low, high = cast(float, self.param.low), cast(float, self.param.high)
-        now, whole, step = cast(float, value), self.param.kind == "whole", slider_step(low, high)
-        if whole:
-            step = max(1, round(step)) if high - low > 500 else 1
-        return place.slider(
-            text, (low, high), step, now, hint=hint(self.param), whole=whole, order=order
-        )
-
-    def _asked(self, shown: object) -> None:
-        """Request the value that a person has set."""
-        try:
-            value = self._parse_input(shown)
-        except ValueError as error:
-            self._refuse(str(error))
-        else:
-            self._put(self.param.key, value)
-
-    def _parse_input(self, shown: object) -> object:
-        """Return the choice of a name, the value of a text, or the value itself.
-
-        Raises:
-            ValueError: the text cannot be read.
-        """
+    def _ask(self, shown: object) -> None:
+        """Request what a person has set: the choice of a name, the value of a text, or a value."""
+        value = next((c for c in self.param.choices if str(c) == shown), shown)
         if isinstance(self.field, TextField):
-            return read(self.param, str(shown))
-        return next((c for c in self.param.choices if str(c) == shown), shown)
+            try:
+                value = read(self.param, str(shown))
+            except ValueError as error:
+                self._refuse(str(error))
+                return
+        self._put(self.param.key, value)
 
     def show(self, value: object, unsaved: bool) -> None:
         """Show the present value."""

@@ -11,9 +11,8 @@ from typing import cast
 
 from gazerig.robot.dashboard.panels.param_control import ParamControl
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
-from gazerig.robot.dashboard.widgets.widgets import Widgets
+from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
 from gazerig.robot.model.parameter import Parameter
 
 MOST_SHOWN = 30
@@ -194,7 +193,16 @@ class ParamPanel:
     def _show_chosen(self) -> None:
         """Build the controls of the search result or of the chosen group."""
         with self._lock:
-            wanted = self._chosen()
+            known = [param for key, param in self._params.items() if key in self._values]
+            group = self._group.value
+            if self._find.value.strip():
+                wanted = found(self._find.value, known)
+            elif group == UNSAVED:
+                wanted = [param.key for param in known if param.key in self._unsaved]
+            elif group == DIFFERENT:
+                wanted = [one.key for one in known if self._values[one.key] != one.default]
+            else:
+                wanted = [param.key for param in known if group_of(param) == group]
             for key in [key for key in self._controls if key not in wanted[:MOST_SHOWN]]:
                 self._controls.pop(key).remove()
             for order, key in enumerate(wanted[:MOST_SHOWN]):
@@ -213,18 +221,6 @@ class ParamPanel:
             self._refuse,
             place,
         )
-
-    def _chosen(self) -> list[str]:
-        known = [param for key, param in self._params.items() if key in self._values]
-        if self._find.value.strip():
-            return found(self._find.value, known)
-        match self._group.value:
-            case str(name) if name == UNSAVED:
-                return [param.key for param in known if param.key in self._unsaved]
-            case str(name) if name == DIFFERENT:
-                return [k.key for k in known if self._values[k.key] != k.default]
-            case group:
-                return [param.key for param in known if group_of(param) == group]
 
 
 def group_of(param: Parameter) -> str:

@@ -10,7 +10,7 @@ from html import escape
 from typing import Any
 
 from gazerig.robot.dashboard.feed.page_process import MARK_KINDS, SPEEDS
-from gazerig.robot.dashboard.widgets.container import Container
+from gazerig.robot.dashboard.widgets.widgets import Container
 
 Tell = Callable[[str, Mapping[str, object]], object]
 """Sends a user's request to the rig's process: the browser's tab, and the request."""
@@ -55,11 +55,12 @@ class ReplayView:
         self.speed.on_change(
             lambda speed, client: self._ask(client, {"speed": float(speed.removesuffix("x"))})
         )
-        for way, group in self.steps.items():
-            group.on_press(partial(self._step, way))
 
-    def _step(self, way: str, kind: str, client: str) -> None:
-        self._ask(client, {"step": f"{way} {kind}"})
+        def step(way: str, kind: str, client: str) -> None:
+            self._ask(client, {"step": f"{way} {kind}"})
+
+        for way, group in self.steps.items():
+            group.on_press(partial(step, way))
 
     def _seek(self, at_s: float, client: str) -> None:
         self._asked_s = at_s
@@ -97,9 +98,16 @@ def strip(marks: Mapping[str, Sequence[int]]) -> str:
 
     marks: counts of equal shares of the recording, by kind
     """
-    bars = "".join(
-        _bars(marks.get(kind, ()), colour, top, height) for kind, colour, top, height in _ROWS
-    )
+    bars = ""
+    for kind, colour, top, height in _ROWS:
+        counts = marks.get(kind, ())
+        most, width = max(counts, default=0), _WIDTH / max(len(counts), 1)
+        bars += "".join(  # darker for parts of the recording with more marks
+            f"<rect x='{i * width:.1f}' y='{top}' width='{width:.1f}' height='{height}' "
+            f"fill='var(--{colour})' fill-opacity='{0.25 + 0.75 * n / most:.2f}'/>"
+            for i, n in enumerate(counts)
+            if n
+        )
     legend = "".join(
         f"<span><span class='swatch ground-{colour}'></span>{kind}s</span>"
         for kind, colour, _, _ in _ROWS
@@ -108,17 +116,6 @@ def strip(marks: Mapping[str, Sequence[int]]) -> str:
     return (
         f"<svg viewBox='0 0 {_WIDTH} {_HEIGHT}' preserveAspectRatio='none' class='strip' "
         f"role='img' aria-label='{said}'>{bars}</svg><div class='key'>{legend}</div>"
-    )
-
-
-def _bars(counts: Sequence[int], colour: str, top: int, height: int) -> str:
-    """Return one row of bars, darker for parts of the recording with more marks."""
-    most, width = max(counts, default=0), _WIDTH / max(len(counts), 1)
-    return "".join(
-        f"<rect x='{i * width:.1f}' y='{top}' width='{width:.1f}' height='{height}' "
-        f"fill='var(--{colour})' fill-opacity='{0.25 + 0.75 * n / most:.2f}'/>"
-        for i, n in enumerate(counts)
-        if n
     )
 
 

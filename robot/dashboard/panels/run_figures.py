@@ -9,7 +9,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.norm_bands import BY_KEY, NormBand
+from gazerig.robot.analysis.human_norms import BY_KEY, NormBand
 from gazerig.robot.dashboard.panels.dwell_chart import DwellChart
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.model.types import SeenBlink, SeenSaccade, Snapshot

@@ -81,36 +81,25 @@ def _row(servos: Servos, i: int, joint: str, estimated: bool) -> str:
     silent = servos.unanswered[i] if servos.unanswered else None
     late: Strain = "over" if servos.age_s[i] > _OLD_S else ""
     figures = f"<td colspan='3' class='nothing'>{NO_FEEDBACK}</td>"
-    said = _fault_text(servos, i)
+    if not estimated:
+        warmth, load = _at(servos.temperature_c, i), _at(servos.load, i)
+        volts = _at(servos.voltage_v, i)
+        figures = (
+            _cell("-" if warmth is None else f"{warmth:.0f}", strain_of_heat(servos, i))
+            + _cell("-" if load is None else f"{100.0 * load:+.0f} %", strain_of_load(servos, i))
+            + _cell("-" if volts is None else f"{volts:.1f}", strain_of_voltage(servos, i))
+        )
+    said = "torque off" if servos.torque and not servos.torque[i] else ""
+    if servos.fault and servos.fault[i]:
+        said = servos.fault[i]
+    elif late:
+        said = f"silent for {min(servos.age_s[i], 999.0):.1f} s"
     more = f"<div class='{'fault' if said != 'torque off' else 'quiet'}'>{escape(said)}</div>"
     return (
         f"<tr><th scope='row'>{escape(joint.replace('_', ' '))}"
-        f"{more if said else ''}</th>{figures if estimated else _figures(servos, i)}"
+        f"{more if said else ''}</th>{figures}"
         f"{_cell('-' if silent is None else str(silent), late)}</tr>"
     )
-
-
-def _figures(servos: Servos, i: int) -> str:
-    """Return temperature, load and voltage."""
-    warmth, load, volts = (
-        _at(servos.temperature_c, i),
-        _at(servos.load, i),
-        _at(servos.voltage_v, i),
-    )
-    return (
-        _cell("-" if warmth is None else f"{warmth:.0f}", strain_of_heat(servos, i))
-        + _cell("-" if load is None else f"{100.0 * load:+.0f} %", strain_of_load(servos, i))
-        + _cell("-" if volts is None else f"{volts:.1f}", strain_of_voltage(servos, i))
-    )
-
-
-def _fault_text(servos: Servos, i: int) -> str:
-    """Return a servo's fault, silence or missing torque as text, "" if it is well."""
-    if servos.fault and servos.fault[i]:
-        return servos.fault[i]
-    if servos.age_s[i] > _OLD_S:
-        return f"silent for {min(servos.age_s[i], 999.0):.1f} s"
-    return "torque off" if servos.torque and not servos.torque[i] else ""
 
 
 def strain_of_heat(servos: Servos, i: int) -> Strain:

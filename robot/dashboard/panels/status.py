@@ -21,7 +21,13 @@ def alarms(snapshot: Snapshot) -> str:
     """
     said, kind = "", LEVELS[snapshot.level]
     if not snapshot.stopped and snapshot.level in ("hold", "torque_off"):
-        said += banner(_STANDS_STILL[snapshot.level], kind, _first_reasons(snapshot.reasons))
+        reasons = snapshot.reasons
+        more = len(reasons) - _REASONS_SHOWN
+        said += banner(
+            _STANDS_STILL[snapshot.level],
+            kind,
+            reasons[:_REASONS_SHOWN] + ((f"and {more} more",) if more > 0 else ()),
+        )
     if snapshot.frame_age_s is not None and snapshot.frame_age_s >= OLD_FRAME_S:
         said += banner(f"the frame is {snapshot.frame_age_s:.1f} s old", "hold")
     for other in snapshot.others:
@@ -75,8 +81,3 @@ def without_feedback(snapshot: Snapshot) -> str:
         f"<div class='warn'>{len(estimated)} of "
         f"{count_text(len(snapshot.joints), 'joint')} without feedback: {where}</div>"
     )
-
-
-def _first_reasons(reasons: tuple[str, ...]) -> tuple[str, ...]:
-    more = len(reasons) - _REASONS_SHOWN
-    return reasons[:_REASONS_SHOWN] + ((f"and {more} more",) if more > 0 else ())

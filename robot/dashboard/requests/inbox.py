@@ -107,17 +107,14 @@ class Inbox:
             if urgent(message):
                 self._take(message)
             else:
-                self._defer(message)
+                try:
+                    self._later.put_nowait(message)
+                except queue.Full:
+                    if self._refuse is not None:
+                        self._refuse(message)
         self._end_later()
         if not self._over.is_set():
             self._lost()
-
-    def _defer(self, message: bytes) -> None:
-        try:
-            self._later.put_nowait(message)
-        except queue.Full:
-            if self._refuse is not None:
-                self._refuse(message)
 
     def _end_later(self) -> None:
         """End the slow thread after its present request; requests that wait are dropped."""

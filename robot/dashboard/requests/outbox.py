@@ -1,4 +1,4 @@
-"""Outbox of the page: sends the requests of browsers to the rig."""
+"""Requests of browsers to the rig: checked, limited in rate, and sent."""
 
 import contextlib
 import json
@@ -7,22 +7,20 @@ from collections.abc import Callable, Mapping
 
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.robot.dashboard.requests.inbox import BEAT, MESSAGE_BYTES, PICTURE, request_message
-from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import as_json
-from gazerig.robot.model.commands import Command, Leading
+from gazerig.robot.model.commands import COMMANDS, Command, Leading
+from gazerig.robot.remote.socket_io import parse_json
 
 DOOR = "door"
 """Name of the sender for the stop button and clicks in the image."""
-
-
+ASKED_BYTES = 2048
+"""Longest request, bytes; a stop with its reason has a hundred."""
+_LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, Leading))
+_SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
+"""Commands with the name of the client."""
 _PER_S, _BURST = 100.0, 200.0
 """Rate limit of all browsers together; dragging sends some 20 changes a second."""
-
-
-def _unnamed(client: str) -> str:
-    """Return "": the browser of a client is unknown."""
-    return ""
 
 
 class Outbox:
@@ -39,8 +37,8 @@ class Outbox:
         self,
         feed: MessageLink,
         clock: Clock | None = None,
-        name: Callable[[str], str] = _unnamed,
-        leads: Callable[[str], object] = _unnamed,
+        name: Callable[[str], str] = lambda client: "",
+        leads: Callable[[str], object] = lambda name: None,
     ) -> None:
         self._feed = feed
         self._clock = clock if clock is not None else RealClock()
@@ -84,3 +82,56 @@ class Outbox:
         except OSError:  # full, or closed: then the page ends
             return False
         return True
+
+
+def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
+    """Return a request with the browser's name written in, None if it is not valid.
+
+    Args:
+        body: as it came
+        who: the name of the browser; what it calls itself in the request is overwritten
+    """
+    try:
+        asked = parse_json(body)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(asked, dict):
+        return None
+    if (name := asked.get("do")) in _SAY_WHO:
+        asked = {"do": name, **asked, "who": who}
+    if isinstance(pick := asked.get("pick"), dict):
+        asked["pick"] = {**pick, "who": who}
+    return asked
+
+
+def leads(asked: Mapping[str, object]) -> bool:
+    """Return whether a request gives its browser control of the head."""
+    return "pick" in asked or asked.get("do") in _LEADING
+
+
+def compact(asked: Mapping[str, object]) -> bytes:
+    """Return a request as JSON without blanks, its "do" first."""
+    return json.dumps(asked, separators=(",", ":")).encode()
+
+
+class TokenBucket:
+    """Token bucket with a rate per second and a burst."""
+
+    def __init__(self, per_s: float, burst: float) -> None:
+        self._per_s, self._burst = per_s, burst
+        self._left, self._at_s = burst, -1.0
+
+    def take(self, now_s: float, amount: float = 1.0) -> bool:
+        """Take tokens; return whether any were left before."""
+        if self.wait_s(now_s) > 0.0:
+            return False
+        self._left -= amount
+        return True
+
+    def wait_s(self, now_s: float) -> float:
+        """Return the time until there is a token, s."""
+        if self._at_s >= 0.0:
+            gained = max(0.0, now_s - self._at_s) * self._per_s
+            self._left = min(self._burst, self._left + gained)
+        self._at_s = now_s
+        return 0.0 if self._left > 0.0 else (1e-9 - self._left) / self._per_s

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from gazerig.gaze.angles import add, dot, norm, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
+from gazerig.robot.dashboard.requests.outbox import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 

@@ -12,7 +12,6 @@ from gazerig.robot.control.command_handler import (
     PathGuard,
     PendingCommand,
     QuestionAnswer,
-    RequestResult,
 )
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.clock import RealClock
@@ -80,9 +79,35 @@ class PageRequestHandler:
     def _do(self, data: Mapping[str, object]) -> str | None:
         match data:
             case {"do": str(verb)}:
-                return self._outcome_text(verb, self._handler.do(data, _signed), data)
+                match self._handler.do(data, _signed):
+                    case PendingCommand() as given:
+                        return self._reply_text(given)
+                    case ParamsSaved(saved):
+                        backup = saved.backup
+                        kept = f", what was there is in {backup}" if backup is not None else ""
+                        return f"saved in {saved.path}{kept}"
+                    case ParamsChanged(notes):
+                        if verb == "set":
+                            notes = tuple(note for note in notes if _LATER in note)
+                        quiet = {
+                            "revert": "all is as in the file again",
+                            "character": f"the character is {data.get('name')}",
+                        }
+                        return "\n".join(notes) or quiet.get(verb)
+                    case QuestionAnswer(list(found)) if verb == "differs":
+                        lines = [f"{c['key']}: {c['new']} (default {c['old']})" for c in found]
+                        return "\n".join(lines) or "all is as by default"
+                return None  # the page gets these by other messages
             case {"pick": {"x": int() | float() as x, "y": int() | float() as y, **rest}}:
-                return self._pick(float(x), float(y), str(rest.get("who") or PAGE))
+                if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
+                    raise ValueError(
+                        "a place in the image is 0 to 1 from the left and from the top"
+                    )
+                point = self._point(float(x), float(y)) if self._point is not None else None
+                if point is None:
+                    return "refused: there is no camera image to look into yet"
+                who = str(rest.get("who") or PAGE)
+                return self._reply_text(self._handler.give(LookAt(point, who)))
             case {"steer": str(way)} if self._steer is not None:
                 return self._steer(way)
             case {"show": {"depth": bool(on)}} if self._depth is not None:
@@ -91,30 +116,6 @@ class PageRequestHandler:
             case {"replay": dict(asked)} if self._replay is not None:
                 return self._replay(asked)
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} is not available here")
-
-    def _outcome_text(
-        self, verb: str, outcome: RequestResult, data: Mapping[str, object]
-    ) -> str | None:
-        """Return an outcome as text, None if no message is needed."""
-        match outcome:
-            case PendingCommand():
-                return self._reply_text(outcome)
-            case ParamsSaved(saved):
-                backup = saved.backup
-                kept = f", what was there is in {backup}" if backup is not None else ""
-                return f"saved in {saved.path}{kept}"
-            case ParamsChanged(notes):
-                if verb == "set":
-                    notes = tuple(note for note in notes if _LATER in note)
-                quiet = {
-                    "revert": "all is as in the file again",
-                    "character": f"the character is {data.get('name')}",
-                }
-                return "\n".join(notes) or quiet.get(verb)
-            case QuestionAnswer(list(found)) if verb == "differs":
-                lines = [f"{c['key']}: {c['new']} (default {c['old']})" for c in found]
-                return "\n".join(lines) or "all is as by default"
-        return None  # the page gets these by other messages
 
     def _reply_text(self, given: PendingCommand) -> str | None:
         """Return a command's restrictions as text, None if there are none or no client waits."""
@@ -133,14 +134,6 @@ class PageRequestHandler:
             return None
         self._limited_s = now_s
         return reply.text()
-
-    def _pick(self, x: float, y: float, who: str) -> str | None:
-        if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
-            raise ValueError("a place in the image is 0 to 1 from the left and from the top")
-        point = self._point(x, y) if self._point is not None else None
-        if point is None:
-            return "refused: there is no camera image to look into yet"
-        return self._reply_text(self._handler.give(LookAt(point, who)))
 
 
 class _CommandSink:

@@ -13,7 +13,7 @@ from gazerig.robot.description.build import SIDES
 from gazerig.robot.description.head_shape import EYE_RADIUS, measures_of, surface
 from gazerig.robot.description.mesh import Mesh, grid, lid, ring
 from gazerig.robot.description.paint import Colour
-from gazerig.robot.model.quaternion import quaternion
+from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import CommandedPose, Snapshot
 
 _GHOST: Colour = (70, 110, 255)

@@ -20,8 +20,8 @@ from gazerig.robot.description.head_shape import HeadMeasures, measures_of
 from gazerig.robot.description.links import Description, Link, Visual, turn_about
 from gazerig.robot.description.paint import Colour
 from gazerig.robot.description.parts import FLOOR_M
+from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.kinematics import LIDS
-from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import Snapshot
 
 _SIGHT: dict[str, Colour] = {

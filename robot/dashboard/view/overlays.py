@@ -2,7 +2,7 @@
 
 import viser
 
-from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
 from gazerig.robot.dashboard.view.commanded_pose import CommandedPoseView
 from gazerig.robot.dashboard.view.lid_edges import LidEdges
 from gazerig.robot.dashboard.view.view_frusta import CameraField, EyeFields

@@ -14,7 +14,7 @@ from gazerig.robot.description.paint import Colour
 from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.person_shape import LOOKS, hand, head, torso
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
-from gazerig.robot.model.quaternion import quaternion
+from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 FIXATED_WITHIN_M = 0.02

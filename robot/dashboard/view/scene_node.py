@@ -8,7 +8,7 @@ from math import atan2, cos, hypot, sin
 from typing import Protocol
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.model.quaternion import Quaternion
+from gazerig.robot.model.frames import Quaternion
 
 _STILL_M, _STILL = 1e-4, 3e-4
 """Smallest motion that is sent, in metres and in parts of a quaternion (0.04 deg): otherwise a

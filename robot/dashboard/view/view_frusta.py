@@ -8,7 +8,7 @@ import viser
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.dashboard.view.scene_node import along, put
 from gazerig.robot.description.paint import Colour
-from gazerig.robot.model.quaternion import quaternion
+from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import Snapshot
 
 _CAMERA: Colour = (120, 128, 140)

@@ -1,0 +1,187 @@
+"""Websockets of the page: panels, webcam, and the relay to the server behind the door."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+
+import aiohttp
+from aiohttp import web
+
+from gazerig.drivers.camera.double_buffer import MOST_BYTES
+from gazerig.robot.dashboard.requests.outbox import TokenBucket
+from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
+
+MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
+"""Messages of one browser; a person who drags with two hands sends some 60 a second."""
+BYTES_PER_S, BYTES_BURST = 1e6, 4e6
+TAKES_S = 20.0
+"""Timeout of sending to a browser, s; it reconnects after it is disconnected."""
+_CLOSES_WITHIN_S = 1.0
+"""Timeout of a browser's answer to the closing message, s."""
+
+Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
+
+
+async def relay_in(browser: web.WebSocketResponse, inside: Socket) -> None:
+    """Relay a browser's messages, at a limited rate."""
+    messages, size = (
+        TokenBucket(MESSAGES_PER_S, MESSAGES_BURST),
+        TokenBucket(BYTES_PER_S, BYTES_BURST),
+    )
+    loop = asyncio.get_running_loop()
+    async for message in browser:
+        if (wait_s := max(messages.wait_s(loop.time()), size.wait_s(loop.time()))) > 0.0:
+            await asyncio.sleep(wait_s)
+        messages.take(loop.time())
+        size.take(loop.time(), len(message.data or ""))
+        await _forward(message, inside)
+
+
+async def relay_out(inside: Socket, browser: web.WebSocketResponse) -> None:
+    """Relay the server's messages, as fast as the browser reads them.
+
+    Raises:
+        TimeoutError: it takes nothing any more.
+    """
+    async for message in inside:
+        async with asyncio.timeout(TAKES_S):
+            await _forward(message, browser)
+
+
+async def until_one_ends(*works: Awaitable[object]) -> None:
+    """Run all until one ends, and cancel the others."""
+    tasks = {asyncio.ensure_future(work) for work in works}
+    _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    for task in others:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def close_socket(socket: web.WebSocketResponse, request: web.Request) -> None:
+    """Close a browser's websocket; a browser that reads nothing does not read the closing message.
+
+    Args:
+        socket: to be closed.
+        request: by which it was opened.
+    """
+    with suppress(TimeoutError, ConnectionError):
+        async with asyncio.timeout(_CLOSES_WITHIN_S):
+            await socket.close()
+    if request.transport is not None:
+        request.transport.abort()
+
+
+async def _forward(message: aiohttp.WSMessage, there: Socket) -> None:
+    if message.type is aiohttp.WSMsgType.BINARY:
+        await there.send_bytes(message.data)
+    elif message.type is aiohttp.WSMsgType.TEXT:
+        await there.send_str(message.data)
+
+
+PICTURES_PER_S, _BURST = 20.0, 5.0
+_JPEG = b"\xff\xd8\xff"
+
+TakePicture = Callable[[bytes], bool]
+"""Sends an image to the rig; returns False if it is not accepted now."""
+
+
+class WebcamSocket:
+    """Receives images of one browser at a time.
+
+    Args:
+        now_s: the clock of the event loop.
+        take: receives pictures.
+    """
+
+    def __init__(self, now_s: Callable[[], float], take: TakePicture) -> None:
+        self._take = take
+        self._now_s = now_s
+        self._rate = TokenBucket(PICTURES_PER_S, _BURST)
+        self._newest: web.WebSocketResponse | None = None
+
+    @staticmethod
+    def prepared() -> web.WebSocketResponse:
+        """Return a websocket that accepts one image at a time."""
+        return web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False)
+
+    async def serve(self, socket: web.WebSocketResponse) -> None:
+        """Receive images until the browser ends, sends other data, or another takes over."""
+        self._newest = socket
+        async for message in socket:
+            if self._newest is not socket:
+                await _say(socket, "another browser's camera has taken over")
+                return
+            if message.type is not aiohttp.WSMsgType.BINARY or not message.data.startswith(_JPEG):
+                await _say(socket, "only JPEG pictures are taken here")
+                return
+            if self._rate.take(self._now_s()):
+                self._take(message.data)
+            await _say(socket, "next")
+
+
+async def _say(socket: web.WebSocketResponse, text: str) -> None:
+    async with asyncio.timeout(TAKES_S):
+        await socket.send_str(text)
+
+
+_PAUSE_S = 0.04
+"""Time between messages to a browser, s: 25 a second, more cannot be read."""
+
+
+class WidgetSocket:
+    """Sends the panels to browsers, to each as fast as it reads them.
+
+    Args:
+        widgets: all panels.
+    """
+
+    def __init__(self, widgets: Widgets) -> None:
+        self._widgets = widgets
+        # Input of users is handled in a separate thread, in order: a STOP through the same loop
+        # must not wait for it.
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="page panels")
+
+    async def serve(self, socket: web.WebSocketResponse, browser: str) -> None:
+        """Serve a connection of a browser until it ends."""
+        loop, news = asyncio.get_running_loop(), asyncio.Event()
+
+        def wake() -> None:
+            loop.call_soon_threadsafe(news.set)
+
+        client = await loop.run_in_executor(self._worker, self._widgets.join, browser, wake)
+        try:
+            await until_one_ends(self._send(socket, client, news), self._receive(socket, client))
+        finally:
+            await asyncio.shield(loop.run_in_executor(self._worker, self._widgets.leave, client))
+
+    def close(self) -> None:
+        """End the thread."""
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    async def _send(
+        self, socket: web.WebSocketResponse, client: Client, news: asyncio.Event
+    ) -> None:
+        while not socket.closed:
+            await news.wait()
+            news.clear()
+            message = self._widgets.outgoing(client)
+            if message is None:
+                continue
+            async with asyncio.timeout(TAKES_S):
+                if message.text:
+                    await socket.send_str(message.text)
+                for image in message.images:
+                    await socket.send_bytes(image)
+            await asyncio.sleep(_PAUSE_S)
+
+    async def _receive(self, socket: web.WebSocketResponse, client: Client) -> None:
+        loop = asyncio.get_running_loop()
+        rate = TokenBucket(MESSAGES_PER_S, MESSAGES_BURST)
+        async for message in socket:
+            if message.type is not aiohttp.WSMsgType.TEXT:
+                continue
+            if (wait_s := rate.wait_s(loop.time())) > 0.0:
+                await asyncio.sleep(wait_s)
+            rate.take(loop.time())
+            await loop.run_in_executor(self._worker, self._widgets.received, client, message.data)
