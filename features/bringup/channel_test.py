@@ -13,9 +13,8 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.hold import HoldResult, hold_channel
 from gazerig.drivers.hobby_board.release import switch_off
-from gazerig.drivers.hobby_board.start import read_every_pulse
+from gazerig.drivers.hobby_board.start import HoldResult, hold_channel, read_every_pulse
 from gazerig.drivers.maestro.commands import name_errors
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.types import ServoConfig
@@ -107,7 +106,15 @@ def give_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
         channel.hold()
         yield channel
     finally:
-        _end(board, setup)
+        try:
+            left = switch_off(board, (setup.id,))
+            sure = not left.holding and not left.unconfirmed
+        except BusLost:
+            sure = False
+        if not sure:
+            raise ServoFault(
+                f"{servo_label(setup)} may still get pulses: switch the servo supply off"
+            )
 
 
 def _advance(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -> int:
@@ -120,21 +127,6 @@ def _advance(board: Board, channel: Channel, sleep_until: Callable[[float], None
         if pulses is not None:
             return pulses[0]
     return read_every_pulse(board, [channel.setup])[0]
-
-
-def _end(board: Board, setup: ServoConfig) -> None:
-    """Stop the pulses and see that they have.
-
-    Raises:
-        ServoFault: no answer confirms it.
-    """
-    try:
-        left = switch_off(board, (setup.id,))
-        sure = not left.holding and not left.unconfirmed
-    except BusLost:
-        sure = False
-    if not sure:
-        raise ServoFault(f"{servo_label(setup)} may still get pulses: switch the servo supply off")
 
 
 def send_home(line: MaestroLink) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """A head moved by hand, without torque: its joints read at even times."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -84,11 +84,6 @@ def record(
         ended_by = stopped()
         slot = max(slot + 1, int((clock.now_s() - start_s) * RATE_HZ))
         clock.sleep_until(start_s + slot / RATE_HZ)
-    return _series(rows, start_s, ended_by or "the time is over")
-
-
-def _series(rows: Sequence[TelemetrySample], start_s: float, ended_by: str) -> HandRecording:
-    """Turn readings into one row of times and angles for each joint."""
     series, left_out = {}, []
     for name in rows[0].servos if rows else ():
         pairs = [
@@ -103,4 +98,4 @@ def _series(rows: Sequence[TelemetrySample], start_s: float, ended_by: str) -> H
             series[name] = np.array(times), np.array(angles)
     if not series:
         raise DriverError("no servo answered: check power, cable, ids and baud rate")
-    return HandRecording(series, tuple(left_out), ended_by)
+    return HandRecording(series, tuple(left_out), ended_by or "the time is over")

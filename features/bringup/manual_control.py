@@ -30,7 +30,7 @@ from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.power_down import Again
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Jog
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.guard import Guard
 

@@ -10,9 +10,9 @@ from gazerig.drivers.bus.servo_models import SERVOS, BusKind
 from gazerig.drivers.dynamixel import control_table as dynamixel
 from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.feetech import homing
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
+from gazerig.drivers.feetech.family import set_middle
 from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
@@ -139,7 +139,7 @@ FEETECH = ServoKind(
             current * feetech.CURRENT_UNIT_MA / 1000.0 / feetech.MODELS[model].stall_current_a
         ),
     ),
-    set_middle=homing.set_middle,
+    set_middle=set_middle,
 )
 
 SCS = FEETECH._replace(

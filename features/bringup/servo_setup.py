@@ -133,11 +133,23 @@ class _Assignment:
             self._done.append("torque 1 -> 0")
         if self._id != servo_id:
             tell(f"id {self._id} -> {servo_id}")
-            self._change_id(servo_id)
+            self._unlock()
+            written = registers.write(self._id, "id", servo_id)
+            # The confirmation may come from either id, or be lost.
+            if not written and ping(self._port, kind.family, servo_id, self._baud, 2) is None:
+                raise self._refusal(f"take the id {servo_id}")
+            self._done.append(f"id {self._id} -> {servo_id}")
+            self._id = servo_id
         rate = kind.family.baud_rates.index(baud)
         if self._baud != baud or registers.read(self._id, "baud_rate") != rate:
             tell(f"baud rate {self._baud} -> {baud}")
-            self._change_baud(baud)
+            self._unlock()
+            # A mere silence may be a lost confirmation.
+            if not registers.write(self._id, "baud_rate", rate) and registers.refusal:
+                raise self._refusal(f"take {baud} bit/s")
+            self._done.append(f"baud rate {self._baud} -> {baud} bit/s")
+            self._baud = baud
+            self._open(baud)
         seen = ping(self._port, kind.family, self._id, self._baud, 3)
         if seen is None or seen.number != self._found.number:
             raise ServoMissing(
@@ -147,26 +159,6 @@ class _Assignment:
         if kind.family.lock is not None and not registers.settle(self._id, kind.family.lock, 1):
             raise self._refusal("close its lock")
         return SetupResult(self._found, seen, tuple(self._done))
-
-    def _change_id(self, servo_id: int) -> None:
-        self._unlock()
-        written = self._registers.write(self._id, "id", servo_id)
-        # The confirmation may come from either id, or be lost.
-        if not written and ping(self._port, self._kind.family, servo_id, self._baud, 2) is None:
-            raise self._refusal(f"take the id {servo_id}")
-        self._done.append(f"id {self._id} -> {servo_id}")
-        self._id = servo_id
-
-    def _change_baud(self, baud: int) -> None:
-        self._unlock()
-        written = self._registers.write(
-            self._id, "baud_rate", self._kind.family.baud_rates.index(baud)
-        )
-        if not written and self._registers.refusal:  # a mere silence may be a lost confirmation
-            raise self._refusal(f"take {baud} bit/s")
-        self._done.append(f"baud rate {self._baud} -> {baud} bit/s")
-        self._baud = baud
-        self._open(baud)
 
     def _unlock(self) -> None:
         lock = self._kind.family.lock

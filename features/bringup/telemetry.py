@@ -10,7 +10,7 @@ from dataclasses import replace
 from math import degrees, radians
 from typing import NamedTuple, Protocol
 
-from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.maestro.commands import MOST_INPUT
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
@@ -243,22 +243,20 @@ def _joint_deg(
 
 def as_json(sample: TelemetrySample, start_s: float) -> dict[str, object]:
     """Return a sample as plain values, times in seconds since the start."""
+    joints: dict[str, dict[str, object] | None] = {}
+    for name, seen in sample.servos.items():
+        joints[name] = values = None if seen is None else seen._asdict()
+        if seen is None or values is None:
+            continue
+        for key, digits in _DIGITS.items():
+            if values[key] is not None:
+                values[key] = round(values[key], digits)
+        if seen.measured:
+            del values["pulse_us"]  # smart servos know no such thing
     return {
         "t_s": round(sample.at_s - start_s, 3),
         "took_ms": round(1e3 * sample.took_s, 1),
         "asked": sample.asked,
         "unanswered": sample.unanswered,
-        "joints": {
-            name: None if seen is None else _plain(seen) for name, seen in sample.servos.items()
-        },
+        "joints": joints,
     }
-
-
-def _plain(seen: Telemetry) -> dict[str, object]:
-    values = seen._asdict()
-    for key, digits in _DIGITS.items():
-        if values[key] is not None:
-            values[key] = round(values[key], digits)
-    if seen.measured:
-        del values["pulse_us"]  # smart servos know no such thing
-    return values

@@ -240,19 +240,12 @@ def _average_view(
             continue
         sights.append(seen)
         stood.append(after)
-    mean = _mean(sights) if len(sights) == params.frames else None
-    if mean is None:
+    common = set.intersection(*(set(seen.ids.tolist()) for seen in sights)) if sights else set()
+    if len(sights) < params.frames or len(common) < LEAST_CORNERS:
         return None, neck.angles(), why
+    kept = [np.isin(seen.ids, sorted(common)) for seen in sights]
+    places = [seen.corners_px[keep] for seen, keep in zip(sights, kept, strict=True)]
+    first, of_first = sights[0], kept[0]
+    mean = SeenBoard(first.ids[of_first], np.mean(places, axis=0), first.corners_board_m[of_first])
     yaw, pitch, roll = np.mean(stood, axis=0).tolist()
     return mean, (yaw, pitch, roll), ""
-
-
-def _mean(sights: Sequence[SeenBoard]) -> SeenBoard | None:
-    """Average the corners that are in every frame, None if they are too few."""
-    common = set.intersection(*(set(seen.ids.tolist()) for seen in sights))
-    kept = [np.isin(seen.ids, sorted(common)) for seen in sights]
-    if len(common) < LEAST_CORNERS:
-        return None
-    places = [seen.corners_px[keep] for seen, keep in zip(sights, kept, strict=True)]
-    first = sights[0]
-    return SeenBoard(first.ids[kept[0]], np.mean(places, axis=0), first.corners_board_m[kept[0]])

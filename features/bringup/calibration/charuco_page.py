@@ -48,8 +48,22 @@ def page(board: CharucoBoard, paper: str) -> ImageArray:
     top = round((_EDGE_MM + (room_mm[1] - board_mm[1]) / 2) * _PX_PER_MM)
     sheet[top : top + drawn.shape[0], left : left + drawn.shape[1]] = drawn
     below = round((high_mm - _EDGE_MM - _STRIP_MM + 3.0) * _PX_PER_MM)
-    _ruler(sheet, left, below)
-    _text(sheet, left, below, board)
+    # A line of 100 mm with a mark every 10 mm; its length is that between outer edges.
+    mm = _PX_PER_MM
+    sheet[below : below + 3, left : left + RULER_MM * mm] = _BLACK
+    for at_mm in range(0, RULER_MM + 1, 10):
+        high = (4 if at_mm % 50 == 0 else 2) * mm
+        start = left + at_mm * mm - (3 if at_mm == RULER_MM else 0)
+        sheet[below : below + high, start : start + 3] = _BLACK
+    lines = (
+        f"The line on the left is {RULER_MM} mm long: measure it.",
+        "Print at 100 %, not 'fit to page'. Glue it on something flat and stiff.",
+        f"ChArUco board {par.columns} x {par.rows}, squares {par.square_mm:g} mm, "
+        f"markers {par.marker_mm:g} mm.",
+    )
+    for number, line in enumerate(lines):
+        at = (left + (RULER_MM + 6) * mm, below + round((1.6 + 3.9 * number) * mm))
+        cv2.putText(sheet, line, at, cv2.FONT_HERSHEY_SIMPLEX, 1.1, _BLACK, 3, cv2.LINE_8)
     return sheet
 
 
@@ -70,27 +84,3 @@ def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) 
             image.save(file, format="PDF", resolution=_DPI)
         else:
             image.save(file, format="PNG", dpi=(_DPI, _DPI))
-
-
-def _ruler(sheet: ImageArray, left: int, top: int) -> None:
-    """Draw a line of 100 mm with a mark every 10 mm; its length is that between outer edges."""
-    mm = _PX_PER_MM
-    sheet[top : top + 3, left : left + RULER_MM * mm] = _BLACK
-    for at_mm in range(0, RULER_MM + 1, 10):
-        high = (4 if at_mm % 50 == 0 else 2) * mm
-        start = left + at_mm * mm - (3 if at_mm == RULER_MM else 0)
-        sheet[top : top + high, start : start + 3] = _BLACK
-
-
-def _text(sheet: ImageArray, left: int, top: int, board: CharucoBoard) -> None:
-    """Write what to check to the right of the ruler."""
-    par = board.params
-    lines = (
-        f"The line on the left is {RULER_MM} mm long: measure it.",
-        "Print at 100 %, not 'fit to page'. Glue it on something flat and stiff.",
-        f"ChArUco board {par.columns} x {par.rows}, squares {par.square_mm:g} mm, "
-        f"markers {par.marker_mm:g} mm.",
-    )
-    for number, line in enumerate(lines):
-        at = (left + (RULER_MM + 6) * _PX_PER_MM, top + round((1.6 + 3.9 * number) * _PX_PER_MM))
-        cv2.putText(sheet, line, at, cv2.FONT_HERSHEY_SIMPLEX, 1.1, _BLACK, 3, cv2.LINE_8)

@@ -80,7 +80,12 @@ class StopSearch:
         if self.found is None:
             if (position_steps - self._best) * way > par.progress_deg * STEPS_PER_DEG:
                 self._best, self._moved_s = float(position_steps), t_s
-            self.found = self._judge(position_steps, load, t_s)
+            still_s = t_s - self._moved_s
+            pushed = abs(load) >= par.touch_share and still_s >= par.touch_ms / 1e3
+            if (self._end - position_steps) * way <= NEAR_DEG * STEPS_PER_DEG:
+                self.found = EndStop(position_steps, "limit", still_s)
+            elif pushed or still_s >= par.longest_push_ms / 1e3:
+                self.found = EndStop(position_steps, "stop", still_s)
         if self.found is not None:
             back = self.found.position_steps - way * par.back_off_deg * STEPS_PER_DEG
             return self._within(back)
@@ -89,17 +94,6 @@ class StopSearch:
         nearer = min if way > 0 else max
         self._goal, self._t_s = nearer(ahead, most, self._end), t_s
         return self._within(self._goal)
-
-    def _judge(self, position_steps: int, load: float, t_s: float) -> EndStop | None:
-        par = self._params
-        still_s = t_s - self._moved_s
-        near = (self._end - position_steps) * self._way <= NEAR_DEG * STEPS_PER_DEG
-        if near:
-            return EndStop(position_steps, "limit", still_s)
-        pushed = abs(load) >= par.touch_share and still_s >= par.touch_ms / 1e3
-        if pushed or still_s >= par.longest_push_ms / 1e3:
-            return EndStop(position_steps, "stop", still_s)
-        return None
 
     def _within(self, goal: float) -> int:
         low, high = self._room

@@ -80,10 +80,25 @@ class FaceSteering:
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the part that is due as target, or where to wait while no face is seen."""
-        self.face = face = self._nearest(percept, state.p_world_head_m, t_s)
-        part = self.state.part
+        followed, self.face = self.face.id if self.face is not None else None, None
+        if percept is not None and percept.faces and percept.age_s(t_s) <= STALE_S:
+            # The present face while it is seen, else the nearest.
+            self.face = min(
+                percept.faces,
+                key=lambda one: (
+                    one.id != followed,
+                    norm(sub(one.p_world_m, state.p_world_head_m)),
+                ),
+            )
+        face, part = self.face, self.state.part
         if face is None or percept is None or part is None:
-            return self._waiting(t_s)
+            # At the last face, and after a while straight ahead.
+            lost = t_s - self._seen_s > _LOST_S
+            p = self._rest if lost else self._lost_at
+            self._count(("rest", lost))
+            return Target(
+                p, _STILL, t_s, "rest", -1, _PULL, True, None, self._shift, "no face seen"
+            )
         self._seen_s = t_s
         place = self.state.place_mm(part)
         p = self._lost_at = point_world_m(place, face.p_world_m, face.R_world_face)
@@ -132,23 +147,6 @@ class FaceSteering:
     def _gaze_error_deg(self, tick: Tick) -> float:
         """Return the angle of the gaze from the part, as far as the eyes can meet it."""
         return degrees(gaze_error(tick.target.p_world_m, tick.pose, self._converges).whole)
-
-    def _nearest(self, percept: Percept | None, p_head: Vec3, t_s: float) -> Face | None:
-        """Return the present face while it is seen, else the nearest."""
-        if percept is None or not percept.faces or percept.age_s(t_s) > STALE_S:
-            return None
-        followed = self.face.id if self.face is not None else None
-        return min(
-            percept.faces,
-            key=lambda face: (face.id != followed, norm(sub(face.p_world_m, p_head))),
-        )
-
-    def _waiting(self, t_s: float) -> Target:
-        """Keep looking at the last face, and after a while rest straight ahead."""
-        lost = t_s - self._seen_s > _LOST_S
-        p = self._rest if lost else self._lost_at
-        self._count(("rest", lost))
-        return Target(p, _STILL, t_s, "rest", -1, _PULL, True, None, self._shift, "no face seen")
 
     def _count(self, identity: object) -> None:
         """Count a shift whenever another point is looked at."""

@@ -205,7 +205,8 @@ class Fit:
         """Return standard deviations (6,) of the camera's turn (rad) and place (m)."""
         observations, errors = self.observations, self.observations.errors(self.estimate)
         shared, own = observations.slopes(self.estimate)
-        weight, of_row = _weights(errors), np.repeat(observations.view, 2)
+        weight = np.minimum(1.0, _bound(errors) / np.maximum(np.abs(errors), 1e-12))
+        weight, of_row = weight / _CORNER_PX**2, np.repeat(observations.view, 2)
         inner = np.zeros((observations.views, _SHARED, _SHARED))
         pull = np.zeros((observations.views, _SHARED))
         for k in range(observations.views):
@@ -272,10 +273,7 @@ def refine(observations: Observations, estimate: Estimate) -> Fit:
 
 
 def _huber(bound: float, corners: int) -> Callable[[Floats], Floats]:
-    """Return Huber's loss of the first residuals, those of corners, and squares of the others.
-
-    It has the form that scipy.optimize.least_squares takes: of squares, with two derivatives.
-    """
+    """Return Huber's loss of the corners' squares, and two derivatives, as scipy takes them."""
 
     def loss(squares: Floats) -> Floats:
         rho = np.stack((squares, np.ones_like(squares), np.zeros_like(squares)))
@@ -290,12 +288,6 @@ def _huber(bound: float, corners: int) -> Callable[[Floats], Floats]:
 def _bound(errors: Floats) -> float:
     """Return the size beyond which errors count less, in pixels."""
     return max(_HUBER * 1.4826 * float(np.median(np.abs(errors))), 1e-3)
-
-
-def _weights(errors: Floats) -> Floats:
-    """Return the weight of each error, 1/px^2."""
-    weight = np.minimum(1.0, _bound(errors) / np.maximum(np.abs(errors), 1e-12))
-    return np.asarray(weight / _CORNER_PX**2, dtype=np.float64)
 
 
 _METHODS = (

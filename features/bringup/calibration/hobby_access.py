@@ -7,10 +7,10 @@ The board knows no watchdog: a guardian stops its pulses when this program is ki
 from collections.abc import Callable
 
 from gazerig.drivers.errors import BusLost
-from gazerig.drivers.hobby_board.models import US_STEPS
-from gazerig.drivers.maestro.bus import MaestroBus
+from gazerig.drivers.hobby_board.params import US_STEPS
+from gazerig.drivers.maestro.board import MaestroBus
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.pca9685.board import Pca9685Bus
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
@@ -159,11 +159,7 @@ class HobbyServoHandle:
         return min(max(round(place_us * US_STEPS), low), high)
 
     def _read(self) -> int:
-        """Read the board until it replies; return its present pulse in steps.
-
-        Raises:
-            BusLost: it does not answer any more.
-        """
+        """Read the board until it replies; return its present pulse in steps."""
         end_s = self._clock.now_s() + SILENT_S
         while True:
             feedback = self._bus.read(self._clock.now_s())

@@ -129,17 +129,6 @@ def zero_of(joint_name: str) -> str:
     return "straight ahead" if joint_name in GAZE_JOINTS else "at rest"
 
 
-def _plain(value: Value) -> Value:
-    """Return whole numbers of a linkage as such: 1500 us is no more exact as 1500.0."""
-    if not isinstance(value, tuple):
-        return value
-    return tuple((_short(angle), _short(at)) for angle, at in value)
-
-
-def _short(number: float) -> float:
-    return int(number) if number == int(number) else number
-
-
 def is_lid(joint_name: str) -> bool:
     """Return whether a joint moves a lid: its ends matter, and it has no straight ahead."""
     return joint_name in LIDS
@@ -191,7 +180,26 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
     made = Calibration(
         marks.zero % STEPS_PER_TURN, sign, 0.0 - round_inwards(least), round_inwards(most)
     )
-    _refuse_unfit(name, made, joint, margin_deg)
+    if name in GAZE_JOINTS and not made.min_deg < 0.0 < made.max_deg:
+        raise CalibrationRefused(
+            f"{name}: straight ahead is within {margin_deg:g} deg of an end (range "
+            f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in again, or lessen the margin"
+        )
+    if made.max_deg - made.min_deg <= SMALLEST_RANGE_DEG:
+        raise CalibrationRefused(
+            f"{name}: with {margin_deg:g} deg of margin at each end only "
+            f"{made.max_deg - made.min_deg:.1f} deg are left, more than {SMALLEST_RANGE_DEG:g} "
+            "are needed: lessen the margin"
+        )
+    if made.min_deg < -180.0 or made.max_deg > 180.0:
+        raise CalibrationRefused(
+            f"{name}: {made.min_deg:g}..{made.max_deg:g} deg is more than a joint may turn "
+            "(-180..180): check its ratio"
+        )
+    try:
+        with_calibration(joint, made)
+    except ValueError as error:
+        raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
     return made
 
 
@@ -231,30 +239,6 @@ def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable:
     )
 
 
-def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: float) -> None:
-    """Refuse values that the rig file's own rules would refuse."""
-    if name in GAZE_JOINTS and not made.min_deg < 0.0 < made.max_deg:
-        raise CalibrationRefused(
-            f"{name}: straight ahead is within {margin_deg:g} deg of an end (range "
-            f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in again, or lessen the margin"
-        )
-    if made.max_deg - made.min_deg <= SMALLEST_RANGE_DEG:
-        raise CalibrationRefused(
-            f"{name}: with {margin_deg:g} deg of margin at each end only "
-            f"{made.max_deg - made.min_deg:.1f} deg are left, more than {SMALLEST_RANGE_DEG:g} "
-            "are needed: lessen the margin"
-        )
-    if made.min_deg < -180.0 or made.max_deg > 180.0:
-        raise CalibrationRefused(
-            f"{name}: {made.min_deg:g}..{made.max_deg:g} deg is more than a joint may turn "
-            "(-180..180): check its ratio"
-        )
-    try:
-        with_calibration(joint, made)
-    except ValueError as error:
-        raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
-
-
 def with_calibration(joint: JointParams, made: Calibration) -> JointParams:
     """Return the joint as calibrated.
 
@@ -276,10 +260,17 @@ def changes(
     a parking angle outside the new range to its nearer end.
     """
     wanted: dict[str, Value] = {
-        f"joints.{name}.{key}": _plain(value)
+        f"joints.{name}.{key}": value
         for key, value in made._asdict().items()
         if getattr(joint, key) != value
     }
+    places = f"joints.{name}.transmission_points"
+    if isinstance(made, LinkageFit) and places in wanted:
+        # Whole numbers as such: 1500 us is no more exact as 1500.0.
+        wanted[places] = tuple(
+            (int(angle) if angle == int(angle) else angle, int(at) if at == int(at) else at)
+            for angle, at in made.transmission_points
+        )
     if is_lid(name):
         shut, wide = lid_keys(name)
         wanted[f"lid_joints.{shut}"] = made.min_deg

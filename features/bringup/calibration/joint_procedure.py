@@ -110,7 +110,21 @@ def calibrate_by_motion(
         CalibrationStopped: the person ended it.
     """
     try:
-        marks = _find_stops(single, person, params)
+        positive, negative = ends_of(single.name)
+        way = single.joint.sign
+        single.enable_torque(params)
+        person.tell(
+            f"{single.who}: torque on at {params.strength:.0%} of its strength, "
+            f"moving at {params.speed_deg_s:g} deg/s"
+        )
+        if single.alone:
+            person.tell(f"{single.who}: {single.alone}")
+        first = _find_stop(single, person, params, way)
+        asked = f"did {single.name} just go to its {positive} end?"
+        sign = way if person.agrees(asked, PositionTracker(single).live) else -way
+        second = _find_stop(single, person, params, -way)
+        single.go(params, (first + second) // 2)
+        marks = Marks(first, second, 0) if sign == way else Marks(second, first, 0)
     finally:
         single.servo.restore()
     person.tell(f"{single.who}: torque off")
@@ -121,25 +135,6 @@ def calibrate_by_motion(
     else:
         marks = centre_zero(marks)
     return calibration(single.name, marks, single.joint, margin_deg)
-
-
-def _find_stops(single: SingleJoint, person: Operator, params: StopSearchParams) -> Marks:
-    """Return both stops without the zero; the person confirms the direction."""
-    positive, negative = ends_of(single.name)
-    way = single.joint.sign
-    single.enable_torque(params)
-    person.tell(
-        f"{single.who}: torque on at {params.strength:.0%} of its strength, "
-        f"moving at {params.speed_deg_s:g} deg/s"
-    )
-    if single.alone:
-        person.tell(f"{single.who}: {single.alone}")
-    first = _find_stop(single, person, params, way)
-    asked = f"did {single.name} just go to its {positive} end?"
-    sign = way if person.agrees(asked, PositionTracker(single).live) else -way
-    second = _find_stop(single, person, params, -way)
-    single.go(params, (first + second) // 2)
-    return Marks(first, second, 0) if sign == way else Marks(second, first, 0)
 
 
 def _find_stop(single: SingleJoint, person: Operator, params: StopSearchParams, way: int) -> int:

@@ -152,11 +152,6 @@ class SingleServo:
         self._unguard()
 
     def _torque_off(self) -> None:
-        """Switch the torque off, and see that it is.
-
-        Raises:
-            ServoFault: it is not.
-        """
         if self._family.watchdog_unit_s is not None:
             self._put("bus_watchdog", 0)
         self._put("torque_enable", 0)
@@ -183,14 +178,26 @@ class SingleServo:
             ServoFault: the torque does not come on, or the position jumped.
             SetupError: the guardian does not start.
         """
-        value, put = self._value, self._put
+        value, put, driving = self._value, self._put, self._driving
         if self._guardian is not None:
             self._guardian.join(0)
             self._guardian.arm(0)
         self._torque_off()
         if self._family.lock is not None:
             put(self._family.lock, 1)
-        self._borrow(strength, speed_steps_s)
+        wanted = {
+            **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
+            **driving.gentle(value, strength, speed_steps_s),
+        }
+        was = {name: value(name) for name in wanted}
+        found = dict(was)
+        if driving.full_drive is not None:
+            register, largest = driving.full_drive
+            found[register] = value(largest)
+        self._was = found | self._was
+        for name, desired in wanted.items():
+            if was[name] != desired:
+                put(name, desired)
         before = self.position()
         if not 0 <= before < self._family.steps_per_turn:
             raise ServoMissing(
@@ -209,23 +216,6 @@ class SingleServo:
         unit_s = self._family.watchdog_unit_s
         if unit_s is not None:
             put("bus_watchdog", round(WATCHDOG_S / unit_s))
-
-    def _borrow(self, strength: float, speed_steps_s: float) -> None:
-        """Allow goals anywhere in the turn, weak and slow, to find the end stops."""
-        value, driving = self._value, self._driving
-        wanted = {
-            **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
-            **driving.gentle(value, strength, speed_steps_s),
-        }
-        was = {name: value(name) for name in wanted}
-        found = dict(was)
-        if driving.full_drive is not None:
-            register, largest = driving.full_drive
-            found[register] = value(largest)
-        self._was = found | self._was
-        for name, desired in wanted.items():
-            if was[name] != desired:
-                self._put(name, desired)
 
     def torque_is_on(self) -> bool:
         """Return whether the torque is on."""
@@ -259,22 +249,12 @@ class SingleServo:
             self._guardian.leave(0)
 
     def _value(self, register: str) -> int:
-        """Return a register's value.
-
-        Raises:
-            BusLost: it does not answer any more.
-        """
         value = self._registers.read(self._id, register)
         if value is None:
             raise BusLost(f"{self.who} does not answer any more: check its cable and power")
         return value
 
     def _put(self, register: str, value: int) -> None:
-        """Write a register.
-
-        Raises:
-            BusLost: it does not answer any more, or refuses the value.
-        """
         if not self._registers.write(self._id, register, value):
             raise BusLost(f"{self.who} does not take {register} {value}: check its cable and power")
 

@@ -31,38 +31,18 @@ class TerminalJogger(TerminalPerson):
         """Return when the servo has the desired position; see Jogger."""
         say(question)
         if self._lines.is_scripted or not sys.stdin.isatty():
-            self._steer_by_lines(question, servo)
-        else:
-            self._steer_by_keys(servo)
-
-    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
-        """Return the typed number, Enter is the proposed one; see Jogger."""
-        asked = f"{question} [{proposed:g}]"
-        say(asked)
-        while True:
-            line = self._line(asked, live)
-            try:
-                number = float(line) if line else proposed
-            except ValueError:
-                number = float("nan")
-            if isfinite(number):
-                return number
-            say(f"{line!r} is no number: a number, or Enter for {proposed:g}; q ends")
-
-    def _steer_by_lines(self, question: str, servo: JoggableJoint) -> None:
-        while line := self._line(question, servo.live):
-            try:
-                us = float(line)
-            except ValueError:
-                us = float("nan")
-            if not isfinite(us):
-                say(f"{line!r}: {LINES_HELP}")
-            elif line[0] in "+-":
-                servo.by(us)
-            else:
-                servo.to(us)
-
-    def _steer_by_keys(self, servo: JoggableJoint) -> None:
+            while line := self._line(question, servo.live):
+                try:
+                    us = float(line)
+                except ValueError:
+                    us = float("nan")
+                if not isfinite(us):
+                    say(f"{line!r}: {LINES_HELP}")
+                elif line[0] in "+-":
+                    servo.by(us)
+                else:
+                    servo.to(us)
+            return
         step = FIRST_STEP
         say(KEYS_HELP)
         with TerminalKeys() as keys:
@@ -81,3 +61,17 @@ class TerminalJogger(TerminalPerson):
                     step = min(step + 1, len(STEPS_US) - 1)
                 elif key in ("down", "smaller"):
                     step = max(step - 1, 0)
+
+    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        """Return the typed number, Enter is the proposed one; see Jogger."""
+        asked = f"{question} [{proposed:g}]"
+        say(asked)
+        while True:
+            line = self._line(asked, live)
+            try:
+                number = float(line) if line else proposed
+            except ValueError:
+                number = float("nan")
+            if isfinite(number):
+                return number
+            say(f"{line!r} is no number: a number, or Enter for {proposed:g}; q ends")

@@ -87,17 +87,18 @@ def holding_text(rig: Rig) -> str:
 
 def unreleased_text(rig: Rig) -> str:
     """Return the behaviour of servos whose torque could not be switched off."""
-    return "; ".join(dict.fromkeys(_unreleased_text(rig, bus) for bus in bus_names(rig)))
-
-
-def _unreleased_text(rig: Rig, bus: str) -> str:
-    kind = rig.bus_named(bus).kind
     until = "until the servo power is cut, or the guardian, which tries for 10 s, reaches the port"
-    if kind in BOARDS:
-        return f"{BOARDS[kind]} goes on with its last pulses {until}"
-    title = KINDS[kind].title if kind in KINDS else kind
-    if not can_be_released(rig, bus):
-        return f"the {title} servos' own watchdog stops them"
-    if has_watchdog(rig, bus):
-        return f"{title} servos stop by their own watchdog and hold {until}"
-    return f"{title} servos hold their last goal {until}"
+    texts: dict[str, None] = {}
+    for bus in bus_names(rig):
+        kind = rig.bus_named(bus).kind
+        title = KINDS[kind].title if kind in KINDS else kind
+        if kind in BOARDS:
+            text = f"{BOARDS[kind]} goes on with its last pulses {until}"
+        elif not can_be_released(rig, bus):
+            text = f"the {title} servos' own watchdog stops them"
+        elif has_watchdog(rig, bus):
+            text = f"{title} servos stop by their own watchdog and hold {until}"
+        else:
+            text = f"{title} servos hold their last goal {until}"
+        texts[text] = None
+    return "; ".join(texts)

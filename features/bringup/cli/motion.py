@@ -14,7 +14,6 @@ from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.manual_session import holding_rig, holding_text
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
 from gazerig.features.bringup.look_at import (
-    GazeResult,
     ends_reached,
     gaze_text,
     look_at,
@@ -124,7 +123,25 @@ def look_at_command(
         kinematics, oculomotor = gaze_parts(loaded, seed)
     with _manual_control(loaded, rig, mock, port, yes, 20.0, hold, not no_park) as control:
         looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
-        good = _report_look(looked, loaded)
+        good = looked.error <= 2.0
+        ranges = loaded.ranges
+        narrower = {
+            "eye_pan": ranges.eye_yaw_deg,
+            "eyes_pan": ranges.eye_yaw_deg,
+            "eye_tilt": ranges.eye_pitch_deg,
+            "eyes_tilt": ranges.eye_pitch_deg,
+            "neck_yaw": ranges.neck_yaw_deg,
+        }
+        _print_events(looked.moved.events)
+        if any(name.startswith("neck") for name in loaded.names):
+            yaw, pitch, roll = looked.head
+            say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
+        for line in gaze_text(looked):
+            say(line)
+        for applied in looked.moved.remarkable():
+            say(f"limited: {applied}")
+        for line in () if good else ends_reached(loaded.joints, narrower, looked.moved):
+            say(f"limited: {line}")
         _hold(control, 0.0, hold)
     _exit_unless(good)
 
@@ -210,30 +227,6 @@ def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
         if applied.joint in asked or applied.reasons:
             say(str(applied))
     say(f"{moved} after {moved.seconds:.1f} s")
-
-
-def _report_look(looked: GazeResult, rig: Rig) -> bool:
-    """Print how close the eyes come to the point; return whether within 2 deg."""
-    good = looked.error <= 2.0
-    ranges = rig.ranges
-    narrower = {
-        "eye_pan": ranges.eye_yaw_deg,
-        "eyes_pan": ranges.eye_yaw_deg,
-        "eye_tilt": ranges.eye_pitch_deg,
-        "eyes_tilt": ranges.eye_pitch_deg,
-        "neck_yaw": ranges.neck_yaw_deg,
-    }
-    _print_events(looked.moved.events)
-    if any(name.startswith("neck") for name in rig.names):
-        yaw, pitch, roll = looked.head
-        say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
-    for line in gaze_text(looked):
-        say(line)
-    for applied in looked.moved.remarkable():
-        say(f"limited: {applied}")
-    for line in () if good else ends_reached(rig.joints, narrower, looked.moved):
-        say(f"limited: {line}")
-    return good
 
 
 def _print_events(events: Iterable[str]) -> None:

@@ -15,7 +15,7 @@ from gazerig.drivers.serial.list_ports import Host, SerialPort, check_owner, ser
 from gazerig.drivers.serial.port import BusPort, port_of
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
-from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.terminal import say, status
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.sim_mock.devices import Emulated

@@ -83,7 +83,7 @@ class TerminalPerson:
         self._stopped = stopped
         self._yes = yes
         self._live_line = sys.stderr.isatty()
-        self.hand: Callable[[int], None] | None = None
+        self.hand: Callable[[int], object] | None = None
         """Turns the present joint by some steps, if it is emulated."""
 
     def tell(self, line: str) -> None:
@@ -104,15 +104,22 @@ class TerminalPerson:
     def _ask(self, question: str, live: Callable[[], str], accepted: tuple[str, ...]) -> str:
         say(question)
         while (line := self._line(question, live)) not in accepted:
-            self._other(line, live, accepted)
+            word, _, number = line.partition(" ")
+            if word == "turn" and self.hand is not None and number.lstrip("+-").isdecimal():
+                left = int(number)
+                while left:
+                    step = max(-HAND_STEPS, min(HAND_STEPS, left))
+                    self.hand(step)
+                    left -= step
+                    live()
+                continue
+            wanted = "Enter" if accepted == ("",) else "y or n"
+            hand = ", turn STEPS moves the emulated joint" if self.hand is not None else ""
+            say(f"{line!r} is no answer: {wanted} goes on, q ends{hand}")
         return line
 
     def _look(self, live: Callable[[], str], more: str = "") -> None:
-        """Watch the joint once, and show it.
-
-        Raises:
-            CalibrationStopped: there is a reason to end.
-        """
+        """Watch the joint once, and show it."""
         why = self._stopped()
         if why is not None:
             raise CalibrationStopped(why)
@@ -121,12 +128,7 @@ class TerminalPerson:
             status(f"{shown}{more}")
 
     def _line(self, question: str, live: Callable[[], str]) -> str:
-        """Wait for a line while the joint is watched.
-
-        Raises:
-            CalibrationStopped: the user ended it, or there is another reason.
-            SetupError: there are no more lines.
-        """
+        """Wait for a line while the joint is watched."""
         while True:
             self._look(live)
             try:
@@ -140,18 +142,3 @@ class TerminalPerson:
                 raise CalibrationStopped("q")
             if line is not None:
                 return line
-
-    def _other(self, line: str, live: Callable[[], str], accepted: tuple[str, ...]) -> None:
-        """Turn an emulated joint, or explain that the line is no answer."""
-        word, _, number = line.partition(" ")
-        if word == "turn" and self.hand is not None and number.lstrip("+-").isdecimal():
-            left = int(number)
-            while left:
-                step = max(-HAND_STEPS, min(HAND_STEPS, left))
-                self.hand(step)
-                left -= step
-                live()
-            return
-        wanted = "Enter" if accepted == ("",) else "y or n"
-        hand = ", turn STEPS moves the emulated joint" if self.hand is not None else ""
-        say(f"{line!r} is no answer: {wanted} goes on, q ends{hand}")

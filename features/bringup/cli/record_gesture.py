@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from gazerig.config.gestures import gesture_name
-from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
@@ -20,7 +19,7 @@ from gazerig.features.bringup.cli.ports import (
     open_port,
     rig_ports,
 )
-from gazerig.features.bringup.hand_recording import LONGEST_S, HandRecording, record, switch_off
+from gazerig.features.bringup.hand_recording import LONGEST_S, record, switch_off
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.features.bringup.telemetry import Monitor, SmartServoTelemetry
 from gazerig.robot.cli.gestures import FolderOption, say_written
@@ -72,31 +71,24 @@ def record_gesture(
             "Is the head held, and no finger between its parts?",
             yes,
         )
-        recorded = _record(loaded, measured, seconds, mock, port)
-        if recorded is None:
+        clock, there = RealClock(), {one: loaded.joints[one] for one in measured}
+        with signals() as stopped, rig_ports(loaded, mock, port) as wire, ExitStack() as ports:
+            readers = {}
+            for bus in dict.fromkeys(joint.bus for joint in there.values()):
+                line = ports.enter_context(open_port(loaded, wire, bus))
+                own = {one: joint for one, joint in there.items() if joint.bus == bus}
+                switch_off(own, line)
+                readers[bus] = SmartServoTelemetry(line, kind_of(next(iter(own.values())).model))
+            say(f"the torque is off; move the head, Enter ends it (within {seconds:g} s)")
+            watch = Monitor(readers, there, clock.now_s)
+            end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
+            recorded = record(watch.sample, clock, end, seconds)
+            say(f"recorded {len(recorded.series)} joints; the torque stays off")
+            ended = stopped()
+        if ended:
             say("ended by Ctrl-C: the torque is off, nothing is written")
             raise typer.Exit(INTERRUPTED)
-        for joint in recorded.left_out:
-            say(f"{joint}: answered too seldom and is left out")
+        for one in recorded.left_out:
+            say(f"{one}: answered too seldom and is left out")
         text = gesture_text(loaded, recorded.series, "recorded by hand")
         say_written(loaded.name, *write_gesture(loaded, name, text, folder, force))
-
-
-def _record(
-    rig: Rig, joints: list[str], seconds: float, mock: bool, port: str | None
-) -> HandRecording | None:
-    """Switch the torque off and record; None if a signal ended it."""
-    clock, there = RealClock(), {name: rig.joints[name] for name in joints}
-    with signals() as stopped, rig_ports(rig, mock, port) as wire, ExitStack() as ports:
-        readers = {}
-        for bus in dict.fromkeys(joint.bus for joint in there.values()):
-            line = ports.enter_context(open_port(rig, wire, bus))
-            own = {name: joint for name, joint in there.items() if joint.bus == bus}
-            switch_off(own, line)
-            readers[bus] = SmartServoTelemetry(line, kind_of(next(iter(own.values())).model))
-        say(f"the torque is off; move the head, Enter ends it (within {seconds:g} s)")
-        watch = Monitor(readers, there, clock.now_s)
-        end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
-        recorded = record(watch.sample, clock, end, seconds)
-        say(f"recorded {len(recorded.series)} joints; the torque stays off")
-        return None if stopped() else recorded

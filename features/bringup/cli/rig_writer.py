@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 from rich.table import Table
 
 from gazerig.config.rig import Rig
@@ -66,13 +67,17 @@ def write_values(
         say(f"written into {saved.path}; as it was: {saved.backup}")
 
 
-def difference_table(rig: str, loaded: Rig, changes: Mapping[str, Any]) -> Table:
-    """Return old and new values side by side.
+def show_and_write(
+    rig: str,
+    loaded: Rig,
+    changes: Mapping[str, Any],
+    out: Path | None,
+    dry_run: bool,
+    person: TerminalPerson,
+) -> None:
+    """Show old and new values side by side; write them after a yes, but not with ``dry_run``.
 
-    Args:
-        rig: as it was named.
-        loaded: with the old values.
-        changes: new values by the dotted keys of the rig's file.
+    loaded: with the old values; the others as in ``write_values``
     """
     table = Table(caption=f"what was found, against {rig}")
     for name in ("key", "old", "new"):
@@ -83,7 +88,9 @@ def difference_table(rig: str, loaded: Rig, changes: Mapping[str, Any]) -> Table
             old = old.get(step, "-") if isinstance(old, Mapping) else getattr(old, step, "-")
         style = "bold" if key.endswith("sign") else None
         table.add_row(key, _text(old), _text(new), style=style)
-    return table
+    Console().print(table)
+    if not dry_run:
+        write_values(rig, changes, out, person)
 
 
 def _text(value: Any) -> str:

@@ -15,13 +15,11 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
-from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.port_by_path import port_of
-from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
+from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
+from gazerig.drivers.serial.port import BusPort, port_of
 from gazerig.features.bringup.bus_search import (
     RATES,
     SearchRound,
@@ -84,7 +82,12 @@ def scan(
             raise SetupError(f"--kind {error}") from None
         found_ports = bench.ports_here()
         if not as_json:
-            _show_ports(found_ports)
+            for bus in sorted(Path("/dev").glob("i2c-*")):
+                say(f"I2C bus {bus}")
+            for one in found_ports:
+                alias = f", lasting name {one.by_id}" if one.by_id else ""
+                usb = f" [{one.usb}]" if one.usb else ""
+                say(f"port {one.device}: {one.description}{usb}{alias}")
         with _paths(rig, mock, port, found_ports) as paths:
             answered = [
                 _boards(path, as_json)
@@ -218,18 +221,10 @@ def _search(
     return rounds
 
 
-def _show_ports(ports: Sequence[SerialPort]) -> None:
-    for bus in sorted(Path("/dev").glob("i2c-*")):
-        say(f"I2C bus {bus}")
-    for port in ports:
-        alias = f", lasting name {port.by_id}" if port.by_id else ""
-        say(f"port {port.device}: {port.description}{f' [{port.usb}]' if port.usb else ''}{alias}")
-
-
 def _show(
     rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind], as_json: bool
 ) -> None:
-    boards = [one for one in rounds if one.board is not None]
+    boards = [(one, one.board) for one in rounds if one.board is not None]
     found = found_servos(rounds)
     if as_json:
         answer: dict[str, object] = {
@@ -237,13 +232,12 @@ def _show(
             "servos": [{"kind": kind, **servo._asdict()} for kind, servo in found],
             "boards": [
                 {
-                    **one.board._asdict(),
+                    **board._asdict(),
                     "channels": one.channels,
                     "baud": one.baud,
-                    "pulses": [pulse / US_STEPS for pulse in one.board.pulses],  # us, 0 for none
+                    "pulses": [pulse / US_STEPS for pulse in board.pulses],  # us, 0 for none
                 }
-                for one in rounds
-                if one.board is not None
+                for one, board in boards
             ],
         }
         print(json.dumps(answer))
@@ -256,30 +250,22 @@ def _show(
             version = made.family.version(servo.firmware)
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
-    for one in boards:
-        for line in _board_text(one):
+    for one, board in boards:
+        size = f"{one.channels} channels"
+        if one.channels is None:
+            size = "6 channels or more (asking for one too many would send all of them home)"
+        crc = "on" if board.crc else "off"
+        given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(board.pulses) if pulse]
+        script: dict[bool | None, str] = {True: "its own script runs", False: "no script runs"}
+        for line in (
+            f"Pololu Maestro: {size}, {' and '.join(board.forms)} form, CRC {crc}",
+            f"pulses: {', '.join(given) or 'none'} (channels 0..{len(board.pulses) - 1})",
+            f"errors it held, cleared by asking: {', '.join(board.errors) or 'none'}",
+            script.get(board.script, "its script: no answer"),
+        ):
             out.print(f"{where}: {line}", markup=False)
     for line in remarks(rounds, where, requested):
         out.print(completed(line), markup=False)
-
-
-def _board_text(looked: SearchRound) -> Iterator[str]:
-    """Return a description of what a board reported."""
-    board = looked.board
-    if board is None:
-        return
-    if looked.channels is not None:
-        size = f"{looked.channels} channels"
-    else:
-        size = "6 channels or more (asking for one too many would send all of them home)"
-    crc = "on" if board.crc else "off"
-    yield f"Pololu Maestro: {size}, {' and '.join(board.forms)} form, CRC {crc}"
-    given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(board.pulses) if pulse]
-    yield f"pulses: {', '.join(given) or 'none'} (channels 0..{len(board.pulses) - 1})"
-    yield f"errors it held, cleared by asking: {', '.join(board.errors) or 'none'}"
-    yield {True: "its own script runs", False: "no script runs", None: "its script: no answer"}[
-        board.script
-    ]
 
 
 def remarks(

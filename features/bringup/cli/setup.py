@@ -31,7 +31,7 @@ from gazerig.features.bringup.cli.setup_boards import (
 )
 from gazerig.features.bringup.servo_families import ServoKind, kind_of
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.emulation import CHAINS
+from gazerig.robot.app.run_bus import CHAINS
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, say
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 

@@ -1,7 +1,7 @@
 """The commands that calibrate a camera: the board to print, then lens and place on the head."""
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from enum import StrEnum
 from math import degrees, radians
@@ -10,7 +10,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
-from rich.console import Console
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
@@ -26,7 +25,6 @@ from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.bringup.calibration.camera_calibration import (
     CameraCalibrationRefused,
-    LensCalibration,
     lens_params,
 )
 from gazerig.features.bringup.calibration.camera_procedure import (
@@ -53,9 +51,8 @@ from gazerig.features.bringup.cli.rig_writer import (
     AllYesOption,
     DryRunOption,
     OutOption,
-    difference_table,
     refuse_unwritable,
-    write_values,
+    show_and_write,
 )
 from gazerig.features.bringup.manual_control import JogParams, ManualControl
 from gazerig.gaze.types import Angles3
@@ -152,7 +149,8 @@ def calibrate_camera(
         loaded = load_rig(rig)
         if face_at is not None:
             changes = _measure_field(loaded, Webcam(camera or 0, loaded.webcam), face_at, stopped)
-            _write(rig, loaded, changes, out, dry_run, stopped, yes)
+            person = TerminalPerson(Lines(None), stopped, yes)
+            show_and_write(rig, loaded, changes, out, dry_run, person)
             return
         board = CharucoBoard(_board(columns, rows, square, ruler))
         if loaded.camera.mount != "head" and what is not CalibrationTarget.lens:
@@ -176,22 +174,9 @@ def calibrate_camera(
                     with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
                         found = _measure_mount(job, eye, neck, lens.camera, lens.good)
                         changes |= mount_changes(found, lens.camera)
-        _write(rig, loaded, changes, out, dry_run, stopped, yes)
-
-
-def _write(
-    rig: str,
-    loaded: Rig,
-    changes: Mapping[str, Any],
-    out: Path | None,
-    dry_run: bool,
-    stopped: Callable[[], str | None],
-    yes: bool,
-) -> None:
-    """Show new and old values, and write them after a yes."""
-    Console().print(difference_table(rig, loaded, changes))
-    if not dry_run:
-        write_values(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
+        show_and_write(
+            rig, loaded, changes, out, dry_run, TerminalPerson(Lines(None), stopped, yes)
+        )
 
 
 def _measure_field(
@@ -241,11 +226,6 @@ def _measure_field(
     return {"camera.horizontal_field_deg": field_deg + 0.05 * (field_deg == ASSUMED_FIELD_DEG)}
 
 
-def lens_changes(lens: LensCalibration) -> dict[str, Any]:
-    """Return a measured lens as dotted keys of a rig file and values."""
-    return lens_keys(lens.params(), lens.horizontal_field_deg)
-
-
 def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
     """Return a camera found on the head as dotted keys of a rig file and values.
 
@@ -257,13 +237,6 @@ def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
         f"camera.lens.{key}": round(getattr(lens, key), 2)
         for key in ("fx_px", "fy_px", "cx_px", "cy_px")
     }
-
-
-def accuracy_of(lens: LensCalibration) -> HandEyeParams:
-    """Return the parameters of hand-eye calibration for a lens that was just measured."""
-    focal = max(lens.focal_std_px) / lens.intrinsics.fx_px * 100.0
-    centre = max(lens.centre_std_px) * 640.0 / lens.width_px
-    return HandEyeParams(lens_error_percent=max(focal, 0.02), centre_error_px=max(centre, 0.1))
 
 
 class _Job(NamedTuple):
@@ -362,22 +335,6 @@ def _find_lens(
         return _KnownLens(job.rig.camera, {}, HandEyeParams())
     if isinstance(source, OakSource):
         return _read_oak_lens(job, source.calibration(), _first_frame(job, eye))
-    lens = _measure_lens(job, eye)
-    camera = replace(job.rig.camera, lens=lens.params())
-    return _KnownLens(camera, lens_changes(lens), accuracy_of(lens))
-
-
-def _read_oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
-    """Return the lens of an OAK camera for upright frames, and print its memory."""
-    found = upright_calibration(delivered, orientation_of(job.rig.camera))
-    found = with_frame_lens(found, shot.lens if shot is not None else None)
-    print_calibration(found, job.rig.oak)
-    camera = replace(job.rig.camera, lens=lens_params(found.lens, found.width_px, found.height_px))
-    return _KnownLens(camera, oak_changes(found), HandEyeParams())
-
-
-def _measure_lens(job: _Job, eye: _CameraView) -> LensCalibration:
-    """Have the user show the board until the lens is known."""
     steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
     say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
     while True:
@@ -409,7 +366,20 @@ def _measure_lens(job: _Job, eye: _CameraView) -> LensCalibration:
     if eye.mock is not None:
         t = eye.mock.lens
         say(f"true: {t.fx_px:.1f}, {t.fy_px:.1f} px; axis at {t.cx_px:.1f}, {t.cy_px:.1f} px")
-    return lens
+    camera = replace(job.rig.camera, lens=lens.params())
+    focal = max(lens.focal_std_px) / i.fx_px * 100.0
+    centre = max(lens.centre_std_px) * 640.0 / lens.width_px
+    good = HandEyeParams(lens_error_percent=max(focal, 0.02), centre_error_px=max(centre, 0.1))
+    return _KnownLens(camera, lens_keys(lens.params(), lens.horizontal_field_deg), good)
+
+
+def _read_oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
+    """Return the lens of an OAK camera for upright frames, and print its memory."""
+    found = upright_calibration(delivered, orientation_of(job.rig.camera))
+    found = with_frame_lens(found, shot.lens if shot is not None else None)
+    print_calibration(found, job.rig.oak)
+    camera = replace(job.rig.camera, lens=lens_params(found.lens, found.width_px, found.height_px))
+    return _KnownLens(camera, oak_changes(found), HandEyeParams())
 
 
 def _measure_mount(
@@ -537,7 +507,9 @@ def moving_neck(
     say("will look at it from several sides: keep your fingers away; Ctrl-C stops it")
     if mock is not None:
         mock.hang()
-    elif not confirm(stopped, yes, "does the board hang, and is the head free to move?"):
+    elif not TerminalPerson(Lines(None), stopped, yes).agrees(
+        "does the board hang, and is the head free to move?"
+    ):
         raise CameraCalibrationRefused("left out as you asked: nothing was written")
     params = JogParams(speed_deg_s=_GENTLE_DEG_S)
     with (
@@ -558,8 +530,3 @@ def refuse_stop(stopped: StopReason) -> None:
     why = stopped()
     if why is not None:
         raise CameraCalibrationRefused(f"stopped by {why}: nothing was written")
-
-
-def confirm(stopped: StopReason, yes: bool, question: str) -> bool:
-    """Ask on the terminal; yes: the reply is known."""
-    return TerminalPerson(Lines(None), stopped, yes).agrees(question)

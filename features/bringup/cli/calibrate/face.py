@@ -1,9 +1,9 @@
 """The command calibrate face: places of one person's eyes, mouth and other parts."""
 
-import contextlib
 import os
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -40,7 +40,7 @@ from gazerig.features.bringup.cli.rig_writer import (
 )
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
 from gazerig.robot.app.session import prepare_shutdown
@@ -134,12 +134,7 @@ def _calibrate(
     scripted: bool,
     stopped: Callable[[], str | None],
 ) -> FaceCalibration:
-    """Let the user steer the gaze from part to part; the rig ends parked, torque off.
-
-    Raises:
-        CalibrationStopped: a signal or a fault ended it.
-        DriverError: port, servos or camera are not as configured.
-    """
+    """Let the user steer the gaze from part to part; the rig ends parked, torque off."""
     idle = rig.gaze.idle
     rest_m = (idle.rest_distance_m, 0.0, idle.rest_height_m)
     begin = initial_calibration(rig.face_parts_mm)
@@ -162,37 +157,24 @@ def _calibrate(
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
-        count = _run(made, sitting, keys, observers, door, Interrupts.of(stopped))
+        interrupts, count = Interrupts.of(stopped), LoopCount(0, 0, "fault: unexpected error")
+        with ExitStack() as closed_last, prepare_shutdown(made, say, interrupts) as leaving:
+            leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
+            for note in (*made.notes, *group_events(made.robot.body.bus.events())):
+                say(note)
+            closed_last.callback(lambda: observers.close(count))
+            observers.open()
+            closed_last.callback(door.close)
+            door.open()
+            with keys:
+                count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
+            leaving.cause = count.stopped_by
+            observers.tell("over: the head parks; the terminal asks whether to write it")
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
         raise CalibrationStopped(count.stopped_by)
     return steering.state
-
-
-def _run(
-    made: Assembly,
-    sitting: "_CalibrationSession",
-    keys: Keys,
-    observers: RunObservers,
-    door: StopOnlyServer,
-    interrupts: Interrupts,
-) -> LoopCount:
-    """Run the robot until the sitting is over."""
-    count = LoopCount(0, 0, "fault: unexpected error")
-    with contextlib.ExitStack() as closed_last, prepare_shutdown(made, say, interrupts) as leaving:
-        leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
-        for note in (*made.notes, *group_events(made.robot.body.bus.events())):
-            say(note)
-        closed_last.callback(lambda: observers.close(count))
-        observers.open()
-        closed_last.callback(door.close)
-        door.open()
-        with keys:
-            count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
-        leaving.cause = count.stopped_by
-        observers.tell("over: the head parks; the terminal asks whether to write it")
-    return count
 
 
 class _CalibrationSession:

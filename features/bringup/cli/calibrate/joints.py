@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import typer
-from rich.console import Console
 
 from gazerig.config.rig import Rig
 from gazerig.config.save import propose, rig_file
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
-from gazerig.drivers.serial.port_by_path import port_of
+from gazerig.drivers.serial.port import port_of
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
 from gazerig.features.bringup.calibration.hobby_access import HobbyServoHandle
 from gazerig.features.bringup.calibration.joint_calibration import (
@@ -51,9 +50,8 @@ from gazerig.features.bringup.cli.rig_writer import (
     AllYesOption,
     DryRunOption,
     OutOption,
-    difference_table,
     refuse_unwritable,
-    write_values,
+    show_and_write,
 )
 from gazerig.features.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
@@ -122,7 +120,9 @@ def measure(
     for bus in bus_names(bench.rig):
         for name in (name for name in joints_on(bench.rig, bus) if name in names):
             try:
-                found[name] = _calibrate_joint(bench, name, bus)
+                measured = bench.rig.joints[name].facts.measured
+                calibrate = _calibrate_smart_servo if measured else _calibrate_hobby_servo
+                found[name] = calibrate(bench, name, bus)
             except (CalibrationRefused, ServoMissing, ServoFault) as error:
                 refused.append(name)
                 say(f"refused: {error}")
@@ -162,23 +162,16 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
         raise SetupError(f"--pulses {low:g}:{high:g}: must ascend within {least:g}:{most:g} us")
 
 
-def _calibrate_joint(bench: CalibrationJob, name: str, bus: str) -> JointResult:
-    if not bench.rig.joints[name].facts.measured:
-        return _calibrate_hobby_servo(bench, name, bus)
-    guardian = _guardian(bench, name, bus)
+def _calibrate_smart_servo(bench: CalibrationJob, name: str, bus: str) -> JointResult:
+    guardian, joint, person = _guardian(bench, name, bus), bench.rig.joints[name], bench.person
     with open_port(bench.rig, bench.wire, bus, guardian) as port:
-        joint = bench.rig.joints[name]
         servo = SingleServo(name, joint.id, joint.model, port, guardian)
         single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
-        bench.person.hand = None
+        person.hand = None
         if (buses := bench.wire.buses) is not None:
-
-            def turn(steps: int) -> None:
-                buses.command(f"turn {joint.id} {steps}", bus)
-
-            bench.person.hand = turn
+            person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", bus)
         with _torque_off_after(single.who, servo.disable_torque, bench.stopped):
-            return _calibrate_smart_servo(bench, single)
+            return _calibrate(single, bench.how, person)
 
 
 def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
@@ -187,8 +180,7 @@ def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
 
 
-def _calibrate_smart_servo(bench: CalibrationJob, single: SingleJoint) -> JointResult:
-    how, person = bench.how, bench.person
+def _calibrate(single: SingleJoint, how: CalibrationOptions, person: TerminalJogger) -> JointResult:
     if how.clear_offset:
         was = single.servo.clear_offset()
         if was:
@@ -254,54 +246,43 @@ def _torque_off_after(
         yield
 
 
-JointOption = Annotated[
-    list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")
-]
-TurnedByOption = Annotated[
-    ActuationMode, typer.Option(help="Turned by hand, torque off, or gently by itself.")
-]
-MarginOption = Annotated[
-    float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Kept from each end.")
-]
-ZeroOption = Annotated[
-    ZeroReference, typer.Option(help="With --by motion: zero half-way, or where a person puts it.")
-]
-StrengthOption = Annotated[
-    float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")
-]
-ClearOffsetOption = Annotated[
-    bool, typer.Option("--clear-offset", help="Set the offset in a servo to 0 first.")
-]
-SetMiddleOption = Annotated[
-    bool,
-    typer.Option("--set-middle", help="Feetech: make the middle of its travel 2048 first."),
-]
-PulsesOption = Annotated[
-    str, typer.Option(metavar="US:US", help="Hobby servos: never narrower or wider pulses.")
-]
-MoreOption = Annotated[
-    int, typer.Option(min=0, max=5, help="Push rods: places between each two you mark.")
-]
-AnswersOption = Annotated[
-    Path | None, typer.Option(help="File with one answer a line; empty is Enter.")
-]
-
-
 def calibrate_joints(
     rig: RigArgument = "desk",
-    joint: JointOption = None,
-    by: TurnedByOption = ActuationMode.hand,
-    margin: MarginOption = 2.0,
-    zero: ZeroOption = ZeroReference.middle,
-    strength: StrengthOption = 0.3,
-    clear_offset: ClearOffsetOption = False,
-    set_middle: SetMiddleOption = False,
-    pulses: PulsesOption = "500:2500",
-    more: MoreOption = 1,
+    joint: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")
+    ] = None,
+    by: Annotated[
+        ActuationMode, typer.Option(help="Turned by hand, torque off, or gently by itself.")
+    ] = ActuationMode.hand,
+    margin: Annotated[
+        float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Kept from each end.")
+    ] = 2.0,
+    zero: Annotated[
+        ZeroReference,
+        typer.Option(help="With --by motion: zero half-way, or where a person puts it."),
+    ] = ZeroReference.middle,
+    strength: Annotated[
+        float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")
+    ] = 0.3,
+    clear_offset: Annotated[
+        bool, typer.Option("--clear-offset", help="Set the offset in a servo to 0 first.")
+    ] = False,
+    set_middle: Annotated[
+        bool,
+        typer.Option("--set-middle", help="Feetech: make the middle of its travel 2048 first."),
+    ] = False,
+    pulses: Annotated[
+        str, typer.Option(metavar="US:US", help="Hobby servos: never narrower or wider pulses.")
+    ] = "500:2500",
+    more: Annotated[
+        int, typer.Option(min=0, max=5, help="Push rods: places between each two you mark.")
+    ] = 1,
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
-    answers: AnswersOption = None,
+    answers: Annotated[
+        Path | None, typer.Option(help="File with one answer a line; empty is Enter.")
+    ] = None,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
@@ -322,7 +303,17 @@ def calibrate_joints(
         if not dry_run:
             refuse_unwritable(rig, out)
             if out is None:
-                _refuse_long_lists(rig, loaded, names)
+                # A linkage that is spread over several lines cannot be rewritten: they are kept.
+                behind_rods = [
+                    one
+                    for one in names
+                    if loaded.joints[one].transmission_points
+                    or not loaded.joints[one].facts.measured
+                ]
+                propose(
+                    rig_file(rig),
+                    {f"joints.{one}.transmission_points": ((0, 0),) for one in behind_rods},
+                )
         refuse_impossible(loaded, names, how)
         person = TerminalJogger(Lines(answers), stopped, yes)
         try:
@@ -332,9 +323,7 @@ def calibrate_joints(
                 wanted: dict[str, Value] = {}
                 for name, made in found.items():
                     wanted |= changes(name, loaded.joints[name], made, loaded.park_deg)
-                Console().print(difference_table(rig, loaded, wanted))
-                if not dry_run:
-                    write_values(rig, wanted, out, person)
+                show_and_write(rig, loaded, wanted, out, dry_run, person)
         except CalibrationStopped as why:
             say(f"stopped by {why}: nothing written")
             raise typer.Exit(FAULT) from None
@@ -364,26 +353,8 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     return tuple(name for name in rig.names if name not in coupled and (not asked or name in asked))
 
 
-def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:
-    """Refuse before anything moves if places could not be written into the file.
-
-    Raises:
-        gazerig.config.load.ConfigError: a linkage is spread over several lines, which are kept.
-    """
-    joints = [
-        n
-        for n in names
-        if loaded.joints[n].transmission_points or not loaded.joints[n].facts.measured
-    ]
-    propose(rig_file(rig), {f"joints.{name}.transmission_points": ((0, 0),) for name in joints})
-
-
 def _span(pulses: str) -> tuple[float, float]:
-    """Read --pulses.
-
-    Raises:
-        SetupError: these are no two numbers.
-    """
+    """Read --pulses."""
     low, _, high = pulses.partition(":")
     try:
         return float(low), float(high)
