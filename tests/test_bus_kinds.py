@@ -3,12 +3,26 @@
 import pytest
 from bus_kinds import KINDS, ON_EITHER, in_process, twin_of
 
-from gazerig.testing import BusSuite
+from gazerig.testing import BusLossSuite, BusSuite
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
 
 class TestEveryKind(BusSuite):
+    @pytest.fixture(params=ON_EITHER, ids="-".join)
+    def twin(self, request):
+        with twin_of(*request.param) as made:
+            yield made
+
+    @pytest.fixture(params=KINDS)
+    def another(self, request):
+        return lambda: in_process(request.param)
+
+
+# What every kind of servo bus does when a servo, a port or a supply goes away, over both twins
+
+
+class TestEveryKindOfLoss(BusLossSuite):
     @pytest.fixture(params=ON_EITHER, ids="-".join)
     def twin(self, request):
         with twin_of(*request.param) as made:

@@ -6,9 +6,15 @@ from typing import Any
 import pytest
 from dynamixel_vectors import PING, instruction, vector
 from fastcrc.crc16 import umts
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from servo_bench import READ, REBOOT, DynamixelBench
 
+from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks, registers_of
+from gazerig.sim_mock.dynamixel.memory import ACCESS, DATA_LENGTH, DATA_RANGE, DynamixelMemory
 from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 
 ALERT = 0x80
 
@@ -277,3 +283,214 @@ def test_the_watchdog_sleeps_without_torque():
     bench.write(1, 98, 1, 1)
     bench.now_s = 5.0
     assert bench.read(1, 98, 1) == 1
+
+
+# The control table of every emulated model as bytes: access, ranges, indirect windows
+
+
+EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=lambda m: m.name)
+
+
+def raw(value: int, size: int) -> bytes:
+    return value.to_bytes(size, "little", signed=value < 0)
+
+
+@EVERY
+def test_every_register_starts_with_its_initial_value(model):
+    memory = DynamixelMemory(model, 53)
+    for register in registers_of(model):
+        if register.initial is not None:
+            assert memory.get(register.name) == register.initial, register.name
+
+
+@EVERY
+def test_every_register_keeps_to_its_access_range_and_size(model):
+    memory = DynamixelMemory(model, 53)
+    for register in registers_of(model):
+        at, size = register.address, register.size
+        if register.access == "r":
+            assert memory.fields(at, bytes(size)) == ACCESS, register.name
+            continue
+        if register.high is not None and register.high + 1 < 1 << 8 * size - register.signed:
+            assert memory.fields(at, raw(register.high, size)) == ((register, register.high),)
+            assert memory.fields(at, raw(register.high + 1, size)) == DATA_RANGE, register.name
+        if register.low:
+            assert memory.fields(at, raw(register.low - 1, size)) == DATA_RANGE, register.name
+        if size > 1:
+            assert memory.fields(at, bytes(size - 1)) == DATA_LENGTH, register.name
+
+
+@EVERY
+def test_what_no_register_covers_can_neither_be_read_nor_written(model):
+    memory = DynamixelMemory(model, 53)
+    known = {a for r in registers_of(model) for a in range(r.address, r.address + r.size)}
+    for address in set(range(148)) - known:
+        assert memory.read(address, 1) is None
+        assert memory.fields(address, b"\0") == ACCESS
+    last = 661 if model.family == "x430" else 251
+    assert memory.read(last, 1) == b"\0"
+    assert memory.read(last, 2) is None
+
+
+@EVERY
+@pytest.mark.parametrize("firmware", [45, 52, 53])
+def test_every_window_shows_and_takes_other_bytes(model, firmware):
+    servo = DynamixelServo(ServoSpec(1, model.name, 1234, firmware), 0)
+    for block in indirect_blocks(model, firmware):
+        first, data = block.address_base, block.data_base
+        for i in range(4):
+            assert servo.write(first + 2 * i, raw(132 + i, 2)) == 0
+        assert servo.write(first + 8, raw(65, 2)) == 0
+        assert servo.read(data, 4) == raw(1234, 4)
+        assert (servo.write(data + 4, b"\1"), servo.read(65, 1)) == (0, b"\1")
+        assert servo.write(65, b"\0") == 0
+        assert servo.write(data, b"\0") == ACCESS
+        for outside in (0, 63, block.target_high + 1):
+            assert servo.write(first, raw(outside, 2)) == DATA_RANGE
+    # Where another firmware has its data there is nothing.
+    if model.family == "x330":
+        assert (servo.read(228, 1) is None) == (firmware < 53)
+        assert servo.write(213, b"\1") == (0 if firmware < 53 else ACCESS)
+
+
+@EVERY
+def test_the_eeprom_is_locked_under_torque_and_nothing_changes(model):
+    servo = DynamixelServo(ServoSpec(1, model.name), 0)
+    assert servo.write(64, b"\1") == 0
+    before = bytes(servo.memory.bytes[:64])
+    for register in registers_of(model):
+        if register.address < 64 and register.access == "rw":
+            value = register.low or 0
+            assert servo.write(register.address, raw(value, register.size)) == ACCESS
+    assert bytes(servo.memory.bytes[:64]) == before
+
+
+# Who listens on the emulated Dynamixel chain, and what it does where documents differ
+
+
+# --- who listens
+
+
+def test_a_secondary_id_obeys_and_never_answers():
+    bench = DynamixelBench((1, "xl330-m288"), (2, "xl330-m288"))
+    assert bench.write(2, 12, 1, 1) == 0
+    assert bench.write(1, 65, 1, 1) == 0
+    assert (bench.read(1, 65, 1), bench.read(2, 65, 1)) == (1, 1)
+    sync = struct.pack("<HHBB", 65, 1, 1, 0)
+    assert bench.chain.receive(instruction(0xFE, 0x83, sync)) == b""
+    assert bench.read(2, 65, 1) == 0
+    assert len(bench.chain.receive(PING)) == 14
+    # EEPROM is not to be had by the secondary id.
+    assert bench.write(1, 31, 60, 1) == 0
+    assert (bench.read(1, 31, 1), bench.read(2, 31, 1)) == (60, 70)
+
+
+def test_a_secondary_id_that_nobody_has_is_obeyed_in_silence():
+    bench = DynamixelBench((2, "xl330-m288"))
+    bench.write(2, 12, 77, 1)
+    assert bench.write(77, 65, 1, 1) == -1
+    assert bench.read(2, 65, 1) == 1
+    bench.write(2, 12, 253, 1)
+    assert bench.write(77, 65, 0, 1) == -1
+    assert bench.read(2, 65, 1) == 1
+
+
+def test_a_baud_rate_that_a_model_lacks_is_refused():
+    with pytest.raises(ValueError, match="baud 4500000: xl330-m288 knows 9600, 57600"):
+        DynamixelBench((1, "xl330-m288"), baud=4_500_000)
+
+
+def test_a_broadcast_reset_of_everything_is_ignored_by_newer_firmware():
+    bench = DynamixelBench((5, "xm430-w210", 2048, 41), (6, "xm430-w210", 2048, 42))
+    bench.chain.receive(instruction(0xFE, 6, b"\xff"))
+    assert bench.chain.ids() == (1, 6)
+
+
+# --- where documents and devices differ
+
+
+def test_a_wrong_crc_may_be_answered():
+    bench = DynamixelBench((1, "xm430-w210"))
+    bad = PING[:-1] + bytes([PING[-1] ^ 1])
+    assert bench.chain.receive(bad) == b""
+    bench.chain.choose("bad-crc", "reply")
+    assert bench.chain.receive(bad) == status(1, 3, b"")
+    assert len(bench.chain.receive(PING)) == 14
+
+
+def test_a_packet_that_should_have_been_stuffed_may_be_dropped():
+    raw = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\x00")
+    stuffed = instruction(1, 3, struct.pack("<H", 224) + b"\xff\xff\xfd\xfd\x00")
+    bench = DynamixelBench((1, "xm430-w210"))
+    assert bench.chain.receive(raw)[8] == 0
+    bench.chain.choose("stuffing", "strict")
+    assert bench.chain.receive(raw) == b""
+    assert bench.chain.receive(stuffed)[8] == 0
+
+
+def test_replies_know_their_servos_return_delay():
+    bench = DynamixelBench((1, "xl330-m288"), (2, "xl330-m288"))
+    bench.write(2, 9, 5, 1)
+    wanted = struct.pack("<HH", 132, 4) + bytes((1, 2))
+    (plain,) = bench.chain.exchange(instruction(0xFE, 0x82, wanted))
+    (fast,) = bench.chain.exchange(instruction(0xFE, 0x8A, wanted))
+    assert [piece.delay_s for piece in plain.pieces] == pytest.approx([500e-6, 10e-6])
+    assert [piece.delay_s for piece in fast.pieces] == pytest.approx([500e-6])
+
+
+@given(
+    st.lists(st.sampled_from([1, 2, 3, 4, 9]), max_size=6),
+    st.sampled_from([(132, 4), (126, 10), (64, 1), (40, 4), (64, 4)]),
+    st.sampled_from([0, 1, 2]),
+)
+@settings(max_examples=40)
+def test_both_ways_to_a_fast_reply_give_the_same_bytes(ids, span, level):
+    specs = [(i, "xl330-m288", 100 * i) for i in (1, 2, 3)] + [(4, "xl330-m288", 400, 45)]
+    answers = []
+    for spoilt in (False, True):
+        bench = DynamixelBench(*specs)
+        bench.write(2, 68, level, 1)
+        bench.chain[3].fail("overheating")
+        if spoilt:
+            bench.chain.faults.command("lose 3 for 0")
+            bench.chain.faults.command("delay 1 5")
+        wanted = struct.pack("<HH", *span) + bytes(ids)
+        answers.append(bench.chain.receive(instruction(0xFE, 0x8A, wanted)))
+    assert answers[0] == answers[1]
+
+
+def test_backup_and_restore_of_the_control_table():
+    bench = DynamixelBench((1, "xl330-m288"))
+    store = vector("FF FF FD 00 01 08 00 20 01 43 54 52 4C 16 F5")
+    restore = vector("FF FF FD 00 01 08 00 20 02 43 54 52 4C 9E F5")
+    assert bench.chain.receive(restore)[8] == 1
+    bench.write(1, 31, 55, 1)
+    assert bench.chain.receive(store) == status(1, 0, b"")
+    assert bench.read(1, 147, 1) == 1
+    bench.write(1, 31, 66, 1)
+    assert bench.chain.receive(restore) == status(1, 0, b"")
+    bench.now_s = 0.5
+    assert bench.read(1, 31, 1) == 55
+    bench.enable_torque(1)
+    assert bench.chain.receive(store)[8] == 1
+    assert bench.chain.receive(instruction(1, 0x20, b"\x03CTRL"))[8] == 4
+    assert bench.chain.receive(instruction(1, 0x20))[8] == 4
+
+
+def test_a_restored_servo_answers_once_under_the_id_it_had():
+    bench = DynamixelBench((5, "xl330-m288"))
+    bench.chain.receive(instruction(5, 0x20, b"\x01CTRL"))
+    bench.write(5, 7, 9, 1)
+    assert bench.chain.receive(instruction(9, 0x20, b"\x02CTRL"))[4] == 9
+    bench.now_s = 0.5
+    (servo_id,) = bench.chain.ids()
+    assert bench.read(servo_id, 7, 1) == servo_id
+
+
+def test_some_models_reboot_without_a_status():
+    spec = ServoSpec(1, "xl430-w250", quirks=Quirks(mute_reboot=True))
+    bench = DynamixelBench(spec)
+    assert bench.chain.receive(instruction(1, 8)) == b""
+    assert bench.chain.receive(PING) == b""
+    bench.now_s = 0.5
+    assert len(bench.chain.receive(PING)) == 14

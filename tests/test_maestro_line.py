@@ -4,7 +4,7 @@ import pytest
 from stand_in import StandIn
 
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.maestro.limits import SPEED_STEPS_S, speed_units
+from gazerig.drivers.maestro.commands import SPEED_STEPS_S, speed_units
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.types import ServoConfig

@@ -7,16 +7,28 @@ import threading
 import time
 from datetime import timedelta
 from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import cv2
 import numpy as np
 import pytest
+from oak_packets import face_archive
 from present import present
 
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import Outputs, device_nodes, read_archive
-from gazerig.drivers.camera.oak.sdk import load_depthai
+from gazerig.drivers.camera.oak.pipeline import (
+    Outputs,
+    device_nodes,
+    imu_queue,
+    read_archive,
+    set_controls,
+)
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.errors import CameraError
 
@@ -248,7 +260,7 @@ def test_depthai_is_loaded_without_telemetry_and_without_a_word():
     code = (
         "import sys, gazerig.drivers.camera.oak.source\n"
         "assert 'depthai' not in sys.modules\n"
-        "from gazerig.drivers.camera.oak.sdk import load_depthai; load_depthai()\n"
+        "from gazerig.drivers.camera.oak.discovery import load_depthai; load_depthai()\n"
         "import os; assert os.environ['DEPTHAI_TELEMETRY'] == '0'"
     )
     environment = {k: v for k, v in os.environ.items() if not k.startswith("DEPTHAI")}
@@ -263,3 +275,149 @@ def test_depthai_that_is_not_there_is_named_with_its_extra(monkeypatch):
     with pytest.raises(CameraError) as told:
         load_depthai()
     assert str(told.value) == "depthai is not installed: pip install 'gazerig[oak]'"
+
+
+# Exposure, flicker and focus from the rig's file to the camera, and what is refused
+
+
+RIG = (Path(__file__).parents[1] / "config/rigs/maker.yaml").read_text(encoding="utf-8")
+
+
+def commands(dai, **wanted):
+    """Return the text of what is sent to a camera; untouched commands are not in it."""
+    control = dai.CameraControl()
+    set_controls(dai, control, OakParams(**wanted))
+    return control
+
+
+def test_nothing_is_sent_where_nothing_is_asked(dai):
+    assert str(commands(dai).getData()) == str(dai.CameraControl().getData())
+    assert commands(dai).aeMaxExposureTimeUs == dai.CameraControl().aeMaxExposureTimeUs
+
+
+def test_exposure_limit_flicker_and_focus_are_sent(dai):
+    control = commands(dai, exposure_limit_ms=8.5, anti_flicker="60hz", focus=130)
+    assert control.aeMaxExposureTimeUs == 8500
+    assert control.antiBandingMode == dai.CameraControl.AntiBandingMode.MAINS_60_HZ
+    assert control.getLensPosition() == 130
+
+
+@pytest.mark.parametrize("name", ["off", "50hz", "60hz", "auto"])
+def test_every_way_against_flicker_is_one_of_depthais(dai, name):
+    members = dai.CameraControl.AntiBandingMode.__members__
+    chosen = commands(dai, anti_flicker=name).antiBandingMode
+    assert chosen in members.values() and name[:2].upper() in chosen.name
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ("exposure_limit_ms: 20\n  rate_hz: 60", "longer than a frame lasts"),
+        ("exposure_limit_ms: 0", "0.1"),
+        ("focus: 256", "255"),
+        ("focus: near", "focus"),
+        ("anti_flicker: 55hz", "50hz"),
+        ("width_px: 650", "width_px is a multiple of 16"),
+        ("height_px: 401", "height_px of 2"),
+        ("imu_rotation_deg: [0, 0, 181]", "180"),
+        ("imu_rotation_deg: [0, 0]", "imu_rotation_deg"),
+    ],
+)
+def test_keys_are_checked(tmp_path, keys, told):
+    file = tmp_path / "rig.yaml"
+    file.write_text(RIG + f"\noak:\n  {keys}\n")
+    with pytest.raises(ConfigError) as caught:
+        load_rig(str(file))
+    assert told in str(caught.value)
+
+
+def test_keys_reach_the_parameters(tmp_path):
+    file = tmp_path / "rig.yaml"
+    keys = (
+        "exposure_limit_ms: 10\n  focus: 0\n  anti_flicker: 'off'\n  imu_rotation_deg: [0, 0, 90]"
+    )
+    file.write_text(RIG + f"\noak:\n  {keys}\n  undistort: false\n  gyro: false\n")
+    oak = load_rig(str(file)).oak
+    assert (oak.exposure_limit_ms, oak.focus, oak.anti_flicker) == (10.0, 0, "off")
+    assert (oak.imu_rotation_deg, oak.undistort, oak.gyro) == ((0.0, 0.0, 90.0), False, False)
+
+
+# Which nodes are asked of a camera, and with what; the nodes themselves are stood in for
+
+
+class Pipeline:
+    """Makes a stand-in for each node, and keeps them by name."""
+
+    def __init__(self, dai, platform="RVC4") -> None:
+        self.made: dict[str, list[MagicMock]] = {}
+        device = SimpleNamespace(getPlatform=lambda: getattr(dai.Platform, platform))
+        self.getDefaultDevice = lambda: device
+
+    def create(self, node):
+        made = MagicMock()
+        made.build.return_value = made
+        self.made.setdefault(node.__name__, []).append(made)
+        return made
+
+
+def asked(dai, platform="RVC4", **wanted):
+    """Return the outputs and the nodes made for them."""
+    pipeline = Pipeline(dai, platform)
+    return device_nodes(dai, pipeline, OakParams(**wanted)), pipeline.made
+
+
+def test_colour_is_straightened_unless_it_is_not_wanted(dai):
+    for undistort in (True, False):
+        _, made = asked(dai, depth=False, undistort=undistort, rate_hz=20.0)
+        request = made["Camera"][0].requestOutput
+        assert request.call_args.args == ((640, 400),)
+        assert request.call_args.kwargs["enableUndistortion"] is undistort
+        assert request.call_args.kwargs["fps"] == 20.0
+
+
+def test_exposure_and_focus_are_set_before_the_start(dai):
+    _, made = asked(dai, depth=False, exposure_limit_ms=5.0, focus=120)
+    control = made["Camera"][0].initialControl
+    control.setAutoExposureLimit.assert_called_once_with(5000)
+    control.setManualFocus.assert_called_once_with(120)
+    control.setAntiBandingMode.assert_not_called()
+
+
+def test_gyro_is_asked_for_in_small_batches(dai):
+    outputs, made = asked(dai, depth=False)
+    (imu,) = made["IMU"]
+    imu.enableIMUSensor.assert_called_once_with(dai.IMUSensor.GYROSCOPE_RAW, 200)
+    imu.setBatchReportThreshold.assert_called_once_with(2)
+    assert imu_queue(outputs) is not None
+    outputs, made = asked(dai, depth=False, gyro=False)
+    assert "IMU" not in made and imu_queue(outputs) is None
+
+
+def test_yunet_gets_the_frame_in_whole_and_is_decoded_on_the_host(dai, tmp_path):
+    file = face_archive(tmp_path / "faces.tar.xz")
+    outputs, made = asked(dai, depth=False, face_model=str(file))
+    (network,) = made["NeuralNetwork"]
+    assert network.build.call_args.kwargs["resizeMode"] == dai.ImgResizeMode.LETTERBOX
+    (decoder,) = made["YunetDecoder"]
+    decoder.link_args.assert_called_once_with(network.out)
+    assert outputs.faces is decoder.out and outputs.face_fault() == ""
+    assert "DetectionNetwork" not in made
+
+
+def test_yolo_is_decoded_by_the_camera(dai, tmp_path):
+    file = face_archive(tmp_path / "faces.tar.xz", parser="YOLO", points=5)
+    outputs, made = asked(dai, depth=False, face_model=str(file), min_confidence=0.4)
+    (network,) = made["DetectionNetwork"]
+    network.setConfidenceThreshold.assert_called_once_with(0.4)
+    assert outputs.faces is network.out and outputs.face_fault() == ""
+
+
+@pytest.mark.parametrize("platform", ["RVC2", "RVC4"])
+def test_depth_lies_on_the_colour_frame(dai, platform):
+    outputs, made = asked(dai, platform)
+    assert len(made["Camera"]) == 3
+    (stereo,) = made["StereoDepth"]
+    if platform == "RVC4":
+        assert outputs.depth is made["ImageAlign"][0].outputAligned
+    else:
+        assert outputs.depth is stereo.depth and "ImageAlign" not in made

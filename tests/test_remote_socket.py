@@ -1,19 +1,26 @@
 """The socket of a running rig: who may open it, whose it is, and what becomes of it."""
 
 import contextlib
+import json
 import os
+import re
 import shutil
+import socket
 import stat
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from math import radians
 from pathlib import Path
+from typing import Any
 
 import pytest
 from branch import Branch
 from remote_rig import (
+    BLINKS,
+    RATE,
     Beat,
     Broken,
     SecondTuning,
@@ -22,17 +29,22 @@ from remote_rig import (
 )
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.model import stop_latch
+from gazerig.robot.model import lead, commands
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.commands import Tune, Value
+from gazerig.robot.remote import client
 from gazerig.robot.remote import socket_io as remote_socket
+from gazerig.robot.remote import socket_server as server_module
 from gazerig.robot.remote.client import (
     ConnectionLost,
     NoRobotError,
+    RequestRejected,
     RobotClient,
     running,
 )
 from gazerig.robot.remote.request_handler import Pulse, RequestHandler
-from gazerig.robot.remote.socket_server import RemoteServer
+from gazerig.robot.remote.socket_io import REQUEST_BYTES
+from gazerig.robot.remote.socket_server import Budget, RemoteServer, RequestRate
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -49,8 +61,8 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def beat() -> Iterator[Beat]:
     with pytest.MonkeyPatch.context() as patch, Beat() as running_robot:
-        patch.setattr(stop_latch, "MIN_HOLD_S", 0.0)
-        patch.setattr(stop_latch, "MIN_RESUME_GAP_S", 0.0)
+        patch.setattr(commands, "MIN_HOLD_S", 0.0)
+        patch.setattr(commands, "MIN_RESUME_GAP_S", 0.0)
         yield running_robot
 
 
@@ -255,3 +267,386 @@ def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
         for _ in range(2):
             with pytest.raises(ConnectionLost, match="does not answer|has ended or hung up"):
                 rig.get()
+
+
+# Other programs steer a running rig: what is asked is done, what is rubbish costs nobody
+
+
+# What can be asked
+
+
+def test_values_rules_and_changes(rig: RobotClient) -> None:
+    assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
+    assert rig.get("gaze.") == {BLINKS: 17.0}
+    assert rig.parameter(RATE).high == 1000.0 and rig.parameter(RATE).group == "loop"
+    assert isinstance(described := rig._connection.ask("parameters", prefix=RATE), list)
+    assert described[0]["description"] == "a rate"
+    assert rig.set(RATE, 100.0) == ("taken",)
+    assert rig.get(RATE) == {RATE: 100.0}
+    assert rig.unsaved() == rig.differs() == ((RATE, "200.0", "100.0"),)
+    assert rig.status()["version"] == 1 and rig.status()["unsaved"] == 1
+    saved = rig.save("/tmp/my.yaml")
+    assert saved.path == Path("/tmp/my.yaml") and saved.changes == ((RATE, "200.0", "100.0"),)
+    assert rig.unsaved() == ()
+    rig.set(BLINKS, 3.0)
+    rig.revert()
+    assert rig.get(BLINKS) == {BLINKS: 17.0}
+
+
+def test_a_broken_rule_is_told_in_full_and_nothing_changes(rig: RobotClient) -> None:
+    with pytest.raises(RequestRejected) as refused:
+        rig.set_many({RATE: 1e9, BLINKS: -1.0})
+    assert str(refused.value).splitlines() == [
+        f"{RATE}: 1000000000.0 breaks the rule",
+        f"{BLINKS}: -1.0 breaks the rule",
+    ]
+    assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), b"1"])
+def test_what_has_no_json_is_refused_before_it_is_sent(rig: RobotClient, value: Value) -> None:
+    with pytest.raises(RequestRejected, match="finite numbers"):
+        rig.set(RATE, value)
+    assert rig.get(RATE) == {RATE: 200.0}
+
+
+def test_unknown_key_and_character(rig: RobotClient) -> None:
+    with pytest.raises(RequestRejected, match="unknown key"):
+        rig.parameter("loop.rate")
+    assert rig.characters() == ("bold", "shy")
+    rig.character("shy")
+    with pytest.raises(RequestRejected, match="no character 'brave'"):
+        rig.character("brave")
+
+
+def test_when_set_returns_the_loop_has_it(rig: RobotClient, beat: Beat) -> None:
+    rig.set(RATE, 150.0)
+    assert any(Tune(((RATE, 150.0),)) in tick.commands for tick in beat.ticks)
+    assert "tuned 1" in rig.status()["said"]
+
+
+def test_the_first_tick_after_set_has_it(rig: RobotClient, beat: Beat) -> None:
+    beat.hold.set()
+    asking = threading.Thread(target=rig.set, args=(RATE, 140.0))
+    try:
+        asking.start()
+        while not beat.robot._commands:
+            asking.join(timeout=0.002)
+            assert asking.is_alive()
+        held = len(beat.ticks)
+    finally:
+        beat.hold.clear()
+    asking.join()
+    assert beat.ticks[held].commands == (Tune(((RATE, 140.0),)),)
+
+
+def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
+    rig.look_at(1.0, 0.2, 0.1, stay=True)
+    assert rig.status()["why"].endswith("makes it look at 1 0.2 0.1")
+    assert rig.status()["leads"] == "person"
+    assert beat.ticks[-1].target.p_world_m == (1.0, 0.2, 0.1)
+    rig.look_freely()
+    assert rig.status()["leads"] == "gaze" and "makes it" not in rig.status()["why"]
+    rig.jog("neck_yaw", 10.0, stay=True)
+    desired = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].desired_rad, strict=True))
+    assert desired["neck_yaw"] == pytest.approx(radians(10.0))
+    rig.jog_free()
+    menus = rig.menus()
+    rig.ask("conversation", "talk")
+    assert menus["conversation"][0] == "none" and rig.menus()["conversation"][0] == "talk"
+    rig.ask("conversation", "none")
+
+
+def test_stop_and_resume(rig: RobotClient, beat: Beat) -> None:
+    rig.stop("finger")
+    status = rig.status()
+    assert status["stopped"] == "finger" and status["level"] == "torque_off"
+    assert not any(beat.ticks[-1].joints.torque)
+    rig.resume()
+    assert rig.status()["stopped"] == ""
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda rig: rig.jog("nose", 1.0), "this rig has no joint 'nose'; there is left_eye_pan"),
+        (lambda rig: rig.jog("neck_yaw", float("nan")), "finite"),
+        (lambda rig: rig.look_at(float("inf"), 0.0, 0.0), "finite"),
+        (lambda rig: rig.ask("mood", "good"), "nothing called 'mood'"),
+        (lambda rig: rig.ask("lids", "blue"), "no lids 'blue'"),
+    ],
+)
+def test_orders_that_cannot_be_meant(
+    rig: RobotClient, ask: Callable[[RobotClient], None], words: str
+) -> None:
+    with pytest.raises(RequestRejected, match=words):
+        ask(rig)
+
+
+# A loop that hangs, a resume that fails
+
+
+def test_a_loop_that_hangs_is_told_to_who_stops(
+    folder: Path, beat: Beat, errors: list[str], rig: RobotClient
+) -> None:
+    beat.hold.set()
+    try:
+        with pytest.raises(RequestRejected, match="emergency stop"):
+            rig.stop()
+    finally:
+        beat.hold.clear()
+    assert beat.pulse.taken_up(20.0)
+    rig.resume()
+
+
+def test_a_servo_that_refuses_torque_is_named(
+    rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse() -> None:
+        raise SetupError("neck_yaw: overload; gazerig reboot")
+
+    rig.stop("test")
+    with monkeypatch.context() as patch:
+        patch.setattr(beat.robot.body, "enable_torque", refuse)
+        with pytest.raises(RequestRejected, match="still stopped: neck_yaw: overload"):
+            rig.resume()
+    rig.resume()
+
+
+def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
+    rig: RobotClient, errors: list[str]
+) -> None:
+    with pytest.raises(ConnectionLost, match="KeyError"):
+        rig.set("bug", 5.0)
+    assert "KeyError" in errors[0]
+    assert rig.get(RATE) == {RATE: 200.0}
+
+
+# Rubbish, several programs at once, who leads, and floods: a running rig goes on
+
+
+def raw(folder: Path) -> socket.socket:
+    return remote_socket.dial(folder / f"{os.getpid()}.sock", 5.0)
+
+
+def line_of(end: socket.socket) -> dict[str, Any]:
+    with end.makefile("rb") as file:
+        answer: dict[str, Any] = json.loads(file.readline())
+    return answer
+
+
+# Rubbish
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (b"hello\n", "not a line of JSON"),
+        (b"\n", "not a line of JSON"),
+        (b'{"do": "get", "prefix": NaN}\n', "not a number"),
+        (b"\xff\xfe\n", "not a line of JSON"),
+        (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
+        (b"[]\n", "not understood"),
+        (b'{"do": "dance"}\n', "there is status; "),
+        (b'{"do": "get"}\n', "not understood"),
+        (b'{"do": "get", "prefix": 1}\n', "not understood"),
+        (b'{"do": "get", "prefix": "", "more": 1}\n', "not understood"),
+        (b'{"do": "set", "changes": [["a", 1]]}\n', "not understood"),
+        (b'{"do": "save", "path": "my.yaml"}\n', "absolute path"),
+        (b'{"do": "fly"}\n', "not understood; .*; ask; look_at"),
+        (b'{"do": []}\n', "not understood"),
+        (b'{"do": "tune", "changes": [["a", 1]]}\n', "request set"),
+    ],
+)
+def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
+    rig: RobotClient, folder: Path, line: bytes, words: str
+) -> None:
+    with raw(folder) as end:
+        end.sendall(line)
+        answer = line_of(end)
+        (said,) = answer.values()
+        assert re.search(words, said), said
+        end.sendall(b'{"do": "characters"}\n')
+        assert line_of(end) == {"ok": ["bold", "shy"]}
+
+
+def test_a_huge_request_is_refused_and_hung_up_on(rig: RobotClient, folder: Path) -> None:
+    with raw(folder) as end:
+        with contextlib.suppress(ConnectionError):
+            end.sendall(b"x" * (REQUEST_BYTES + 70_000))
+        assert "longer than" in line_of(end)["refused"]
+        assert hung_up(end)
+
+
+def test_an_endless_request_is_refused_and_hung_up_on(
+    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gazerig.robot.remote.socket_server._REST_S", 0.2)
+    with raw(folder) as end:
+        end.sendall(b'{"do": "characters"}\n')
+        assert "ok" in line_of(end)
+        over = threading.Event()
+
+        def dribble() -> None:
+            with contextlib.suppress(OSError):
+                while not over.wait(0.01):
+                    end.sendall(b"x")
+
+        # The next line is waited for without end, and must then come within its time.
+        dribbler = threading.Thread(target=dribble)
+        dribbler.start()
+        answer = line_of(end)
+        over.set()
+        dribbler.join()
+        assert "no end of the line" in answer["refused"]
+
+
+def test_two_requests_in_one_piece_get_two_answers(rig: RobotClient, folder: Path) -> None:
+    with raw(folder) as end:
+        end.sendall(b'{"do": "characters"}\n{"do": "get", "prefix": "loop"}\n')
+        with end.makefile("rb") as file:
+            assert json.loads(file.readline()) == {"ok": ["bold", "shy"]}
+            assert json.loads(file.readline()) == {"ok": {RATE: 200.0}}
+
+
+def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
+    rig: RobotClient, folder: Path, beat: Beat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gazerig.robot.remote.socket_server._TAKES_S", 0.2)
+    with raw(folder) as end:
+        ticks = len(beat.ticks)
+        with contextlib.suppress(OSError):
+            for _ in range(20_000):
+                end.sendall(b'{"do": "dance"}\n')
+        rig.set(RATE, 120.0)
+        assert len(beat.ticks) > ticks
+
+
+# Several at once
+
+
+def test_two_programs_at_once(rig: RobotClient, beat: Beat) -> None:
+    refused: list[str] = []
+
+    def work(value: float) -> None:
+        with RobotClient.connect() as mine:
+            for step in range(20):
+                mine.set(BLINKS, value + step)
+                if not mine.get(BLINKS):
+                    refused.append("lost")
+
+    before = len(beat.ticks)
+    threads = [threading.Thread(target=work, args=(value,)) for value in (100.0, 500.0)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not refused
+    orders = [order for tick in beat.ticks[before:] for order in tick.commands]
+    given = sorted(
+        float(str(change[1]))
+        for order in orders
+        if isinstance(order, Tune)
+        for change in order.changes
+    )
+    assert given == [*(100.0 + n for n in range(20)), *(500.0 + n for n in range(20))]
+
+
+def test_one_who_holds_a_half_request_does_not_hold_up_another(
+    rig: RobotClient, folder: Path
+) -> None:
+    with raw(folder) as end:
+        end.sendall(b'{"do": ')
+        rig.stop("the other one is slow")
+        assert rig.status()["stopped"]
+        rig.resume()
+        end.sendall(b'"characters"}\n')
+        assert "ok" in line_of(end)
+
+
+def test_who_was_quiet_longest_makes_room(rig: RobotClient, folder: Path) -> None:
+    """Whoever comes to stop the head is let in, however many programs hang around."""
+    with contextlib.ExitStack() as stack:
+        ends = [stack.enter_context(raw(folder)) for _ in range(15)]
+        ends[-1].sendall(b'{"do": "characters"}\n')
+        assert "ok" in line_of(ends[-1])  # all are in by now
+        rig.get(RATE)  # and this one was heard last
+        with RobotClient.connect() as stopper:
+            stopper.stop("many around")
+            stopper.resume()
+        assert hung_up(ends[0])
+        assert rig.get(RATE) == {RATE: 200.0}
+        ends[1].sendall(b'{"do": "characters"}\n')
+        assert "ok" in line_of(ends[1])
+
+
+# Leads of programs, and floods
+
+
+@pytest.mark.slow
+def test_a_program_leads_while_it_lives_and_is_named(
+    rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lead, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
+    monkeypatch.setattr(client, "_EVERY_S", 0.05)
+    with RobotClient.connect(who="a show") as show:
+        reply = show.look_at(-1.0, 0.0, 0.3)
+        assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.text()
+        assert show.leads
+        status = rig.status()
+        assert status["led"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
+        count = len(beat.ticks)
+        assert beat.pulse.taken_up(20.0, ticks=800)  # twice as long
+        assert show.leads and beat.ticks[-1].led and len(beat.ticks) > count
+    assert beat.pulse.taken_up(20.0, ticks=500)
+    assert beat.ticks[-1].led == "" and rig.status()["led"] == ""
+
+
+def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path) -> None:
+    with raw(folder) as end:
+        stop = {"do": "stop", "why": "x", "who": "the page"}
+        end.sendall(json.dumps(stop).encode() + b"\n")
+        assert "ok" in line_of(end)
+    said = rig.status()["said"]
+    assert any(f"stopped by the page (process {os.getpid()})" in words for words in said)
+    with pytest.raises(RequestRejected, match="another may only resume who confirms"):
+        rig.resume()
+    rig.resume(confirmed=True)
+
+
+def test_programs_of_other_users_are_hung_up_on(
+    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stranger = remote_socket.Peer(1, os.getuid() + 1)
+    rig.get(RATE)  # let in
+    with monkeypatch.context() as patch:
+        patch.setattr(remote_socket, "peer", lambda end: stranger)
+        with raw(folder) as end:
+            assert hung_up(end)
+    assert rig.get(RATE) == {RATE: 200.0}
+
+
+def test_processor_time_is_shared_out() -> None:
+    budget = Budget(RequestRate(0.1, 0.5), 100.0)
+    budget.spend(0.5, 100.0)
+    assert budget.wait_s(100.0) == 0.0
+    budget.spend(0.2, 100.0)
+    assert budget.wait_s(100.0) == pytest.approx(2.0)
+    assert budget.wait_s(101.0) == pytest.approx(1.0)
+    assert budget.wait_s(200.0) == 0.0
+    budget.spend(0.6, 200.0)  # never more than the burst was saved
+    assert budget.wait_s(200.0) == pytest.approx(1.0)
+
+
+def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(
+    rig: RobotClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig.get(RATE)  # let in with the usual rate
+    monkeypatch.setattr(server_module, "EACH", RequestRate(1e-6, 0.0))
+    with RobotClient.connect() as greedy:
+        greedy.get()
+        with pytest.raises(RequestRejected, match="too many requests: ask again in"):
+            greedy.get()
+        greedy.stop("all the same")
+    assert rig.status()["stopped"] == "all the same"
+    rig.resume(confirmed=True)

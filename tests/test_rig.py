@@ -6,11 +6,21 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+import typer
 from desk import GAZE_JOINTS
+from features_there import skip_without
+from mixed_rig import mixed_text
+from typer.core import TyperGroup
 
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.save_text import comment
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
+from gazerig.drivers.bus.multi_bus import MultiBus
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.cli.command_list import PANELS
+from gazerig.robot.cli.main import app
 
 DESK = shipped("rigs", "desk")
 
@@ -139,3 +149,158 @@ def test_all_faults_come_in_one_message(tmp_path: Path) -> None:
     text = "\n".join(faults)
     for part in ("id 8 is already", "rate_hz", "naem", "missing", "min_duration_ms"):
         assert part in text
+
+
+# Rigs with other joints and other buses than the desk's: what a file may say, and what is made
+
+
+@pytest.fixture
+def mixed(tmp_path: Path) -> Rig:
+    file = tmp_path / "mixed.yaml"
+    file.write_text(mixed_text(), encoding="utf-8")
+    return load_rig(str(file))
+
+
+def faults(tmp_path: Path, text: str) -> str:
+    file = tmp_path / "wrong.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_rig(str(file))
+    return str(caught.value)
+
+
+def test_joints_stand_in_their_order_whatever_bus_they_are_on(mixed: Rig) -> None:
+    assert mixed.names == (
+        "eyes_pan", "eyes_tilt", "left_upper_lid", "right_upper_lid", "left_lower_lid",
+        "right_lower_lid", "neck_yaw", "neck_pitch",
+    )  # fmt: skip
+    assert bus_names(mixed) == ("", "neck", "tilt")
+    assert joints_on(mixed, "neck") == ("neck_yaw",)
+    assert [setup.name for setup in rig_setups(mixed)] == list(mixed.names)
+    rests = {setup.name: setup.rest_steps for setup in rig_setups(mixed)}
+    assert rests["neck_yaw"] is None and rests["neck_pitch"] is None
+    lid = mixed.joints["left_upper_lid"]
+    assert rests["left_upper_lid"] == round(lid.made().steps(-20.0 * 3.141592653589793 / 180.0))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("bus: neck", "bus: nack", "joints.neck_yaw.bus: no bus 'nack' under buses; there is neck"),
+        ("model: sts3215", "model: xl330-m077", "speaks dynamixel, and its bus is of kind feetech"),
+        ("/dev/ttyUSB0", "/dev/ttyACM0", "buses.neck.port: /dev/ttyACM0 is already that of bus"),
+        ("id: 5", "id: 12", "joints.right_lower_lid.id: the board has channels 0 to 11"),
+        (", bus: tilt", "", "joints.neck_pitch.model: a sts3215 speaks feetech"),
+        ("id: 4\n", "id: 3\n", "joints.left_lower_lid.id: id 3 is already that of right_upper_lid"),
+        (
+            "left_lower_shut_deg: -8.0",
+            "left_lower_shut_deg: null",
+            "of the left lower lid one end is missing",
+        ),
+        ("eyes_tilt:", "left_eye_tilt:", "nothing turns an eye in tilt"),
+        ("kind: maestro", "kind: maestra", "bus.kind"),
+    ],
+)
+def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, says: str) -> None:
+    text = mixed_text()
+    assert old in text
+    said = faults(tmp_path, text.replace(old, new, 1))
+    assert says in said, said
+
+
+def test_an_eye_has_one_master(tmp_path: Path) -> None:
+    own = re.search(r"  eyes_pan:.*?(?=\n  eyes_tilt:)", mixed_text(), re.S)
+    assert own is not None
+    text = mixed_text().replace(
+        "\nlid_joints:", own[0].replace("eyes_pan", "left_eye_pan").join(("\n", "\nlid_joints:"))
+    )
+    said = faults(tmp_path, text.replace("id: 0", "id: 9", 1))
+    assert "joints.eyes_pan: turns both eyes, which left_eye_pan would do as well" in said
+
+
+def test_a_lid_needs_its_ends(tmp_path: Path) -> None:
+    text = re.sub(r"  left_lower_(shut|open)_deg.*\n", "", mixed_text())
+    assert "lid_joints.left_lower_shut_deg: missing; the joint left_lower_lid needs it" in faults(
+        tmp_path, text
+    )
+
+
+def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
+    assert ports_of(mixed, None)["tilt"] == "/dev/ttyACM1"
+    given = ports_of(mixed, "/dev/x,neck=/dev/y")
+    assert (given[""], given["neck"], given["tilt"]) == ("/dev/x", "/dev/y", "/dev/ttyACM1")
+    with pytest.raises(SetupError, match="it can be PORT, neck=PORT, tilt=PORT"):
+        ports_of(mixed, "lids=/dev/z")
+    assert ports_of(load_rig("maker"), "/dev/z") == {"": "/dev/z"}
+
+
+def test_one_bus_is_itself_and_several_are_one(mixed: Rig) -> None:
+    from gazerig.robot.app.assemble import assemble
+
+    made = assemble(mixed, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    assert isinstance(made.robot.body.bus, MultiBus)
+    alone = assemble(load_rig("maker"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    assert not isinstance(alone.robot.body.bus, MultiBus)
+    made.close()
+    alone.close()
+
+
+# RIG is a word of every command, the first one; options of earlier versions still work
+
+
+def group_of_all() -> TyperGroup:
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    return group
+
+
+def values(*words: str) -> dict[str, Any]:
+    """Parse a command as the command line does, without running it."""
+    skip_without(words[0])
+    command = group_of_all().commands[words[0]]
+    return dict(command.make_context(words[0], list(words[1:])).params)
+
+
+@pytest.mark.parametrize(
+    ("words", "rig"),
+    [
+        (("jog", "neck_yaw", "-10"), "desk"),
+        (("jog", "--speed", "5", "my.yaml", "neck_yaw", "-10", "--mock"), "my.yaml"),
+        (("look-at", "1", "-0.2", "0.3"), "desk"),
+        (("look-at", "maker", "1", "-0.2", "0.3"), "maker"),
+        (("reboot", "7", "neck_yaw"), "desk"),
+        (("reboot", "feetech", "7", "neck_yaw"), "feetech"),
+        (("reboot", "./feetech", "7", "neck_yaw"), "./feetech"),
+        (("reboot", "7", "neck_yaw", "--port", "/dev/ttyACM0"), "desk"),
+        (("scan",), None),
+        (("scan", "my.yaml"), "my.yaml"),
+        (("emulate", "maker"), "maker"),
+        (("replay", "a.mcap", "my.yaml", "--rerun"), "my.yaml"),
+        (("home", "my.yaml"), "my.yaml"),
+    ],
+)
+def test_the_rig_is_found_among_the_words(words: tuple[str, ...], rig: str | None) -> None:
+    read = values(*words)
+    assert read["rig"] == rig
+    if words[0] == "jog":
+        assert (read["joint"], read["deg"]) == ("neck_yaw", -10.0)
+    elif words[0] == "look-at":
+        assert (read["x"], read["y"], read["z"]) == (1.0, -0.2, 0.3)
+    elif words[0] == "reboot":
+        assert list(read["servos"]) == ["7", "neck_yaw"]
+
+
+def test_no_command_has_a_rig_option() -> None:
+    waiting: list[Any] = list(group_of_all().commands.values())
+    for command in waiting:
+        waiting.extend(getattr(command, "commands", {}).values())
+        assert not any("--rig" in param.opts for param in command.params), command.name
+
+
+def test_every_command_stands_in_a_panel_of_help_and_in_its_order() -> None:
+    group = group_of_all()
+    context = typer.Context(group)
+    shown = group.list_commands(context)
+    panels = [str(group.commands[name].rich_help_panel) for name in shown]  # type: ignore[attr-defined]
+    assert panels == sorted(panels, key=list(PANELS).index)
+    assert set(shown) == set(group.commands)

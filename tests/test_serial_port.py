@@ -13,7 +13,7 @@ from serial.tools import list_ports
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
-from gazerig.drivers.serial.open_error import explain
+from gazerig.drivers.serial.list_ports import explain
 from gazerig.drivers.serial.port import BlockingPort
 
 
