@@ -7,7 +7,6 @@ from typing import Literal, Protocol, Self
 
 from gazerig.robot.control.tick_feed import Progress
 from gazerig.robot.model.lead import ARRIVED_RAD
-from gazerig.robot.model.leader import GestureState
 from gazerig.robot.model.reply import CommandReply
 
 Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]
@@ -154,7 +153,13 @@ class Order:
         if reply.refused:
             self._end("refused", reply.refused)
         elif played:
-            self._update_from_gesture(played, now.gesture)
+            newest = now.gesture
+            if newest.number > played:
+                self._end("taken over", f"another gesture: {newest.name or newest.ended}")
+            elif newest.number == played and newest.ended:
+                self._end("taken over", newest.ended)
+            elif newest.number == played and not newest.name:
+                self._end("arrived", "")
         elif reply.lead == 0:  # it takes no control: done as soon as accepted
             self._end("arrived", "")
         elif reply.error_rad > ARRIVED_RAD:
@@ -167,14 +172,6 @@ class Order:
         elif now.lead.number > reply.lead:
             self._end("taken over", now.led or now.lead.ended)
         return self._outcome is not None
-
-    def _update_from_gesture(self, number: int, newest: GestureState) -> None:
-        if newest.number > number:
-            self._end("taken over", f"another gesture: {newest.name or newest.ended}")
-        elif newest.number == number and newest.ended:
-            self._end("taken over", newest.ended)
-        elif newest.number == number and not newest.name:
-            self._end("arrived", "")
 
     def _end(self, outcome: Outcome, why: str) -> None:
         self._why = why

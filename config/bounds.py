@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from gazerig.params import Bounds, Declaration, declarations
+from gazerig.params import Declaration, declarations
 
 T = TypeVar("T")
 Step = str | int
@@ -101,6 +101,7 @@ def model_of(params: type) -> type[BaseModel]:
         elif declared[name].default_factory is not dataclasses.MISSING:
             column["default_factory"] = declared[name].default_factory
         columns[name] = (_annotation(shape), Field(**column))
+    doc = (params.__doc__ or "").strip()
     model: type[BaseModel] = create_model(
         params.__name__,
         __config__=ConfigDict(
@@ -111,7 +112,8 @@ def model_of(params: type) -> type[BaseModel]:
             field_title_generator=lambda name, _: name,
         ),
         __module__=params.__module__,
-        __doc__=_first_line(params),
+        # Of a dataclass without one, it is its signature.
+        __doc__="" if doc.startswith(f"{params.__name__}(") else doc.partition("\n")[0],
         **columns,
     )
     return model
@@ -152,19 +154,15 @@ def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
     if origin is Literal or (declared.choices and kind in _PLAIN):
         return Shape("choice", choices=declared.choices)
     if kind in _PLAIN:
-        return _single(_PLAIN[kind], declared.bounds, place)
+        form, bounds = _PLAIN[kind], declared.bounds
+        if bounds is None:
+            return Shape(form)
+        if form not in ("number", "whole"):
+            raise TypeError(f"{place}: Bounds are for numbers")
+        if form == "number":
+            return Shape(form, low=float(bounds.low), high=float(bounds.high))
+        return Shape(form, low=int(bounds.low), high=int(bounds.high))
     raise TypeError(f"{place}: a configuration value cannot have the type {kind}")
-
-
-def _single(form: Form, bounds: Bounds | None, place: str) -> Shape:
-    """Return the shape of a single value; bounds are of its own type."""
-    if bounds is None:
-        return Shape(form)
-    if form not in ("number", "whole"):
-        raise TypeError(f"{place}: Bounds are for numbers")
-    if form == "number":
-        return Shape(form, low=float(bounds.low), high=float(bounds.high))
-    return Shape(form, low=int(bounds.low), high=int(bounds.high))
 
 
 def _annotation(shape: Shape) -> Any:
@@ -240,12 +238,6 @@ def _build(params: type, value: object, validate: Callable[[object], BaseModel])
 def _adapter(params: type) -> TypeAdapter[Any]:
     """Return the validator of a whole file."""
     return TypeAdapter(_frozen(params))
-
-
-def _first_line(params: type) -> str:
-    """Return the first docstring line, "" where dataclass made it up."""
-    doc = (params.__doc__ or "").strip()
-    return "" if doc.startswith(f"{params.__name__}(") else doc.partition("\n")[0]
 
 
 def _described(shape: Shape) -> str:

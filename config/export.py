@@ -45,7 +45,14 @@ def violation(into: type, details: ErrorDetails) -> Violation:
     if path[-1:] == ("[key]",):  # of a mapping's key, not of what it holds
         return Violation(path[:-1], "", _rule(Shape("text"), details))
     if details["type"] == "extra_forbidden":
-        return Violation(path, abbreviated(details["input"]), _unknown(_at(root, path[:-1]), path))
+        holder = _at(root, path[:-1])
+        names = tuple(shapes_of(holder.params)) if holder.params else ()
+        near = suggestion(str(path[-1]), names) or ";"
+        return Violation(
+            path,
+            abbreviated(details["input"]),
+            f"unknown key {abbreviated(path[-1])}{near} allowed: {', '.join(names) or 'none'}",
+        )
     shape = _at(root, path)
     if details["type"] == "missing":
         described = f" ({shape.description})" if shape.description else ""
@@ -133,13 +140,6 @@ def _hint(shape: Shape, value: object) -> str:
         bare = value.replace(".", "", 1).removeprefix("-").isdecimal()
         return "; take the quotes away" if bare else ""
     return ""
-
-
-def _unknown(holder: Shape, path: tuple[Step, ...]) -> str:
-    """Return the text for an unknown key: the keys that there are."""
-    names = tuple(shapes_of(holder.params)) if holder.params else ()
-    near = suggestion(str(path[-1]), names) or ";"
-    return f"unknown key {abbreviated(path[-1])}{near} allowed: {', '.join(names) or 'none'}"
 
 
 def _range(shape: Shape) -> str:

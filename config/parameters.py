@@ -330,18 +330,14 @@ def _put(root: Shape, data: dict[str, Any], key: str, value: Value) -> list[Conf
     if not isinstance(held, dict):
         rule = f"unknown key {abbreviated(last)}; {'.'.join(over)} is a single value"
         return [ConfigFault("", None, key, abbreviated(value), rule)]
-    entry = shape is not None and shape.form == "mapping" and shape.inner is not None
-    if value is None and entry and shape is not None and not _may_be_null(shape.inner):
+    inner = shape.inner if shape is not None and shape.form == "mapping" else None
+    if value is None and inner is not None and not inner.optional:
         held.pop(last, None)
     elif isinstance(value, Mapping) and isinstance(held.get(last), dict):
         held[last] = _laid_over(held[last], value)
     else:
         held[last] = value
     return []
-
-
-def _may_be_null(shape: Shape | None) -> bool:
-    return shape is not None and shape.optional
 
 
 def _below(shape: Shape | None, step: str) -> Shape | None:

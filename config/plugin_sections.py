@@ -94,7 +94,10 @@ def _mentioned(data: Any) -> Iterable[tuple[str, str, str]]:
     buses = _at(data, "buses")
     chosen = [
         (BUS, "bus.kind", _at(data, "bus", "kind")),
-        *((BUS, f"buses.{name}.kind", _at(bus, "kind")) for name, bus in _items(buses)),
+        *(
+            (BUS, f"buses.{name}.kind", _at(bus, "kind"))
+            for name, bus in (buses.items() if isinstance(buses, Mapping) else ())
+        ),
         (DETECTOR, "detector.kind", _at(data, "detector", "kind")),
         (ATTENTION, "gaze.chooser", _at(data, "gaze", "chooser")),
     ]
@@ -102,10 +105,6 @@ def _mentioned(data: Any) -> Iterable[tuple[str, str, str]]:
         known = {field.name for field in dataclasses.fields(Rig)}
         chosen += [(CAMERA, key, key) for key in data if isinstance(key, str) and key not in known]
     yield from ((group, key, name) for group, key, name in chosen if isinstance(name, str))
-
-
-def _items(value: Any) -> Iterable[tuple[str, Any]]:
-    return value.items() if isinstance(value, Mapping) else ()
 
 
 def _at(value: Any, *path: str) -> Any:

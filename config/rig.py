@@ -25,6 +25,7 @@ from gazerig.gaze.field_of_view import FieldOfViewParams
 from gazerig.gaze.gesture.breathing import BreathingParams
 from gazerig.gaze.gesture.gesture import GestureParams
 from gazerig.gaze.gesture.level import LevelParams
+from gazerig.gaze.gesture.sway import SwayParams
 from gazerig.gaze.lids.lids import LidParams
 from gazerig.gaze.oculomotor.params import HeadParams, OculomotorParams, PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
@@ -138,6 +139,7 @@ class GazeConfig:
     pursuit: Annotated[PursuitParams, "how the eyes follow"] = field(default_factory=PursuitParams)
     head: Annotated[HeadParams, "how the head joins"] = field(default_factory=HeadParams)
     breathing: Annotated[BreathingParams, "the head's slow sway"] = field(default_factory=BreathingParams)
+    sway: Annotated[SwayParams, "the head's random sway"] = field(default_factory=SwayParams)
     lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
     gestures: Annotated[GestureParams, "gestures laid over gaze"] = field(default_factory=GestureParams)
     oculomotor: Annotated[OculomotorParams, "how it all fits together"] = field(default_factory=OculomotorParams)

@@ -75,12 +75,35 @@ def save(
             is refused, or another layer overrides it.
     """
     target = Path(os.path.realpath(path))
-    _refuse_shipped(target)
+    # Refuse a file inside the installed package: an update would overwrite it.
+    package = Path(os.path.realpath(SHIPPED))
+    if package in target.parents:
+        raise _fault(
+            target,
+            "comes with the program and is never changed: copy it "
+            f"(cp {target} my{target.name}) and name the copy",
+        )
     before, text, found = _proposal(target, changes, into, base)
     if text == before:
         return SavedFile(target, None, ())
     with _errors_named(target), _beside(target, text) as fresh:
-        _check_new(target, fresh, changes, check)
+        # Load the new file and check that it has every value.
+        try:
+            loaded = check(str(fresh))
+        except ConfigError as error:
+            named = [
+                replace(f, file=str(target) if f.file == str(fresh) else f.file)
+                for f in error.faults
+            ]
+            raise ConfigError(named) from None
+        for key, value in changes.items():
+            held = _follow(loaded, key)
+            if held is not _ABSENT and not _same(held, value):
+                raise _fault(
+                    target,
+                    f"{key} stays {held} whatever this file says: a later layer sets it",
+                    key,
+                )
         if _held(target) != before:
             raise _fault(target, "was changed by another program meanwhile; try again")
         backup = _backup(target, before, now) if before is not None else None
@@ -198,38 +221,10 @@ def _leaves(value: Any, path: str = "") -> dict[str, Any]:
     return found
 
 
-def _check_new(target: Path, fresh: Path, changes: Mapping[str, Value], check: Check) -> None:
-    """Load the new file and check that it has every value."""
-    try:
-        loaded = check(str(fresh))
-    except ConfigError as error:
-        named = [
-            replace(f, file=str(target) if f.file == str(fresh) else f.file) for f in error.faults
-        ]
-        raise ConfigError(named) from None
-    for key, value in changes.items():
-        held = _follow(loaded, key)
-        if held is not _ABSENT and not _same(held, value):
-            raise _fault(
-                target, f"{key} stays {held} whatever this file says: a later layer sets it", key
-            )
-
-
 def _same(held: Any, value: Value) -> bool:
     if isinstance(value, list | tuple):
         return list(held) == list(value)
     return bool(held == value)
-
-
-def _refuse_shipped(target: Path) -> None:
-    """Refuse a file inside the installed package: an update would overwrite it."""
-    package = Path(os.path.realpath(SHIPPED))
-    if package in target.parents:
-        raise _fault(
-            target,
-            "comes with the program and is never changed: copy it "
-            f"(cp {target} my{target.name}) and name the copy",
-        )
 
 
 @contextlib.contextmanager

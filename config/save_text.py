@@ -199,16 +199,11 @@ def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> 
         at, indent = _span(text, holder)[1], holder.before.start_mark.column + 2
     else:
         raise EditRefused(f"{key}: {'.'.join(steps[:depth])} is no mapping; make it one")
-    at = _end_of_line(text, at)
-    lines = _block(steps, depth, indent, value, into)
-    return _Edit(at, at, "".join(f"{newline}{line}" for line in lines))
-
-
-def _end_of_line(text: str, at: int) -> int:
-    """Return the end of a line, before its line break."""
     end = text.find("\n", at)
     end = len(text) if end < 0 else end
-    return end - 1 if end > at and text[end - 1] == "\r" else end
+    at = end - 1 if end > at and text[end - 1] == "\r" else end
+    lines = _block(steps, depth, indent, value, into)
+    return _Edit(at, at, "".join(f"{newline}{line}" for line in lines))
 
 
 def _block(steps: list[str], depth: int, indent: int, value: Value, into: type) -> list[str]:

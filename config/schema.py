@@ -18,13 +18,12 @@ from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.attention.top_down import TopDownParams
-from gazerig.gaze.gesture.gesture import Gesture
 from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable
-from gazerig.robot.model.forbidden_range import forbidden_pairs
 from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, motions
+from gazerig.robot.model.guard_params import forbidden_pairs
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
@@ -377,7 +376,17 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
         try:
             gesture = load_gesture(gesture_path(file))
             known.add(gesture_name(file))
-            _refuse_beyond(rig, gesture)
+            # A gesture that the rig cannot do from the middle of its ranges is refused.
+            limits = [rig.joints[name].limit() for name in rig.names]
+            middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
+            spans = {}
+            for name in LIDS:
+                shut, wide = rig.lid_joints.ends_deg(name)
+                if name in rig.joints and shut is not None and wide is not None:
+                    spans[name] = radians(wide - shut)
+            GestureFit(rig.names, spans).fit(
+                "", motions(gesture, rig.names), 1.0, middle, limits, rig.gaze.gestures.limit_share
+            )
         except ConfigError as error:
             for fault in error.faults:
                 yield f"gesture_files.{i}", str(fault)
@@ -391,23 +400,6 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
                 f"gaze.top_down.rules.{behaviour}.gesture",
                 f"no gesture {rule.gesture!r}{near} there is {there}",
             )
-
-
-def _refuse_beyond(rig: Rig, gesture: Gesture) -> None:
-    """Refuse a gesture that a rig cannot do from the middle of its ranges.
-
-    Raises:
-        gazerig.robot.model.gesture_fit.GestureRefused: with joint, time and limit.
-    """
-    limits = [rig.joints[name].limit() for name in rig.names]
-    middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
-    spans = {}
-    for name in LIDS:
-        shut, wide = rig.lid_joints.ends_deg(name)
-        if name in rig.joints and shut is not None and wide is not None:
-            spans[name] = radians(wide - shut)
-    fit = GestureFit(rig.names, spans)
-    fit.fit("", motions(gesture, rig.names), 1.0, middle, limits, rig.gaze.gestures.limit_share)
 
 
 RULES = (

@@ -269,7 +269,13 @@ def describe_error(error: BaseException) -> str:
 
 def registrations(group: str) -> tuple[Registration, ...]:
     """Return all parts of a group: ours, then those of packages by package and name."""
-    return (*_own_parts(group), *_package_parts(group, tuple(sys.path)))
+    return (
+        *(
+            Registration(group, name, value, OUR_PACKAGE, _version())
+            for name, value in SHIPPED[group].items()
+        ),
+        *_package_parts(group, tuple(sys.path)),
+    )
 
 
 def name_conflicts(group: str) -> tuple[str, ...]:
@@ -377,13 +383,6 @@ def create(group: str, name: str, part: Plugin, params: Any) -> Any:
         raise PluginError(
             f"{find(group, name).label} cannot be made: {describe_error(error)}"
         ) from error
-
-
-def _own_parts(group: str) -> tuple[Registration, ...]:
-    return tuple(
-        Registration(group, name, value, OUR_PACKAGE, _version())
-        for name, value in SHIPPED[group].items()
-    )
 
 
 @cache

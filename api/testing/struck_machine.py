@@ -12,8 +12,8 @@ from typing import NamedTuple
 from gazerig.config.rig import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS, servo_label
 from gazerig.robot.app.bus_wiring import rig_bus, rig_setups
-from gazerig.robot.app.emulation import emulated_lines, place_of
 from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.app.run_bus import emulated_lines, place_of
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.safety.guard import Guard

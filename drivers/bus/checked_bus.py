@@ -74,54 +74,47 @@ class CheckedBus:
         began_s = self._now_s() if self._now_s is not None else 0.0
         feedback = self._checked_call(lambda: self._bus.read(now_s), "read")
         if self._now_s is not None:
-            self._report_slow_read(self._now_s() - began_s, now_s)
+            # Report a read that leaves no time for the rest of the tick.
+            took_s = self._now_s() - began_s
+            period_s = now_s - self._last_s if self._last_s is not None else None
+            self._last_s = now_s
+            if period_s is not None and took_s > 0.9 * period_s:
+                text = f"{self._label}: a read took {took_s * 1e3:.0f} ms, as long as a tick"
+                self._seldom.add(f"{text}: lower loop.rate_hz", now_s, "slow")
         if not isinstance(feedback, Feedback):
             raise BusLost(
                 f"{self._label}: read returned a {type(feedback).__name__}, wanted Feedback"
             )
         try:
-            return self._checked_feedback(feedback, now_s)
+            for name, column in zip(Feedback._fields[:_COLUMNS], feedback[:_COLUMNS], strict=True):
+                if len(column) != self._count:
+                    raise ValueError(f"{len(column)} values of {name} for {self._count} servos")
+            numbers: tuple[Any, ...] = feedback[:_NUMBERS]
+            if not feedback.missing and all(map(isfinite, chain.from_iterable(numbers))):
+                return feedback
+            missing = set(feedback.missing)
+            if not missing <= set(range(self._count)):
+                raise ValueError(f"missing {sorted(missing)} of {self._count} servos")
+            wrong = {
+                i
+                for i in range(self._count)
+                if i not in missing and not all([isfinite(column[i]) for column in numbers])
+            }
+            if not wrong:
+                return feedback
+            names = ", ".join(self._setups[i].label() for i in sorted(wrong))
+            text = f"{self._label}: no finite position, speed, load or time of {names}: taken as missing"
+            self._seldom.add(text, now_s, "not finite")
+            empty = Feedback.of_none(self._count)
+            columns = [
+                tuple([none[i] if i in wrong else column[i] for i in range(self._count)])
+                for column, none in zip(feedback[:_COLUMNS], empty[:_COLUMNS], strict=True)
+            ]
+            return Feedback._make((*columns, tuple(sorted(missing | wrong))))
         except (TypeError, ValueError) as error:
             raise BusLost(
                 f"{self._label}: read returned no feedback: {describe_error(error)}"
             ) from error
-
-    def _report_slow_read(self, took_s: float, now_s: float) -> None:
-        """Report a read that leaves no time for the rest of the tick."""
-        period_s = now_s - self._last_s if self._last_s is not None else None
-        self._last_s = now_s
-        if period_s is not None and took_s > 0.9 * period_s:
-            text = f"{self._label}: a read took {took_s * 1e3:.0f} ms, as long as a tick"
-            self._seldom.add(f"{text}: lower loop.rate_hz", now_s, "slow")
-
-    def _checked_feedback(self, feedback: Feedback, now_s: float) -> Feedback:
-        for name, column in zip(Feedback._fields[:_COLUMNS], feedback[:_COLUMNS], strict=True):
-            if len(column) != self._count:
-                raise ValueError(f"{len(column)} values of {name} for {self._count} servos")
-        numbers: tuple[Any, ...] = feedback[:_NUMBERS]
-        if not feedback.missing and all(map(isfinite, chain.from_iterable(numbers))):
-            return feedback
-        missing = set(feedback.missing)
-        if not missing <= set(range(self._count)):
-            raise ValueError(f"missing {sorted(missing)} of {self._count} servos")
-        wrong = {
-            i
-            for i in range(self._count)
-            if i not in missing and not all([isfinite(column[i]) for column in numbers])
-        }
-        if not wrong:
-            return feedback
-        names = ", ".join(self._setups[i].label() for i in sorted(wrong))
-        text = (
-            f"{self._label}: no finite position, speed, load or time of {names}: taken as missing"
-        )
-        self._seldom.add(text, now_s, "not finite")
-        empty = Feedback.of_none(self._count)
-        columns = [
-            tuple([none[i] if i in wrong else column[i] for i in range(self._count)])
-            for column, none in zip(feedback[:_COLUMNS], empty[:_COLUMNS], strict=True)
-        ]
-        return Feedback._make((*columns, tuple(sorted(missing | wrong))))
 
     def enable_torque(self) -> tuple[int, ...]:
         """Switch torque on at the present positions.

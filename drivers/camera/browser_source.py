@@ -47,7 +47,11 @@ class BrowserSource:
             found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
             image = to_bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
             if image is None:
-                self._report()
+                if not self._told:
+                    self._told = True
+                    self._events.append(
+                        "a browser sends pictures that cannot be read: they are skipped"
+                    )
                 continue
             height, width = image.shape[:2]
             lens = intrinsics_of_view(radians(FIELD_DEG), width, height)
@@ -61,8 +65,3 @@ class BrowserSource:
 
     def close(self) -> None:
         """Stop; there is nothing to free."""
-
-    def _report(self) -> None:
-        if not self._told:
-            self._told = True
-            self._events.append("a browser sends pictures that cannot be read: they are skipped")

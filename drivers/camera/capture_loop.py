@@ -278,7 +278,10 @@ class CaptureLoop:
                 shot = self._source.take(self._now_s, stop)
             except CameraError as error:
                 if lost_s is None:
-                    lost_s = self._lose(error)
+                    self._counted = self._number
+                    if self._recovery.give_up_s > 0.0:
+                        self._report(f"{LOST} ({error}): trying it again")
+                    lost_s = self._now_s()
                 self._source.close()
                 if self._now_s() - lost_s >= self._recovery.give_up_s:
                     raise
@@ -289,13 +292,6 @@ class CaptureLoop:
             if shot is not None and lost_s is not None:
                 self._report(f"{BACK} after {self._now_s() - lost_s:.1f} s")
             return shot
-
-    def _lose(self, error: CameraError) -> float:
-        """Report the loss, continue the frame numbers, and return the time of the loss, seconds."""
-        self._counted = self._number
-        if self._recovery.give_up_s > 0.0:
-            self._report(f"{LOST} ({error}): trying it again")
-        return self._now_s()
 
 
 def detection_error(failure: BaseException) -> CameraError:

@@ -54,7 +54,11 @@ class ClockSync:
         """
         difference_s = arrived_s - device_s
         if self._has_jumped(device_s, difference_s):
-            self._forget()
+            # Reset to an unknown clock.
+            self._best.clear()
+            self._bucket, self._late_since_s, self._last = None, None, None
+            self._drift, self._offset_s = 0.0, 0.0
+            self.jumps += 1
         self._store(device_s, difference_s)
         host_s = device_s + self._line_s(device_s) - self._least_delay_s
         if self._last is not None and device_s >= self._last[0]:
@@ -82,13 +86,6 @@ class ClockSync:
             self._late_since_s = arrived_s
         # A device that restarted counts from 0.
         return device_s < self._last[0] or arrived_s - self._late_since_s > _LASTING_S
-
-    def _forget(self) -> None:
-        """Reset to an unknown clock."""
-        self._best.clear()
-        self._bucket, self._late_since_s, self._last = None, None, None
-        self._drift, self._offset_s = 0.0, 0.0
-        self.jumps += 1
 
     def _store(self, device_s: float, difference_s: float) -> None:
         """Store a frame if it is the least delayed of its bucket, and fit the line again."""

@@ -94,7 +94,12 @@ class GuardedCamera:
             return None
         outcome = self._call(lambda: self._read_camera(now_s))
         if outcome is None:
-            self._wait(now_s)
+            # Record that it has not answered, and report it once.
+            if self._asked_s is None:
+                self._asked_s = now_s
+            elif not self._late and now_s - self._asked_s > SILENT_S:
+                self._late = True
+                self._log.add(f"{self._label} has not answered for {SILENT_S:g} s: no new frames")
             return self._newest
         if self._late:
             self._log.add(f"{self._label} answers again")
@@ -136,14 +141,6 @@ class GuardedCamera:
             self._log.add(f"{self._label} does not close: it is abandoned")
         elif outcome.error is not None:
             self._log.add(f"{self._label} failed while it was closed ({outcome.why})")
-
-    def _wait(self, now_s: float) -> None:
-        """Record that it has not answered, and report it once."""
-        if self._asked_s is None:
-            self._asked_s = now_s
-        elif not self._late and now_s - self._asked_s > SILENT_S:
-            self._late = True
-            self._log.add(f"{self._label} has not answered for {SILENT_S:g} s: no new frames")
 
     def _fail(self, why: str) -> None:
         self._failed, self._newest = True, None

@@ -197,10 +197,7 @@ class HealthModel:
             return None
         if any(abs(_within_half(one - seen.turned_deg)) > _AGREE_DEG for one in self._turned):
             return None
-        return self._turn_message(seen.turned_deg)
-
-    def _turn_message(self, deg: float) -> str:
-        """Return a message with the clockwise angle of frames and the remedy."""
+        deg = seen.turned_deg
         quarter = round(deg / 90.0) * 90 % 360
         off = abs(_within_half(deg - quarter))
         about = (
@@ -316,7 +313,16 @@ class TurnedFaces:
 
         tilted: whether the unturned frame shows faces
         """
-        detector = self._made()
+        if self._detector is None and not self._fails:
+            from gazerig.drivers.errors import ModelFileError
+            from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+            from gazerig.drivers.vision.face.params import FaceDetectorParams
+
+            try:
+                self._detector = MtcnnDetector(FaceDetectorParams())
+            except ModelFileError:
+                self._fails = True
+        detector = self._detector
         if detector is None or not _is_picture(image):
             return None
         small = _limit_width(image[..., :3], _PROBE_PX)
@@ -337,18 +343,6 @@ class TurnedFaces:
         turned_deg = _within_half(way + roll_deg(surest))
         sure = surest.confidence >= _SURE and abs(turned_deg) > _UPRIGHT_DEG
         return turned_deg if sure else 0.0
-
-    def _made(self) -> "MtcnnDetector | None":
-        if self._detector is None and not self._fails:
-            from gazerig.drivers.errors import ModelFileError
-            from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
-            from gazerig.drivers.vision.face.params import FaceDetectorParams
-
-            try:
-                self._detector = MtcnnDetector(FaceDetectorParams())
-            except ModelFileError:
-                self._fails = True
-        return self._detector
 
 
 def _turn_back(image: NDArray[Any], deg: float) -> ImageArray:

@@ -114,50 +114,39 @@ class Recording:
             CameraError: a record is invalid.
         """
         try:
-            return self._indexed()
+            waiting: dict[str, _MessagePlace] = {}
+            stamp_ns = -1
+            for kind, place in self._records():
+                if kind == Opcode.DATA_END:
+                    return True
+                if kind in (Opcode.CHUNK, Opcode.HEADER, Opcode.CHANNEL):
+                    if kind == Opcode.CHUNK:
+                        raise CameraError(
+                            f"{self._path} was packed into chunks by another program: "
+                            "play the file as recorded"
+                        )
+                    if kind == Opcode.HEADER:
+                        profile = Header.read(self._content(place, place.length)).profile
+                        if profile != fmt.PROFILE:
+                            raise CameraError(
+                                f"{self._path} is no camera recording of gazerig (its profile is "
+                                f"{profile!r}): make one with gazerig record-camera"
+                            )
+                    else:
+                        channel = Channel.read(self._content(place, place.length))
+                        self._channels[channel.id] = channel.topic
+                elif kind == Opcode.MESSAGE:
+                    head = Message.read(self._content(place, _FIXED), _FIXED)
+                    topic = self._channels.get(head.channel_id, "")
+                    if head.log_time != stamp_ns:  # earlier messages belong to no frame
+                        stamp_ns, waiting = head.log_time, {}
+                    waiting[topic] = place
+                    last_ns = self._frames[-1].stamp_ns if self._frames else -1
+                    if topic == fmt.PICTURE and stamp_ns > last_ns:
+                        self._frames.append(_FrameIndex(stamp_ns, waiting))
+            return False
         except (McapError, ValueError, struct.error) as error:
             raise CameraError(f"{self._path} is damaged: copy the file again") from error
-
-    def _indexed(self) -> bool:
-        """Index the frames; return whether the file was closed properly."""
-        waiting: dict[str, _MessagePlace] = {}
-        stamp_ns = -1
-        for kind, place in self._records():
-            if kind == Opcode.DATA_END:
-                return True
-            if kind in (Opcode.CHUNK, Opcode.HEADER, Opcode.CHANNEL):
-                self._meet(kind, place)
-            elif kind == Opcode.MESSAGE:
-                head = Message.read(self._content(place, _FIXED), _FIXED)
-                topic = self._channels.get(head.channel_id, "")
-                if head.log_time != stamp_ns:  # earlier messages belong to no frame
-                    stamp_ns, waiting = head.log_time, {}
-                waiting[topic] = place
-                if topic == fmt.PICTURE:
-                    self._add(stamp_ns, waiting)
-        return False
-
-    def _add(self, stamp_ns: int, places: dict[str, _MessagePlace]) -> None:
-        """Record a frame if it is later than the last one."""
-        if not self._frames or stamp_ns > self._frames[-1].stamp_ns:
-            self._frames.append(_FrameIndex(stamp_ns, places))
-
-    def _meet(self, kind: int, place: _MessagePlace) -> None:
-        """Read the records that describe the file."""
-        if kind == Opcode.CHUNK:
-            raise CameraError(
-                f"{self._path} was packed into chunks by another program: play the file as recorded"
-            )
-        if kind == Opcode.HEADER:
-            profile = Header.read(self._content(place, place.length)).profile
-            if profile != fmt.PROFILE:
-                raise CameraError(
-                    f"{self._path} is no camera recording of gazerig (its profile is {profile!r}): "
-                    "make one with gazerig record-camera"
-                )
-        else:
-            channel = Channel.read(self._content(place, place.length))
-            self._channels[channel.id] = channel.topic
 
     def _records(self) -> Iterator[tuple[int, _MessagePlace]]:
         """Yield the kind and position of each complete record."""

@@ -282,7 +282,10 @@ class CameraProcess:
             if self._now_s() - began_s >= _STABLE_S:
                 wait_s = self._recovery.retry_ms / 1e3
             while not self._closing.is_set():
-                if not self._may_restart(end):
+                if self._lost_s is None:
+                    self._lose(end.reason, "starting its process again")
+                gone_s = self._now_s() - (self._lost_s or 0.0)
+                if end.final or gone_s >= self._recovery.give_up_s:
                     self._failure = end.reason
                     return
                 self._end(0.0)
@@ -296,13 +299,6 @@ class CameraProcess:
             if self._pipe is not None and self._motion is not None:
                 with suppress(OSError):
                     self._pipe.send(Retune(None, self._motion))
-
-    def _may_restart(self, end: _End) -> bool:
-        """Report the end of a process; return whether another may be started."""
-        if self._lost_s is None:
-            self._lose(end.reason, "starting its process again")
-        gone_s = self._now_s() - (self._lost_s or 0.0)
-        return not end.final and gone_s < self._recovery.give_up_s
 
     def _lose(self, reason: str, remedy: str) -> None:
         """Record that no frames arrive; losses in quick succession are reported once."""
@@ -325,7 +321,8 @@ class CameraProcess:
         try:
             while True:
                 if not pipe.poll(_POLL_S):
-                    if self._closing.is_set() and not self._alive():
+                    process = self._process
+                    if self._closing.is_set() and (process is None or not process.is_alive()):
                         return _End("closed")
                     if not retrying and self._is_hung(silence):
                         return _End("no new frame, and its process hangs")
@@ -348,9 +345,6 @@ class CameraProcess:
         finally:
             for slot in slots:
                 slot.forget()
-
-    def _alive(self) -> bool:
-        return self._process is not None and self._process.is_alive()
 
     def _is_hung(self, silence: FrameWatchdog) -> bool:
         """Report a camera without new frames; return whether its process must be ended."""

@@ -186,7 +186,16 @@ class CameraRecorder:
         """
         shot = self._source.take(now_s, stop)
         if shot is not None and not self.failure:
-            self._encode(shot)
+            if self._waiting.full():
+                if self.left_out == 0:
+                    self._events.append(
+                        f"{self._path}: this machine is slower than the camera, frames are omitted "
+                        "from the recording; --jpeg makes them smaller and faster"
+                    )
+                self.left_out += 1
+            elif self._encoders is not None:
+                messages = self._encoders.submit(encode_shot, shot, self._jpeg_quality)
+                self._waiting.put(_QueuedFrame(shot.captured_s, shot.number, messages))
         return shot
 
     def events(self) -> tuple[str, ...]:
@@ -207,19 +216,6 @@ class CameraRecorder:
         if self._encoders is not None:
             self._encoders.shutdown()
             self._encoders = None
-
-    def _encode(self, shot: Shot) -> None:
-        """Begin to encode a frame, unless too many are queued already."""
-        if self._waiting.full():
-            if self.left_out == 0:
-                self._events.append(
-                    f"{self._path}: this machine is slower than the camera, frames are omitted "
-                    "from the recording; --jpeg makes them smaller and faster"
-                )
-            self.left_out += 1
-        elif self._encoders is not None:
-            messages = self._encoders.submit(encode_shot, shot, self._jpeg_quality)
-            self._waiting.put(_QueuedFrame(shot.captured_s, shot.number, messages))
 
     def _write(self) -> None:
         """Write frames until the end of the recording; after a fault only discard them."""

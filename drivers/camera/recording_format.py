@@ -103,7 +103,19 @@ def encode_shot(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]
     stamp = nanoseconds(shot.captured_s)
     found: list[tuple[str, bytes]] = []
     if shot.lens is not None:
-        found.append((LENS, _dump(_lens(shot.lens, shot.image, stamp))))
+        fx, fy, cx, cy = shot.lens.fx_px, shot.lens.fy_px, shot.lens.cx_px, shot.lens.cy_px
+        lens = {
+            "timestamp": _stamp(stamp),
+            "frame_id": _FRAME,
+            "width": shot.image.shape[1],
+            "height": shot.image.shape[0],
+            "distortion_model": "plumb_bob",
+            "D": list(shot.lens.distortion),
+            "K": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+            "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            "P": [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        }
+        found.append((LENS, _dump(lens)))
     if shot.depth_m is not None:
         file = _file(".png", to_millimetres(shot.depth_m), _DEPTH_PNG)
         found.append((DEPTH, _dump(_image("png", file, stamp))))
@@ -194,22 +206,6 @@ def decode_faces(data: bytes) -> tuple[DetectedFace, ...]:
         landmarks.setflags(write=False)
         found.append(DetectedFace(box, landmarks, float(face["confidence"]), gaze))
     return tuple(found)
-
-
-def _lens(of: Intrinsics, shown: ImageArray, stamp: int) -> dict[str, Any]:
-    """Return a lens as the camera matrix of its frame."""
-    fx, fy, cx, cy = of.fx_px, of.fy_px, of.cx_px, of.cy_px
-    return {
-        "timestamp": _stamp(stamp),
-        "frame_id": _FRAME,
-        "width": shown.shape[1],
-        "height": shown.shape[0],
-        "distortion_model": "plumb_bob",
-        "D": list(of.distortion),
-        "K": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-        "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        "P": [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-    }
 
 
 def _face(face: DetectedFace) -> dict[str, Any]:

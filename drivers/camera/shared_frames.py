@@ -44,7 +44,12 @@ class SlotWriter:
 
     def put(self, array: NDArray[Any]) -> SlotAddress:
         """Copy an array into the next slot."""
-        memory = self._room(array.nbytes)
+        if self._memory is None or array.nbytes > self._slot_bytes:
+            self.close()
+            self._slot_bytes = -(-array.nbytes // _STAMP_BYTES) * _STAMP_BYTES
+            size = _SLOTS * (self._slot_bytes + _STAMP_BYTES)
+            self._memory = SharedMemory(create=True, size=size)
+        memory = self._memory
         self._stamp += 2  # odd during a write
         slot = self._stamp // 2 % _SLOTS
         stamp, data = _views(memory, slot, self._slot_bytes)
@@ -61,15 +66,6 @@ class SlotWriter:
             self._memory.close()
             self._memory.unlink()
         self._memory = None
-
-    def _room(self, nbytes: int) -> SharedMemory:
-        """Return memory with slots of at least ``nbytes`` bytes."""
-        if self._memory is None or nbytes > self._slot_bytes:
-            self.close()
-            self._slot_bytes = -(-nbytes // _STAMP_BYTES) * _STAMP_BYTES
-            size = _SLOTS * (self._slot_bytes + _STAMP_BYTES)
-            self._memory = SharedMemory(create=True, size=size)
-        return self._memory
 
 
 class SlotReader:
@@ -88,23 +84,20 @@ class SlotReader:
     def take(self, where: SlotAddress) -> NDArray[Any] | None:
         """Return a read-only copy of an array; None if its slot was written again meanwhile."""
         with self._lock:
-            return self._taken(where)
-
-    def _taken(self, where: SlotAddress) -> NDArray[Any] | None:
-        if self._memory is None or self._memory.name != where.memory:
-            self.close()
-            try:
-                self._memory = SharedMemory(where.memory)
-            except FileNotFoundError:  # the writer now uses larger memory
+            if self._memory is None or self._memory.name != where.memory:
+                self.close()
+                try:
+                    self._memory = SharedMemory(where.memory)
+                except FileNotFoundError:  # the writer now uses larger memory
+                    return None
+            stamp, data = _views(self._memory, where.slot, where.slot_bytes)
+            dtype = np.dtype(where.dtype)
+            count = int(np.prod(where.shape)) * dtype.itemsize
+            array = data[:count].view(dtype).reshape(where.shape).copy()
+            if int(stamp[0]) != where.stamp:
                 return None
-        stamp, data = _views(self._memory, where.slot, where.slot_bytes)
-        dtype = np.dtype(where.dtype)
-        count = int(np.prod(where.shape)) * dtype.itemsize
-        array = data[:count].view(dtype).reshape(where.shape).copy()
-        if int(stamp[0]) != where.stamp:
-            return None
-        array.setflags(write=False)
-        return array
+            array.setflags(write=False)
+            return array
 
     def close(self) -> None:
         """Release the memory; safe to call twice."""

@@ -131,17 +131,13 @@ class CameraThread:
                 self.frames += 1
                 self.frames_with_face += bool(found.faces)
                 self._newest = found
-                self._apply_requests()
+                while self._requests:
+                    try:
+                        self._camera.retune(*self._requests.popleft())
+                    except SetupError as error:
+                        self._events.append(f"the detector is unchanged: {error}")
         except BaseException as failure:  # raised to the loop by latest()
             self._failure = failure
         finally:
             # Freed by the thread that reads it, never while a frame is fetched.
             self._camera.close()
-
-    def _apply_requests(self) -> None:
-        """Apply requests since the previous frame."""
-        while self._requests:
-            try:
-                self._camera.retune(*self._requests.popleft())
-            except SetupError as error:
-                self._events.append(f"the detector is unchanged: {error}")

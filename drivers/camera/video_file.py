@@ -135,7 +135,17 @@ class _Film:
         _check_forward(number, max(1, self._number))
         if self._seen is None or self._seen[0] != number:
             while self._number < number:
-                self._advance(number)
+                # Go to the next frame, from the end to the start, and skip whole repeats.
+                if not self._capture.grab():
+                    self._length, self._index = self._index, 0
+                    self._rewind()
+                    if not self._capture.grab():
+                        raise CameraError(
+                            f"{self._path} cannot be read any more: check that the file still exists"
+                        )
+                self._number, self._index = self._number + 1, self._index + 1
+                if self._length:
+                    self._number += (number - self._number) // self._length * self._length
             found, image = self._capture.retrieve()
             if not found:
                 raise CameraError(f"frame {self._index} of {self._path} is damaged: copy it again")
@@ -145,19 +155,6 @@ class _Film:
     def close(self) -> None:
         """Free the file."""
         self._capture.release()
-
-    def _advance(self, goal: int) -> None:
-        """Go to the next frame, from the end to the start, and skip whole repeats."""
-        if not self._capture.grab():
-            self._length, self._index = self._index, 0
-            self._rewind()
-            if not self._capture.grab():
-                raise CameraError(
-                    f"{self._path} cannot be read any more: check that the file still exists"
-                )
-        self._number, self._index = self._number + 1, self._index + 1
-        if self._length:
-            self._number += (goal - self._number) // self._length * self._length
 
     def _rewind(self) -> None:
         """Start again; reopening is exact, while seeking back may not be."""

@@ -77,7 +77,18 @@ class Webcam:
             CameraError: it is absent, not permitted, busy or delivers no frame.
         """
         self.close()
-        self._check_file()
+        # Reject a device file that is absent or not permitted; the message lists the others.
+        if not self._file.exists():
+            there = ", ".join(sorted(str(f) for f in self._file.parent.glob("video*")))
+            raise CameraError(
+                f"no camera at {self._file} (there is: {there or 'none'}): "
+                "plug it in or name another"
+            )
+        if not os.access(self._file, os.R_OK | os.W_OK):
+            raise CameraError(
+                f"{self._file} may not be opened: add yourself to the group video "
+                "(sudo usermod -aG video $USER) and log in again"
+            )
         with quiet_opencv():
             capture = self._open_capture(str(self._file))
             for what, value in self._wishes.items():
@@ -115,7 +126,8 @@ class Webcam:
             found, image = self._capture.retrieve()
             pixels = to_bgr(image) if found and image is not None else None
             if pixels is not None:
-                captured_s = self._stamp_s(self._capture, arrived_s)
+                stamp_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+                captured_s = stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s
                 away_s = 0.0 if self._left_s is None else came_s - self._left_s
                 self._report(self._rate.update(captured_s, away_s))
                 self._left_s = now_s()
@@ -140,20 +152,6 @@ class Webcam:
             self._capture.release()
         self._capture = None
 
-    def _check_file(self) -> None:
-        """Reject a device file that is absent or not permitted; the message lists the others."""
-        if not self._file.exists():
-            there = ", ".join(sorted(str(f) for f in self._file.parent.glob("video*")))
-            raise CameraError(
-                f"no camera at {self._file} (there is: {there or 'none'}): "
-                "plug it in or name another"
-            )
-        if not os.access(self._file, os.R_OK | os.W_OK):
-            raise CameraError(
-                f"{self._file} may not be opened: add yourself to the group video "
-                "(sudo usermod -aG video $USER) and log in again"
-            )
-
     def _report(self, line: str) -> None:
         """Store a line for ``events``."""
         if line and line not in self._told:
@@ -175,12 +173,6 @@ class Webcam:
             f"camera {self._file} uses {name} instead of {wanted} (webcam.format): large frames may "
             "come slowly"
         )
-
-    @staticmethod
-    def _stamp_s(capture: cv2.VideoCapture, arrived_s: float) -> float:
-        """Return the kernel's stamp of the last frame if it is on our clock."""
-        stamp_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        return stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s
 
 
 # From linux/v4l2-controls.h and videodev2.h.

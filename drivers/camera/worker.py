@@ -93,7 +93,14 @@ def run(
     slots = SlotWriter(), SlotWriter()
     try:
         while (found := camera.next(stop)) is not None:
-            pipe.send(_message(found, slots))
+            image, depth = found.image, found.depth_m
+            pipe.send(
+                DetectionMessage(
+                    replace(found, image=None, depth_m=None),
+                    slots[0].put(image) if image is not None else None,
+                    slots[1].put(depth) if depth is not None else None,
+                )
+            )
             _retune(camera, requests, pipe)
     except OSError:  # the parent has ended
         pass
@@ -103,16 +110,6 @@ def run(
         camera.close()
         for slot in slots:
             slot.close()
-
-
-def _message(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> DetectionMessage:
-    """Copy frame and depth into shared memory; return the message to send."""
-    image, depth = found.image, found.depth_m
-    return DetectionMessage(
-        replace(found, image=None, depth_m=None),
-        slots[0].put(image) if image is not None else None,
-        slots[1].put(depth) if depth is not None else None,
-    )
 
 
 def _receive_requests(pipe: Connection, stop: threading.Event, requests: deque[Retune]) -> None:

@@ -271,14 +271,7 @@ def _fit(register: DynamixelRegister, model: DynamixelModel) -> DynamixelRegiste
         return None
     if model.family == "x430" and name == "pwm_slope":
         return None
-    initial = _initials(model).get(name, register.initial)
-    low, high = _ranges(model).get(name, (register.low, register.high))
-    return register._replace(initial=initial, low=low, high=high)
-
-
-def _initials(model: DynamixelModel) -> dict[str, int | None]:
-    """Return the model-dependent initial values."""
-    return {
+    initial = {
         "model_number": model.number,
         "temperature_limit": model.temperature_limit,
         "max_voltage_limit": model.max_voltage,
@@ -288,20 +281,17 @@ def _initials(model: DynamixelModel) -> dict[str, int | None]:
         "pwm_slope": 255 if model.name.startswith("xc330-t") else 140,
         "shutdown": model.shutdown,
         **dict(zip(GAINS, model.gains, strict=True)),
-    }
-
-
-def _ranges(model: DynamixelModel) -> dict[str, tuple[int, int]]:
-    """Return the model-dependent ranges."""
+    }.get(name, register.initial)
     small = model.family == "x330"
-    return {
+    low, high = {
         "baud_rate": (0, 6 if small else 7),
         "protocol_type": (2, 22) if small else (1, 2),
         "max_voltage_limit": (_lowest_voltage(model), model.max_voltage),
         "min_voltage_limit": (_lowest_voltage(model), model.max_voltage),
         "current_limit": (0, model.current_limit or 0),
         "velocity_limit": (0, 2047 if small else 1023),
-    }
+    }.get(name, (register.low, register.high))
+    return register._replace(initial=initial, low=low, high=high)
 
 
 def _lowest_voltage(model: DynamixelModel) -> int:

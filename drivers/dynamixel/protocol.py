@@ -168,14 +168,13 @@ def bytes_missing(raw: bytes, count: int, length: int) -> int:
         return 0
     at = raw.rfind(HEADER, done)
     end = _end(raw, at) if at >= 0 else None
-    begun = len(raw) - at if at >= 0 else _begun_header(raw[done:])
+    begun = (
+        len(raw) - at
+        if at >= 0
+        else next((n for n in (3, 2, 1) if raw[done:].endswith(HEADER[:n])), 0)
+    )
     rest = nominal - begun if begun < STATUS_OVERHEAD else 0
     return (count - seen - 1) * nominal + (end - len(raw) if end is not None else rest)
-
-
-def _begun_header(tail: bytes) -> int:
-    """Return the number of bytes at the end that may be the first of a header."""
-    return next((n for n in (3, 2, 1) if tail.endswith(HEADER[:n])), 0)
 
 
 def _end(raw: bytes, at: int) -> int | None:

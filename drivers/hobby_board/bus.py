@@ -118,12 +118,16 @@ class HobbyBoardBus(PortBus):
             self._lose(lost)
             return self._nothing
         if not answered:
-            self._check_silence(now_s)
+            # If any byte arrives the board is present, and noise spoils its answers.
+            silent_s = min(self._silence.seconds(now_s), now_s - self._byte_s)
+            if silent_s >= self._board.timing.give_up_s:
+                raise BusLost(
+                    f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s: "
+                    "check its power and the cable"
+                )
             return self._nothing
-        return self._feedback(self._heard_s)
-
-    def _feedback(self, at_s: float) -> Feedback:
-        """Return the estimated positions of all servos; never measured."""
+        # All positions are estimated, none is measured.
+        at_s = self._heard_s
         channels, nothing, pending = self._channels, self._nothing, self._supervisor.pending
         position, velocity, on, faults = list[float](), list[float](), list[bool](), list[str]()
         rearmed, missing = [False] * len(channels), list[int]()
@@ -260,20 +264,6 @@ class HobbyBoardBus(PortBus):
         if self._board.line.rx_bytes != self._rx_bytes:
             self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
         return self._byte_s
-
-    def _check_silence(self, now_s: float) -> None:
-        """Raise if the board has not answered for too long.
-
-        Raises:
-            BusLost: no answer within the limit.
-        """
-        # If any byte arrives the board is present, and noise prevents its answers from being read.
-        silent_s = min(self._silence.seconds(now_s), now_s - self._byte_s)
-        if silent_s >= self._board.timing.give_up_s:
-            raise BusLost(
-                f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s: "
-                "check its power and the cable"
-            )
 
     # --- loss of the port
 

@@ -114,7 +114,20 @@ class BoardSupervisor:
         self.record_errors(found.errors, now_s)
         if self.engaged:
             self._unhandled = (*self._unhandled, *found.errors)
-            return self._service(channel, found.pulse_steps, now_s)
+            pulse = found.pulse_steps
+            odd = channel.held and channel.implausible(pulse, now_s)
+            if self._unhandled or not self.sure or odd:
+                if not self._check_all():
+                    return False
+            elif channel.held:
+                channel.confirmed(pulse)
+            if self.pending and now_s >= self._hold_at_s:
+                self._recover_next(now_s)
+            for one in self._channels:
+                if one.entering and one.inside():
+                    one.entering = False
+                    self._board.send_limits([one], confirmed=False)
+            return True
         channel.found(found.pulse_steps)
         self.sure = True
         return True
@@ -134,21 +147,6 @@ class BoardSupervisor:
             self._board.stop(off)  # noise may have begun their pulses
         if self.sure:
             self._board.lead([channel for channel in self._channels if channel.held])
-
-    def _service(self, channel: Channel, pulse: int, now_s: float) -> bool:
-        odd = channel.held and channel.implausible(pulse, now_s)
-        if self._unhandled or not self.sure or odd:
-            if not self._check_all():
-                return False
-        elif channel.held:
-            channel.confirmed(pulse)
-        if self.pending and now_s >= self._hold_at_s:
-            self._recover_next(now_s)
-        for one in self._channels:
-            if one.entering and one.inside():
-                one.entering = False
-                self._board.send_limits([one], confirmed=False)
-        return True
 
     def _check_all(self) -> bool:
         """Compare every channel's pulse with the expected one; return whether they were read."""

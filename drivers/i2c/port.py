@@ -116,7 +116,9 @@ class I2cPort:
             self._check_free(parts[0].address)
             self._bus.i2c_rdwr(*messages)
         except OSError as error:
-            if error.errno in _GONE or (self._bus.fd is not None and not self._is_there()):
+            if error.errno in _GONE or (
+                self._bus.fd is not None and not os.path.exists(self.port_name)
+            ):
                 raise self._lost(error) from error
             self._status = TIMED_OUT if error.errno in _STUCK else NO_ACKNOWLEDGE
             return
@@ -143,9 +145,6 @@ class I2cPort:
                 ) from error
             raise
         self._checked.add(address)
-
-    def _is_there(self) -> bool:
-        return os.path.exists(self.port_name)
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` available bytes; if there are none, wait until the deadline.

@@ -132,7 +132,23 @@ class Pca9685Board:
         if (mode1, mode2, prescale) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale):
             return True
         if mode1 & SILENT or prescale != self._clocks[address].prescale:
-            return self._set_up(address)
+            # Set a board up from any state: no pulses, sleep, prescaler, then wake.
+            mine = [servo_id for servo_id in self._sent if self._places[servo_id][0] == address]
+            for servo_id in mine:
+                del self._sent[servo_id]
+            asleep = self.line.write_confirmed(
+                bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))),
+                bridge.write(address, MODE1, bytes((SLEEP | AUTO_INCREMENT,))),
+                bridge.write(address, PRESCALE, bytes((self._clocks[address].prescale,))),
+                bridge.write(address, MODE2, bytes((TOTEM_POLE,))),
+                bridge.write(address, MODE1, bytes((AWAKE,))),
+            )
+            if not asleep:
+                return False
+            self.line.wait(self.line.port.now_s() + START_S)
+            # Channels that slept with pulses on would resume here; there are none now.
+            self.line.write_confirmed(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
+            return self._modes(address) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale)
         return self.line.write_confirmed(
             bridge.write(address, MODE1, bytes((AWAKE,))),
             bridge.write(address, MODE2, bytes((TOTEM_POLE,))),
@@ -157,29 +173,6 @@ class Pca9685Board:
             self._sent.clear()
             self.line.send(bridge.write_all(SOFTWARE_RESET))
         return mode1, mode2, prescale
-
-    def _set_up(self, address: int) -> bool:
-        """Set a board up from any state: no pulses, sleep, prescaler, then wake."""
-        self._forget(address)
-        asleep = self.line.write_confirmed(
-            bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))),
-            bridge.write(address, MODE1, bytes((SLEEP | AUTO_INCREMENT,))),
-            bridge.write(address, PRESCALE, bytes((self._clocks[address].prescale,))),
-            bridge.write(address, MODE2, bytes((TOTEM_POLE,))),
-            bridge.write(address, MODE1, bytes((AWAKE,))),
-        )
-        if not asleep:
-            return False
-        self.line.wait(self.line.port.now_s() + START_S)
-        # Channels that slept with pulses on would resume here; there are none now.
-        self.line.write_confirmed(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
-        return self._modes(address) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale)
-
-    def _forget(self, address: int) -> None:
-        """Discard the record of pulses sent to a board."""
-        mine = [servo_id for servo_id in self._sent if self._places[servo_id][0] == address]
-        for servo_id in mine:
-            del self._sent[servo_id]
 
     # --- status
 

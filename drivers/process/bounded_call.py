@@ -202,8 +202,11 @@ class BoundedCall:
         while thread.is_alive():
             # Never after the thread has ended: another one may have its number.
             with self._leaving:
-                if not self._left:
-                    _raise_in(thread)
+                if not self._left and thread.ident is not None:
+                    # Raised in the thread once it runs Python code again.
+                    ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                        ctypes.c_ulong(thread.ident), ctypes.py_object(CallEnded)
+                    )
             thread.join(wait_s)
             wait_s = min(2.0 * wait_s, _LONGEST_END_S)
         OVERDUE_SOURCES.discard(self)
@@ -221,14 +224,6 @@ class BoundedCall:
 
 def _do_nothing() -> None:
     """Do nothing; used to wait for all earlier calls."""
-
-
-def _raise_in(thread: threading.Thread) -> None:
-    """Raise ``CallEnded`` in a thread once it runs Python code again."""
-    if thread.ident is not None:
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(
-            ctypes.c_ulong(thread.ident), ctypes.py_object(CallEnded)
-        )
 
 
 def _outcome(

@@ -103,12 +103,8 @@ def access(device: str) -> Access:
 
         entry = grp.getgrgid(found.st_gid)
         group, members = entry.gr_name, entry.gr_mem
-    joined = found.st_gid in os.getgroups() or _user() in members
+    joined = found.st_gid in os.getgroups() or os.environ.get("USER", "") in members
     return Access(True, stat.S_ISCHR(found.st_mode), allowed, group, joined)
-
-
-def _user() -> str:
-    return os.environ.get("USER", "")
 
 
 def port_users(device: str, host: Host | None = None) -> tuple[str, ...]:

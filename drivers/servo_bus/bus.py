@@ -165,15 +165,6 @@ class SmartServoBus(PortBus):
             answered,
         )
 
-    def _disturbed(self, now_s: float) -> bool:
-        """Return whether answers were damaged recently."""
-        places = self._feedback.places
-        damaged = self._line.errors.get("corrupt", 0)
-        if damaged != self._damaged or self._reader.stray_s == now_s:
-            self._damaged = damaged
-            places.record_damaged(now_s)
-        return places.is_disturbed(now_s)
-
     def _confirm_doubtful(
         self, replies: dict[int, ServoReply], now_s: float
     ) -> dict[int, ServoReply]:
@@ -182,7 +173,13 @@ class SmartServoBus(PortBus):
         Raises:
             BusLost: the port is lost.
         """
-        disturbed = self._disturbed(now_s)
+        # Whether answers were damaged recently.
+        places = self._feedback.places
+        damaged = self._line.errors.get("corrupt", 0)
+        if damaged != self._damaged or self._reader.stray_s == now_s:
+            self._damaged = damaged
+            places.record_damaged(now_s)
+        disturbed = places.is_disturbed(now_s)
         doubtful = [i for i in replies if disturbed or self._reader.is_reply_pending(i, now_s)]
         again = self._reader.reread(doubtful) if doubtful else {}
         kept = {i: one for i, one in replies.items() if i not in doubtful}
@@ -283,7 +280,12 @@ class SmartServoBus(PortBus):
             self._lose(lost)
             return self._nothing
         if self._poll_list.troubled:
-            self._check_silence(now_s)
+            silent_s = self._health.silent_for_s(now_s)
+            if silent_s >= self._params.give_up_s:
+                raise BusLost(
+                    f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
+                    "check servo power and the cable"
+                )
         return feedback.now
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -381,19 +383,6 @@ class SmartServoBus(PortBus):
             f"{self._port.port_name} is gone: torque could not be switched off; servos that have "
             f"power keep their torque, {rest}: {CUT} to free them"
         )
-
-    def _check_silence(self, now_s: float) -> None:
-        """Raise if no servo has answered for too long.
-
-        Raises:
-            BusLost: no answer within the limit.
-        """
-        silent_s = self._health.silent_for_s(now_s)
-        if silent_s >= self._params.give_up_s:
-            raise BusLost(
-                f"{self._port.port_name}: no servo has answered for {silent_s:.1f} s: "
-                "check servo power and the cable"
-            )
 
     def _reset_after_reconnect(self) -> None:
         """Reset the state after the port reconnects."""

@@ -140,7 +140,12 @@ class FeedbackColumns:
         if not self._engaged and 0 in position and group.covers_torque:
             return False
         if self._turn and (min(position) < self._near_low or max(position) > self._near_high):
-            position = self._all_near(position)
+            position = tuple(
+                [
+                    nearest_turn(p, low, high, self._turn)
+                    for p, (low, high) in zip(position, self._ranges, strict=True)
+                ]
+            )
         warm, volts = now.temperature_c, now.voltage_v
         if at_temperature is not None and (celsius := values[at_temperature]) != warm:
             if max(celsius) > MOST_CELSIUS:
@@ -164,15 +169,6 @@ class FeedbackColumns:
             ),
         )  # fmt: skip
         return True
-
-    def _all_near(self, position: tuple[int, ...]) -> tuple[int, ...]:
-        """Return positions with whole turns added, so that they are nearest to their ranges."""
-        return tuple(
-            [
-                nearest_turn(p, low, high, self._turn)
-                for p, (low, high) in zip(position, self._ranges, strict=True)
-            ]
-        )
 
     # --- answers servo by servo
 

@@ -87,13 +87,6 @@ class LatchedFaultSupervisor(Supervisor):
         Raises:
             BusLost: the port is lost.
         """
-        self._do_due(group, now_s)
-        if self.entering.places:
-            self._mark_entering(now_s)
-        if self._rearmed:
-            self._mark_rearmed()
-
-    def _do_due(self, group: Collection[int], now_s: float) -> None:
         covered = self._plan.covered
         if self._suspects and now_s >= self._recover_at_s:
             self._recover(group, now_s)
@@ -114,6 +107,10 @@ class LatchedFaultSupervisor(Supervisor):
             self._check_at_s if self.engaged else inf,
             inf if covered else self._slow_at_s,
         )
+        if self.entering.places:
+            self._mark_entering(now_s)
+        if self._rearmed:
+            self._mark_rearmed()
 
     def _find_alerts(self, ids: Sequence[int]) -> None:
         """Read the latched errors of servos."""

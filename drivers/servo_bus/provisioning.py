@@ -71,7 +71,19 @@ class Provisioning:
                 self._correct(self.differences(ids))
             self._raise_differences(self.differences(ids))
         if self._block is not None:
-            self._write_addresses(ids, self._block)
+            # Write the indirect addresses that differ.
+            block = self._block
+            for servo_id, data in self._addresses(ids, block).items():
+                if data != block.data:
+                    self._registers.write_bytes(servo_id, block.address, block.data)
+                    self._log.add(f"{self._setups[servo_id].label()}: Indirect Addresses set")
+            found = self._addresses(ids, block)
+            bad = [self._setups[i].label() for i, data in found.items() if data != block.data]
+            if bad:
+                raise ServoMissing(
+                    f"{self._where}: {', '.join(bad)} does not take the indirect addresses: restart "
+                    "the servo power, or set indirect_block: false"
+                )
 
     def disable(self, ids: Sequence[int]) -> None:
         """Make servos answer every instruction, and switch torque and bus watchdog off.
@@ -154,20 +166,6 @@ class Provisioning:
         if not written and not self._registers.refusal:
             self._raise_missing((servo_id,), {}, name)
         return written
-
-    def _write_addresses(self, ids: Sequence[int], block: AddressMap) -> None:
-        """Write the indirect addresses that differ."""
-        for servo_id, data in self._addresses(ids, block).items():
-            if data != block.data:
-                self._registers.write_bytes(servo_id, block.address, block.data)
-                self._log.add(f"{self._setups[servo_id].label()}: Indirect Addresses set")
-        found = self._addresses(ids, block)
-        bad = [self._setups[i].label() for i, data in found.items() if data != block.data]
-        if bad:
-            raise ServoMissing(
-                f"{self._where}: {', '.join(bad)} does not take the indirect addresses: restart "
-                "the servo power, or set indirect_block: false"
-            )
 
     def _addresses(self, ids: Sequence[int], block: AddressMap) -> dict[int, bytes]:
         found = self._line.ask_bytes(ids, block.address, len(block.data))

@@ -217,27 +217,24 @@ class WholeAnswer:
                 if nothing has changed.
         """
         if expected is not self._expected:
-            self._expect(expected)
+            # Set the expected values of known fields; a status is always 0.
+            self._expected = expected
+            order, expected = self._window.order, {"status": (0,) * len(self._heads), **expected}
+            mask, known = [b"\xff" * len(self._front)], [self._front]
+            for k, head in enumerate(self._heads):
+                mask.append(b"\xff" * len(head))
+                known.append(head)
+                for code, name in (*self._window.codes(), (self._check, "")):
+                    value = expected[name][k] if name in expected else None
+                    size = struct.calcsize(order + code)
+                    mask.append((b"\x00" if value is None else b"\xff") * size)
+                    known.append(bytes(size) if value is None else struct.pack(order + code, value))
+            self._mask = int.from_bytes(b"".join(mask), "little")
+            self._known = int.from_bytes(b"".join(known), "little")
         if len(raw) != self.length or int.from_bytes(raw, "little") & self._mask != self._known:
             return None
         values = self._unpack(raw)
         return values if self._intact(self._parts(raw), values[self._checks]) else None
-
-    def _expect(self, expected: Expected) -> None:
-        """Set the expected values of known fields; a status is always 0."""
-        self._expected = expected
-        order, expected = self._window.order, {"status": (0,) * len(self._heads), **expected}
-        mask, known = [b"\xff" * len(self._front)], [self._front]
-        for k, head in enumerate(self._heads):
-            mask.append(b"\xff" * len(head))
-            known.append(head)
-            for code, name in (*self._window.codes(), (self._check, "")):
-                value = expected[name][k] if name in expected else None
-                size = struct.calcsize(order + code)
-                mask.append((b"\x00" if value is None else b"\xff") * size)
-                known.append(bytes(size) if value is None else struct.pack(order + code, value))
-        self._mask = int.from_bytes(b"".join(mask), "little")
-        self._known = int.from_bytes(b"".join(known), "little")
 
 
 class AddressMap(NamedTuple):

@@ -67,7 +67,38 @@ class Recovery:
         # Other servos are waiting: failures are tried again later, not immediately.
         before, self._line.tries = self._line.tries, 1
         try:
-            return self._recover(ids, engaged, now_s)
+            line, health = self._line, self._health
+            line.write_all(ids, "status_return_level", [self._family.answer_level] * len(ids))
+            torque = line.ask(ids, "torque_enable")
+            if not torque:
+                return None
+            whole = self._without_faults(
+                self._same_models(tuple(torque)), torque if engaged else {}
+            )
+            try:
+                self._provisioning.apply(whole)
+                well = tuple(
+                    i for i in whole if torque[i] or not engaged or not health.exhausted(i, now_s)
+                )
+                if engaged:
+                    well = self._release_lost(well)
+                    self.enable(well)
+                found = dict(zip(well, read_positions(line, well), strict=True))
+            except ServoMissing:
+                return None
+            except ServoFault as fault:
+                switch_off(line, whole)
+                if self._last_reported != str(fault):
+                    self._last_reported = str(fault)
+                    self._log.add(self._last_reported)
+                return None
+            for servo_id in well:
+                if self._family.faults_latch:
+                    health.record_cleared(servo_id)
+                if engaged and not torque[servo_id]:
+                    line.errors["restarted"] += 1
+                    health.record_restarted(servo_id, now_s)
+            return found
         finally:
             self._line.tries = before
 
@@ -81,38 +112,6 @@ class Recovery:
             return bool(self._provisioning.differences((servo_id,)))
         except ServoMissing:
             return False
-
-    def _recover(self, ids: Sequence[int], engaged: bool, now_s: float) -> dict[int, int] | None:
-        line, health = self._line, self._health
-        line.write_all(ids, "status_return_level", [self._family.answer_level] * len(ids))
-        torque = line.ask(ids, "torque_enable")
-        if not torque:
-            return None
-        whole = self._without_faults(self._same_models(tuple(torque)), torque if engaged else {})
-        try:
-            self._provisioning.apply(whole)
-            well = tuple(
-                i for i in whole if torque[i] or not engaged or not health.exhausted(i, now_s)
-            )
-            if engaged:
-                well = self._release_lost(well)
-                self.enable(well)
-            found = dict(zip(well, read_positions(line, well), strict=True))
-        except ServoMissing:
-            return None
-        except ServoFault as fault:
-            switch_off(line, whole)
-            if self._last_reported != str(fault):
-                self._last_reported = str(fault)
-                self._log.add(self._last_reported)
-            return None
-        for servo_id in well:
-            if self._family.faults_latch:
-                health.record_cleared(servo_id)
-            if engaged and not torque[servo_id]:
-                line.errors["restarted"] += 1
-                health.record_restarted(servo_id, now_s)
-        return found
 
     def _same_models(self, ids: tuple[int, ...]) -> tuple[int, ...]:
         """Return the servos whose model has not changed."""
@@ -188,7 +187,14 @@ class Recovery:
             write_verified(line, ids, "bus_watchdog", [0] * len(ids))
         present = read_positions(line, ids)
         if family.single_turn:
-            self._check_none_lost(ids, present)
+            # Check that no servo would move into its range in the wrong direction.
+            for servo_id, steps in zip(ids, present, strict=True):
+                if self.is_lost(servo_id, steps):
+                    low, high = self._setups[servo_id].min_steps, self._setups[servo_id].max_steps
+                    raise ServoFault(
+                        f"{self._line.label(servo_id)} is at {steps}, beyond its encoder's zero, and "
+                        f"would go the long way round into {low}..{high}: turn it into that range by hand"
+                    )
         goals = [self.clip(i, p) for i, p in zip(ids, present, strict=True)]
         outside = {i for i, p, g in zip(ids, present, goals, strict=True) if p != g}
         speeds = self.speeds(ids, outside)
@@ -198,20 +204,6 @@ class Recovery:
         if family.watchdog_unit_s is not None:
             write_verified(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
         return tuple(goals), outside
-
-    def _check_none_lost(self, ids: Sequence[int], present: Sequence[int]) -> None:
-        """Check that no servo would move into its range in the wrong direction.
-
-        Raises:
-            ServoFault: one would.
-        """
-        for servo_id, steps in zip(ids, present, strict=True):
-            if self.is_lost(servo_id, steps):
-                low, high = self._setups[servo_id].min_steps, self._setups[servo_id].max_steps
-                raise ServoFault(
-                    f"{self._line.label(servo_id)} is at {steps}, beyond its encoder's zero, and "
-                    f"would go the long way round into {low}..{high}: turn it into that range by hand"
-                )
 
     def _accelerations(self, ids: Sequence[int]) -> list[int]:
         units = self._family.acceleration_units

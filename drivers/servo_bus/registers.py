@@ -114,7 +114,12 @@ class Registers:
     ) -> Status | None:
         """Send a request until a good answer arrives; ``insist``: also after a refusal."""
         for _ in range(self._tries):
-            self._wait_for_late_replies(servo_id)
+            # No answer to an earlier request may arrive any more, as it does not contain the
+            # address of its register.
+            until_s = self._late_until_s.pop(servo_id, None)
+            if until_s is not None:
+                while self._port.read_until(ROOM, until_s):
+                    pass
             self._port.clearPort()
             self.refusal = 0
             _, status = transact(self._port, self._family, request, length, REPLY_S, servo_id)
@@ -129,16 +134,6 @@ class Registers:
             if not insist:
                 return None
         return None
-
-    def _wait_for_late_replies(self, servo_id: int) -> None:
-        """Wait until no answer to an earlier request can arrive any more.
-
-        An answer does not contain the address of its register.
-        """
-        until_s = self._late_until_s.pop(servo_id, None)
-        if until_s is not None:
-            while self._port.read_until(ROOM, until_s):
-                pass
 
 
 def group_adjacent(family: Family, names: Iterable[str]) -> list[list[Register]]:

@@ -302,7 +302,11 @@ class Transactions:
         codec = self.family.codec
         self.port.clearPort()
         self.send(self.family.request(ids, address, length))
-        deadline_s = self._reply_deadline_s(len(ids) * (length + codec.STATUS_OVERHEAD))
+        # In the loop other servos wait, and the delay of answers has been measured.
+        answer_bytes = len(ids) * (length + codec.STATUS_OVERHEAD)
+        hurried_s = min(self.most_s, HURRIED * self.timeout.seconds)
+        timeout_s = self.most_s if self.tries > 1 else hurried_s
+        deadline_s = self._free_s + answer_bytes * self._byte_s + timeout_s
         found: dict[int, bytes] = {}
         refused: set[int] = set()
 
@@ -322,12 +326,3 @@ class Transactions:
         if len(found) < len(ids):
             self.drain()
         return found
-
-    def _reply_deadline_s(self, answer_bytes: int) -> float:
-        """Return the deadline of an answer to the last request, seconds.
-
-        In the loop other servos wait, and the delay of answers has been measured.
-        """
-        hurried_s = min(self.most_s, HURRIED * self.timeout.seconds)
-        timeout_s = self.most_s if self.tries > 1 else hurried_s
-        return self._free_s + answer_bytes * self._byte_s + timeout_s

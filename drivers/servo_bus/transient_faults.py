@@ -80,13 +80,34 @@ class TransientFaultSupervisor(Supervisor):
         confirmed = error & self._last_errors.get(servo_id, 0)
         self._last_errors[servo_id] = error
         if confirmed or servo_id in self._seen_s:
-            self._record_bits(servo_id, confirmed, now_s)
+            seen_s = self._seen_s.setdefault(servo_id, {})
+            before = self._bits(servo_id)
+            for bit in range(8):
+                if confirmed >> bit & 1:
+                    seen_s[1 << bit] = now_s
+            for bit in [b for b, at_s in seen_s.items() if now_s - at_s >= GONE_S]:
+                del seen_s[bit]
+            now = self._bits(servo_id)
+            if now != before:
+                self._name_bits(servo_id, now)
+            if not seen_s:
+                del self._seen_s[servo_id]
         if not self.engaged:
             return
-        if self._health.faults.get(servo_id) == FAR_SIDE:
-            self._check_far_side(servo_id, sample.position)
+        far = self._health.faults.get(servo_id) == FAR_SIDE
+        if far and not self._recovery.is_lost(servo_id, sample.position):
+            # The joint was turned back into its range by hand.
+            self._health.latches.add(servo_id)
+            self._health.record_cleared(servo_id)
+            self._name_fault(servo_id)
+            self._suspects.add(servo_id)
         if sample.torque is not None:
-            self._check_torque(servo_id, sample)
+            # A servo that seems no longer armed is read once more.
+            if sample.torque == 1 and self._is_armed(servo_id, sample):
+                self._torque_off.discard(servo_id)
+                self._doubted.discard(servo_id)
+            elif servo_id not in self._torque_off or not self._has_known_reason(servo_id):
+                self._doubted.add(servo_id)
 
     def record_out(self, out: Collection[int], now_s: float) -> None:
         """Record the servos out of the group; those that return later may have restarted."""
@@ -96,21 +117,6 @@ class TransientFaultSupervisor(Supervisor):
                 self._suspects.add(servo_id)
         for servo_id in out:
             self._out_since_s.setdefault(servo_id, now_s)
-
-    def _record_bits(self, servo_id: int, error: int, now_s: float) -> None:
-        """Report faults as they come and go."""
-        seen_s = self._seen_s.setdefault(servo_id, {})
-        before = self._bits(servo_id)
-        for bit in range(8):
-            if error >> bit & 1:
-                seen_s[1 << bit] = now_s
-        for bit in [b for b, at_s in seen_s.items() if now_s - at_s >= GONE_S]:
-            del seen_s[bit]
-        now = self._bits(servo_id)
-        if now != before:
-            self._name_bits(servo_id, now)
-        if not seen_s:
-            del self._seen_s[servo_id]
 
     def _bits(self, servo_id: int) -> int:
         return sum(self._seen_s.get(servo_id, ()))
@@ -126,22 +132,6 @@ class TransientFaultSupervisor(Supervisor):
         else:
             health.record_cleared(servo_id)
         self._name_fault(servo_id)
-
-    def _check_far_side(self, servo_id: int, steps: int) -> None:
-        """Check whether a joint was turned back into its range by hand."""
-        if not self._recovery.is_lost(servo_id, steps):
-            self._health.latches.add(servo_id)
-            self._health.record_cleared(servo_id)
-            self._name_fault(servo_id)
-            self._suspects.add(servo_id)
-
-    def _check_torque(self, servo_id: int, sample: Sample) -> None:
-        """Mark a servo that seems no longer armed, to be read once more."""
-        if sample.torque == 1 and self._is_armed(servo_id, sample):
-            self._torque_off.discard(servo_id)
-            self._doubted.discard(servo_id)
-        elif servo_id not in self._torque_off or not self._has_known_reason(servo_id):
-            self._doubted.add(servo_id)
 
     def _is_armed(self, servo_id: int, sample: Sample) -> bool:
         """Return whether speed and torque limits are as they were written."""

@@ -37,21 +37,17 @@ class CutDetector:
         Args:
             image: Image (h, w) or (h, w, channels), uint8, of any size.
         """
-        now = _small(image)
+        step = max(1, min(image.shape[0], image.shape[1]) // _SAMPLED_PX)
+        green = image[::step, ::step, 1] if image.ndim == 3 else image[::step, ::step]
+        size = (WIDTH, HEIGHT)
+        small = cv2.resize(np.ascontiguousarray(green), size, interpolation=cv2.INTER_AREA)
+        now = np.asarray(small, np.float32)
         if now.std() < _LEAST_CONTRAST:
             return self._scene  # later images are compared with the last one that showed something
         before, self._before = self._before, now
         if before is not None and _is_cut(before, now):
             self._scene += 1
         return self._scene
-
-
-def _small(image: NDArray[Any]) -> NDArray[np.float32]:
-    step = max(1, min(image.shape[0], image.shape[1]) // _SAMPLED_PX)
-    green = image[::step, ::step, 1] if image.ndim == 3 else image[::step, ::step]
-    size = (WIDTH, HEIGHT)
-    small = cv2.resize(np.ascontiguousarray(green), size, interpolation=cv2.INTER_AREA)
-    return np.asarray(small, np.float32)
 
 
 def _is_cut(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:

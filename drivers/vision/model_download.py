@@ -48,37 +48,36 @@ def fetch(
         name = address.rpartition("/")[2]
         source = address if folder is None else (folder / name).absolute().as_uri()
         try:
-            content = _download(source, members[0].archive_bytes, name, now_s, progress)
-            found = [(file, _extract(content, file)) for file in members]
+            size_bytes = members[0].archive_bytes
+            end_s, content = now_s() + _LONGEST_S, bytearray()
+            request = Request(source, headers={"User-Agent": "gazerig"})
+            with urlopen(request, timeout=_STALLED_S) as reply:
+                while chunk := reply.read(_CHUNK_BYTES):
+                    content += chunk
+                    if len(content) > size_bytes:
+                        raise ValueError(f"it has more than the {size_bytes} bytes expected")
+                    if now_s() > end_s:
+                        raise TimeoutError(f"it takes longer than {_LONGEST_S:.0f} s")
+                    progress(name, len(content) / size_bytes)
+            if len(content) < size_bytes:
+                raise ValueError(f"it ends after {len(content)} of {size_bytes} bytes")
+            found = [(file, _extract(bytes(content), file)) for file in members]
         except (OSError, ValueError, HTTPException, zipfile.BadZipFile) as error:
-            raise ModelFileError(_by_hand(members, source, error)) from error
+            reason = error.reason if isinstance(error, URLError) else error
+            why = getattr(reason, "strerror", None) or str(reason) or type(reason).__name__
+            first = members[0]
+            where = (
+                f"download it elsewhere and run 'gazerig models fetch {first.name} --from FOLDER'"
+                if first.member
+                else f"put the file into {models_folder()}"
+            )
+            raise ModelFileError(
+                f"cannot get {first.name} from {source} ({' '.join(why.split())}). Without it "
+                f"everything else runs. By hand: {where}; it is {first.address}"
+            ) from error
         for file, data in found:
             write_file(file.path, data, force=True)
     return wanted
-
-
-def _download(
-    address: str, size_bytes: int, name: str, now_s: Callable[[], float], progress: Progress
-) -> bytes:
-    """Return the content of an address.
-
-    Raises:
-        OSError: it cannot be read, or takes too long.
-        ValueError: its size is not the expected one.
-    """
-    end_s, content = now_s() + _LONGEST_S, bytearray()
-    request = Request(address, headers={"User-Agent": "gazerig"})
-    with urlopen(request, timeout=_STALLED_S) as reply:
-        while chunk := reply.read(_CHUNK_BYTES):
-            content += chunk
-            if len(content) > size_bytes:
-                raise ValueError(f"it has more than the {size_bytes} bytes expected")
-            if now_s() > end_s:
-                raise TimeoutError(f"it takes longer than {_LONGEST_S:.0f} s")
-            progress(name, len(content) / size_bytes)
-    if len(content) < size_bytes:
-        raise ValueError(f"it ends after {len(content)} of {size_bytes} bytes")
-    return bytes(content)
 
 
 def _extract(content: bytes, file: ModelFile) -> bytes:
@@ -100,19 +99,3 @@ def _extract(content: bytes, file: ModelFile) -> bytes:
     if not file.is_content(content):
         raise ValueError("its content is not the known one (sha256 differs)")
     return content
-
-
-def _by_hand(files: list[ModelFile], source: str, error: Exception) -> str:
-    """Return why a download failed, and how to get the files by hand."""
-    reason = error.reason if isinstance(error, URLError) else error
-    why = getattr(reason, "strerror", None) or str(reason) or type(reason).__name__
-    first = files[0]
-    where = (
-        f"download it elsewhere and run 'gazerig models fetch {first.name} --from FOLDER'"
-        if first.member
-        else f"put the file into {models_folder()}"
-    )
-    return (
-        f"cannot get {first.name} from {source} ({' '.join(why.split())}). Without it everything "
-        f"else runs. By hand: {where}; it is {first.address}"
-    )

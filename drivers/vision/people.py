@@ -91,10 +91,6 @@ class PeopleDetector:
         self._next = (self._next + 1) % len(squares)
         if self._next == 0:
             self._due_s = self._started_s + 1.0 / self._params.people_hz
-        return self._in_square(frame, square)
-
-    def _in_square(self, frame: ImageArray, square: _Square) -> tuple[DetectedPerson, ...]:
-        """Return the people in a square, the most confident first."""
         box = np.array([square.left, 0.0, square.left + square.side, square.side])
         part, where = crop_square(frame, box, _SIDE_PX)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)

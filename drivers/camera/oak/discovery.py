@@ -5,7 +5,6 @@ half a second.
 """
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +34,11 @@ def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices"
         if not wanted or wanted in (info.deviceId, info.name):
             _check_rights(dai, info)
             return info
-    everything = _all_connected(dai)
+    everything = list(
+        dai.XLinkConnection.getAllConnectedDevices(
+            dai.XLinkDeviceState.X_LINK_ANY_STATE, skipInvalidDevices=False
+        )
+    )
     for info in everything:
         if not wanted or wanted in (info.deviceId, info.name):
             _check_rights(dai, info)
@@ -60,15 +63,6 @@ def _check_rights(dai: Any, info: Any) -> None:
     """Reject a camera without permission."""
     if info.status == dai.XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS:
         raise CameraError(_RIGHTS)
-
-
-def _all_connected(dai: Any) -> Sequence[Any]:
-    """Return all cameras, including those in use and those without permission."""
-    return list(
-        dai.XLinkConnection.getAllConnectedDevices(
-            dai.XLinkDeviceState.X_LINK_ANY_STATE, skipInvalidDevices=False
-        )
-    )
 
 
 def _name(info: Any) -> str:

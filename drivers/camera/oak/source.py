@@ -91,7 +91,11 @@ class OakSource:
         self._calibration = None
         try:
             if self._on_device:
-                self._device = self._connect()
+                info = find_oak(self._dai, self._params.device)
+                device = self._dai.Device(info)
+                # This program itself reopens a lost camera and reports it.
+                device.setMaxReconnectionAttempts(0)
+                self._device = device
                 self._prepare()
                 self._pipeline = self._dai.Pipeline(self._device)
             else:
@@ -155,7 +159,18 @@ class OakSource:
             raise CameraError("the OAK camera is not open: call open() before taking")
         began_s = now_s()
         while not stop.is_set():
-            group = self._next_group()
+            # The newest group of messages; none after a short wait.
+            try:
+                group = self._queue.tryGet()
+                self._waited = group is None
+                if group is None:
+                    group = self._queue.get(_SLICE)
+                while group is not None and (newer := self._queue.tryGet()) is not None:
+                    group = newer
+            except (RuntimeError, self._dai.MessageQueue.QueueException) as error:
+                raise CameraError(
+                    f"the OAK camera was lost ({_line(error)}): check its cable and power supply"
+                ) from error
             arrived_s = now_s()
             if group is not None and (shot := self._shot(group, arrived_s)) is not None:
                 return shot
@@ -199,14 +214,6 @@ class OakSource:
         """Close a camera that was not closed: the SDK's own destructor would wait forever."""
         self.close()
 
-    def _connect(self) -> Any:
-        """Open the device."""
-        info = find_oak(self._dai, self._params.device)
-        device = self._dai.Device(info)
-        # This program itself reopens a lost camera and reports it.
-        device.setMaxReconnectionAttempts(0)
-        return device
-
     def _prepare(self) -> None:
         """Check the device's features and USB speed; switch its dot projector on.
 
@@ -230,21 +237,6 @@ class OakSource:
             self._slow_line = FrameRateMonitor("the OAK camera", self._asked.rate_hz)
         if self._params.dot_projector > 0.0:
             self._device.setIrLaserDotProjectorIntensity(self._params.dot_projector)
-
-    def _next_group(self) -> Any:
-        """Return the newest group of messages, None after a short wait without any."""
-        try:
-            group = self._queue.tryGet()
-            self._waited = group is None
-            if group is None:
-                group = self._queue.get(_SLICE)
-            while group is not None and (newer := self._queue.tryGet()) is not None:
-                group = newer
-        except (RuntimeError, self._dai.MessageQueue.QueueException) as error:
-            raise CameraError(
-                f"the OAK camera was lost ({_line(error)}): check its cable and power supply"
-            ) from error
-        return group
 
     def _shot(self, group: Any, arrived_s: float) -> Shot | None:
         """Convert a group of messages to a frame."""

@@ -170,7 +170,18 @@ class AutoDetector:
         soon = len(known) < len(self._known) or self._is_cut(frame)
         if first or self._search_due(soon, not known):
             self._since_search = 0
-            known += self._search_frame(frame, known, first)
+            prepared = prepare(frame, self._params.work_width_px)
+            assert prepared is not None
+            self._searches += 1
+            found: list[_KnownFace] = []
+            if self._yunet is not None:
+                found += self._search_frame_by_yunet(self._yunet, prepared, known)
+            if self._yunet is None or first or self._searches % _BOTH_EVERY == 0:
+                boxes = propose_faces(self._networks, prepared, self._params.min_face_px)
+                boxes = self._networks.refine(frame, boxes[_is_new(boxes, [*known, *found])])
+                least = self._params.min_confidence
+                found += self._accept(frame, [*known, *found], boxes, least)
+            known += found
         else:
             known += self._search_tile(frame, known, self._tile(frame))
         if first:
@@ -221,7 +232,10 @@ class AutoDetector:
                 around = None if one.by_yunet else self._around(frame, one)
                 judged[row] = around or self._by_yunet(frame, one)
             else:
-                judged[row] = _predict(now, one)
+                # The search box is predicted by the motion between frames: the network places a
+                # face that is off the centre of its box too near to that centre.
+                moved = (now.face.landmarks_px - one.face.landmarks_px).mean(axis=0)
+                judged[row] = now._replace(box=now.box + np.tile(moved, 2))
         return _distinct([one for one in judged if one is not None], [])
 
     def _score(self, frame: ImageArray, boxes: Floats, least: float) -> list[_KnownFace | None]:
@@ -255,23 +269,6 @@ class AutoDetector:
         row[:2] += where[:2]
         row[4:14] += np.tile(where[:2], 5)
         return _KnownFace(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
-
-    def _search_frame(
-        self, frame: ImageArray, known: list[_KnownFace], first: bool
-    ) -> list[_KnownFace]:
-        """Search the whole frame; return the new faces."""
-        prepared = prepare(frame, self._params.work_width_px)
-        assert prepared is not None
-        self._searches += 1
-        found: list[_KnownFace] = []
-        if self._yunet is not None:
-            found += self._search_frame_by_yunet(self._yunet, prepared, known)
-        if self._yunet is None or first or self._searches % _BOTH_EVERY == 0:
-            boxes = propose_faces(self._networks, prepared, self._params.min_face_px)
-            boxes = self._networks.refine(frame, boxes[_is_new(boxes, [*known, *found])])
-            least = self._params.min_confidence
-            found += self._accept(frame, [*known, *found], boxes, least)
-        return found
 
     def _search_frame_by_yunet(
         self, yunet: YunetNetwork, prepared: PreparedImage, known: list[_KnownFace]
@@ -327,15 +324,6 @@ class AutoDetector:
         """Return the new faces in square boxes that the last network confirms."""
         found = [one for one in self._score(frame, boxes, least) if one is not None]
         return _distinct(found, known)
-
-
-def _predict(now: _KnownFace, before: _KnownFace) -> _KnownFace:
-    """Return a face with its search box predicted by its motion between frames.
-
-    The network places a face that is off the centre of its box too near to that centre.
-    """
-    moved = (now.face.landmarks_px - before.face.landmarks_px).mean(axis=0)
-    return now._replace(box=now.box + np.tile(moved, 2))
 
 
 def _widen(box: Floats, times: float) -> Floats:

@@ -40,7 +40,29 @@ class YunetNetwork:
         Raises:
             ModelFileError: the file is missing or is not YuNet.
         """
-        self._net = _load(model_file)
+        if not model_file:
+            raise ModelFileError(f"the yunet detector needs a model file: {_CURE}")
+        try:
+            content = Path(model_file).expanduser().read_bytes()
+        except OSError as error:
+            raise ModelFileError(
+                f"cannot read model file {model_file} ({error.strerror}): {_CURE}"
+            ) from error
+        if Path(model_file).name == YUNET.file and not YUNET.is_content(content):
+            raise ModelFileError(f"{model_file} is damaged or another version: {_CURE}")
+        weights, nothing = np.frombuffer(content, dtype=np.uint8), np.zeros(0, np.uint8)
+        try:
+            # Any network loads, but only YuNet's outputs can be decoded: it is tried at once.
+            with quiet_opencv():
+                net = cv2.FaceDetectorYN.create(
+                    "onnx", weights, nothing, (64, 64), _CONFIDENCE, _SAME, _MOST
+                )
+                net.detect(np.zeros((64, 64, 3), np.uint8))
+        except cv2.error as error:
+            raise ModelFileError(
+                f"{model_file} is not a YuNet network but {_kind(content)}: {_CURE}"
+            ) from error
+        self._net = net
 
     def search(self, scaled: ImageArray, least: float) -> NDArray[np.float64]:
         """Return one row per face with at least this confidence, in OpenCV's pixel edges.
@@ -69,33 +91,6 @@ def face_of_row(row: NDArray[np.float64]) -> DetectedFace:
     landmarks = row[4:14].reshape(5, 2) - 0.5
     landmarks.setflags(write=False)
     return DetectedFace((left - 0.5, top - 0.5, width, height), landmarks, float(row[14]))
-
-
-def _load(model_file: str) -> cv2.FaceDetectorYN:
-    """Create the network from the file's bytes."""
-    if not model_file:
-        raise ModelFileError(f"the yunet detector needs a model file: {_CURE}")
-    try:
-        content = Path(model_file).expanduser().read_bytes()
-    except OSError as error:
-        raise ModelFileError(
-            f"cannot read model file {model_file} ({error.strerror}): {_CURE}"
-        ) from error
-    if Path(model_file).name == YUNET.file and not YUNET.is_content(content):
-        raise ModelFileError(f"{model_file} is damaged or another version: {_CURE}")
-    weights, nothing = np.frombuffer(content, dtype=np.uint8), np.zeros(0, np.uint8)
-    try:
-        # Any network loads, but only YuNet's outputs can be decoded, so it is tried immediately.
-        with quiet_opencv():
-            net = cv2.FaceDetectorYN.create(
-                "onnx", weights, nothing, (64, 64), _CONFIDENCE, _SAME, _MOST
-            )
-            net.detect(np.zeros((64, 64, 3), np.uint8))
-    except cv2.error as error:
-        raise ModelFileError(
-            f"{model_file} is not a YuNet network but {_kind(content)}: {_CURE}"
-        ) from error
-    return net
 
 
 def _kind(content: bytes) -> str:

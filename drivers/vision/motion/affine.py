@@ -54,8 +54,12 @@ def fit_affine_warp(
     numbers, weights, rest = _fit(rows, flow)
     if numbers is None:
         return AffineWarp(np.eye(2), -np.median(flow, axis=0), np.inf), rest
+    # Root mean square of the standard deviations of the map's slopes.
+    inverse = np.linalg.inv(rows.T @ (rows * weights[:, None]) + 1e-9 * np.eye(3))
+    points_a_patch = max(1.0, _PATCH_PX2 * len(rows) / max(area_px, 1.0))
+    both = 0.5 * float(inverse[0, 0] + inverse[1, 1])
     return AffineWarp(
-        np.eye(2) - numbers[:2].T, -numbers[2], _spread(rows, weights, rest, area_px)
+        np.eye(2) - numbers[:2].T, -numbers[2], rest * sqrt(max(both, 0.0) * points_a_patch)
     ), rest
 
 
@@ -98,11 +102,3 @@ def _flat(normal: Floats) -> bool:
     """Return whether points are on a line, so that their moments have no area."""
     xx, xy, yy = normal[0, 0], normal[0, 1], normal[1, 1]
     return bool(xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12)
-
-
-def _spread(rows: Floats, weights: Floats, residual_px: float, area_px: float) -> float:
-    """Return the standard deviation of the map's slopes, root mean square."""
-    inverse = np.linalg.inv(rows.T @ (rows * weights[:, None]) + 1e-9 * np.eye(3))
-    points_a_patch = max(1.0, _PATCH_PX2 * len(rows) / max(area_px, 1.0))
-    both = 0.5 * float(inverse[0, 0] + inverse[1, 1])
-    return residual_px * sqrt(max(both, 0.0) * points_a_patch)

@@ -198,7 +198,29 @@ class MotionDetector:
         params = at_level(self._params, now)
         things = segment_motion(pair, ego, params, R_now_before is None, still)
         groups = cluster_motion(things, params)
-        blobs = self._blobs(groups, now, pair, ego, depth, dt_s, params.min_flow_px)
+        frames = blur_images(pair) if groups else ()
+        measured = [
+            (group, _measure(group, frames, _background_warp(group, pair, ego))) for group in groups
+        ]
+        measured = [
+            one
+            for one in measured
+            if _motion_px(one[0], one[1][1], now.grey.shape) > params.min_flow_px
+        ]
+        groups, motions = [group for group, _ in measured], [motion for _, motion in measured]
+        follows = self._tracks.step(
+            [centre for centre, _ in motions],
+            [np.array(motion.slide_px) / dt_s for _, motion in motions],
+            [float(np.sqrt(group.box[2] * group.box[3])) for group in groups],
+            ego.total,
+            now.captured_s,
+            dt_s,
+        )
+        blobs = tuple(
+            self._blob(group, motion, follow, now, depth, dt_s)
+            for group, (_, motion), follow in zip(groups, motions, follows, strict=True)
+            if self._tracks.confirmed(follow)
+        )
         return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
 
     def _compared(
@@ -234,39 +256,6 @@ class MotionDetector:
         if ego.share < self._params.min_background_share:
             return "no common motion of the background"
         return ""
-
-    def _blobs(
-        self,
-        groups: list[Group],
-        now: SmallImage,
-        pair: ImagePair,
-        ego: EgoMotion,
-        depth: Plane | None,
-        dt_s: float,
-        least_px: float,
-    ) -> tuple[MovingBlob, ...]:
-        """Measure each patch, and assign ids to those that move by more than ``least_px``."""
-        frames = blur_images(pair) if groups else ()
-        measured = [
-            (group, _measure(group, frames, _background_warp(group, pair, ego))) for group in groups
-        ]
-        measured = [
-            one for one in measured if _motion_px(one[0], one[1][1], now.grey.shape) > least_px
-        ]
-        groups, motions = [group for group, _ in measured], [motion for _, motion in measured]
-        follows = self._tracks.step(
-            [centre for centre, _ in motions],
-            [np.array(motion.slide_px) / dt_s for _, motion in motions],
-            [float(np.sqrt(group.box[2] * group.box[3])) for group in groups],
-            ego.total,
-            now.captured_s,
-            dt_s,
-        )
-        return tuple(
-            self._blob(group, motion, follow, now, depth, dt_s)
-            for group, (_, motion), follow in zip(groups, motions, follows, strict=True)
-            if self._tracks.confirmed(follow)
-        )
 
     def _blob(
         self,

@@ -127,7 +127,13 @@ def estimate_ego_motion(
         unknown, and the motion of most points is taken for it
     moved_before: whether the image alone showed a motion of the camera shortly before
     """
-    points = _textured_points(pair)
+    # Points (n, 2) of a grid with reliable flow.
+    strength = cv2.cornerMinEigenVal(pair.now, _CORNER_BLOCK)
+    height, width = pair.now.shape
+    y, x = np.mgrid[_EDGE_PX : height - _EDGE_PX : _GRID_PX, _EDGE_PX : width - _EDGE_PX : _GRID_PX]
+    x, y = x.ravel(), y.ravel()
+    good = (strength[y, x] > _LEAST_CORNER) & pair.known[y, x]
+    points = np.column_stack((x[good], y[good])).astype(np.float64)
     B, share, noise, fitted, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False, False
     if len(points) >= _LEAST_POINTS:
         at = points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)
@@ -173,16 +179,6 @@ def predicted_ego_motion(pair: ImagePair, changed: Mask) -> EgoMotion | None:
     return EgoMotion(
         np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0, True
     )
-
-
-def _textured_points(pair: ImagePair) -> Floats:
-    """Return the points of a grid, (n, 2), with reliable flow."""
-    strength = cv2.cornerMinEigenVal(pair.now, _CORNER_BLOCK)
-    height, width = pair.now.shape
-    y, x = np.mgrid[_EDGE_PX : height - _EDGE_PX : _GRID_PX, _EDGE_PX : width - _EDGE_PX : _GRID_PX]
-    x, y = x.ravel(), y.ravel()
-    good = (strength[y, x] > _LEAST_CORNER) & pair.known[y, x]
-    return np.column_stack((x[good], y[good])).astype(np.float64)
 
 
 def _fit_room(
@@ -285,7 +281,13 @@ def _fit_homography(
     """
     focal, centre = float(K[0, 0]), K[:2, 2]
     a, b = (points - centre) / focal, (there - centre) / focal
-    rows = _rows(a, b)
+    # Rows (2 n, 8) of b (h6 x + h7 y + 1) = (h0 x + h1 y + h2, h3 x + h4 y + h5).
+    n = len(a)
+    rows = np.zeros((2 * n, 8))
+    for axis, part in enumerate((rows[:n], rows[n:])):
+        part[:, 3 * axis : 3 * axis + 2] = a
+        part[:, 3 * axis + 2] = 1.0
+        part[:, 6:] = -a * b[:, axis : axis + 1]
     h = _PLAIN
     errors = focal * np.hypot(*(b - a).T)
     # At worst a third of the points is room; their error is the initial scale.
@@ -295,7 +297,12 @@ def _fit_homography(
         weights = np.maximum(1.0 - (errors / (_TUKEY * scale)) ** 2, 0.0) ** 2
         if np.count_nonzero(weights) < _LEAST_POINTS:
             return None
-        last, h = h, _solve(rows, b, weights)
+        # The eight numbers, with a weak prior of no motion.
+        both = np.concatenate((weights, weights)) / _POINT_NOISE**2
+        weighted = rows * both[:, None]
+        belief = np.diag(_SPREADS**-2.0)
+        right = weighted.T @ b.T.ravel() + belief @ _PLAIN
+        last, h = h, np.asarray(np.linalg.solve(rows.T @ weighted + belief, right))
         errors = focal * np.hypot(*(_image(h, a) - b).T)
         done = np.abs(h - last).max() * focal < _SMALL_PX and scale < 2 * noise
         noise = _noise(errors, weights > 0.0)
@@ -308,26 +315,6 @@ def _fit_homography(
     square = np.array([[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]])
     B = square @ np.append(h, 1.0).reshape(3, 3) @ np.linalg.inv(square)
     return HomographyFit(B / B[2, 2], float(near.mean()), _noise(errors, near), reach_px == np.inf)
-
-
-def _rows(a: Floats, b: Floats) -> Floats:
-    """Return the (2 n, 8) rows of b (h6 x + h7 y + 1) = (h0 x + h1 y + h2, h3 x + h4 y + h5)."""
-    n = len(a)
-    rows = np.zeros((2, n, 8))
-    for axis in (0, 1):
-        rows[axis, :, 3 * axis : 3 * axis + 2] = a
-        rows[axis, :, 3 * axis + 2] = 1.0
-        rows[axis, :, 6:] = -a * b[:, axis : axis + 1]
-    return rows.reshape(2 * n, 8)
-
-
-def _solve(rows: Floats, b: Floats, weights: Floats) -> Floats:
-    """Solve for the eight numbers, with a weak prior of no motion."""
-    both = np.concatenate((weights, weights)) / _POINT_NOISE**2
-    weighted = rows * both[:, None]
-    belief = np.diag(_SPREADS**-2.0)
-    right = weighted.T @ b.T.ravel() + belief @ _PLAIN
-    return np.asarray(np.linalg.solve(rows.T @ weighted + belief, right))
 
 
 def _image(h: Floats, a: Floats) -> Floats:

@@ -108,11 +108,15 @@ class GloveDetector:
         mask = _glove_mask(small, least)
         circles = _circles(mask.copy(), least)
         gloves = []
+        height, width = small.shape[:2]
         for row, circle in enumerate(circles):
-            cut = _is_cut(circle, small.shape[1], small.shape[0])
-            covered = _is_covered(circle, circles[:row]) or not (
-                cut or _is_whole(mask, row, circles)
-            )
+            edge = _BEYOND * circle.radius
+            cut = not (edge < circle.x < width - edge and edge < circle.y < height - edge)
+            covered = any(
+                np.hypot(circle.x - one.x, circle.y - one.y)
+                < _TAKEN * one.radius + _BEYOND * circle.radius
+                for one in circles[:row]
+            ) or not (cut or _is_whole(mask, row, circles))
             glove = self._assign_id(circle, cut, covered, captured_s)
             if glove is not None:
                 gloves.append(glove)
@@ -203,20 +207,6 @@ def _circles(mask: NDArray[np.uint8], least_px: float) -> list[Circle]:
         found.append(Circle(float(x), float(y), float(radius) - 0.5, sure))
         cv2.circle(mask, (x, y), int(np.ceil(_TAKEN * radius)), 0, -1)
     return found
-
-
-def _is_cut(circle: Circle, width: int, height: int) -> bool:
-    """Return whether the edge of the image may hide a part of a glove."""
-    edge = _BEYOND * circle.radius
-    return not (edge < circle.x < width - edge and edge < circle.y < height - edge)
-
-
-def _is_covered(circle: Circle, nearer: list[Circle]) -> bool:
-    """Return whether a larger circle may hide a part of a glove."""
-    return any(
-        np.hypot(circle.x - one.x, circle.y - one.y) < _TAKEN * one.radius + _BEYOND * circle.radius
-        for one in nearer
-    )
 
 
 def _is_whole(mask: NDArray[np.uint8], row: int, circles: list[Circle]) -> bool:

@@ -52,7 +52,13 @@ def scale_down(
     Raises:
         ValueError: it is no 8-bit image: grey, BGR or BGR with alpha.
     """
-    _check(image)
+    channels = image.shape[2] if image.ndim == 3 else 1
+    right = image.ndim in (2, 3) and channels in (1, 3, 4) and image.size > 0
+    if not right or image.dtype != np.uint8:
+        raise ValueError(
+            "an image is (height, width), or that with 1, 3 or 4 channels, of uint8, not "
+            f"{image.shape} of {image.dtype}"
+        )
     height, width = image.shape[:2]
     shrink = min(1.0, work_px / max(width, height))
     size = max(1, round(width * shrink)), max(1, round(height * shrink))
@@ -77,16 +83,6 @@ def to_grey(image: NDArray[Any]) -> Grey:
     if channels == 4:
         return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGRA2GRAY), dtype=np.uint8)
     return np.ascontiguousarray(image.reshape(image.shape[:2]))
-
-
-def _check(image: NDArray[Any]) -> None:
-    channels = image.shape[2] if image.ndim == 3 else 1
-    right = image.ndim in (2, 3) and channels in (1, 3, 4) and image.size > 0
-    if not right or image.dtype != np.uint8:
-        raise ValueError(
-            "an image is (height, width), or that with 1, 3 or 4 channels, of uint8, not "
-            f"{image.shape} of {image.dtype}"
-        )
 
 
 def without_illumination(change: Plane) -> Plane:

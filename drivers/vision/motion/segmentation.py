@@ -121,7 +121,15 @@ def segment_motion(
         mask &= squares > _NOISE_RATIO * still.noise
         if mask.any():
             mask &= _across(part.now, moves, threshold)
-            mask &= _confirmed_mask(part, squares, still.noise, rest)
+            # The flow must explain a pixel, and the camera's motion must not. Background that a
+            # thing has uncovered changed too, and any flow explains plain background. But its flow
+            # begins at unchanged pixels, the flow of a thing at pixels that it has left.
+            moving = _squares(part.now, part.before, _add_flow(part.flow, 1.0))
+            left = cv2.remap(
+                squares, _add_flow(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE
+            )
+            mask &= left > _NOISE_RATIO * still.noise
+            mask &= moving < _LEFT_SHARE * (squares - still.noise) + still.noise
         things.flow[window], things.mask[window] = rest, mask
         if mask.any():
             change[window] = _solid_change(part, at)
@@ -211,20 +219,6 @@ def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
     (a, b, c), (d, e, f), (g, h, i) = B.astype(np.float32)
     depth = np.maximum(g * x + h * y + i, np.float32(1e-3))
     return np.dstack(((a * x + b * y + c) / depth, (d * x + e * y + f) / depth))
-
-
-def _confirmed_mask(pair: ImagePair, still: Plane, noise: float, rest: Flow) -> Mask:
-    """Return a mask of pixels that the flow explains and the camera's motion does not.
-
-    Background that a thing has uncovered changed too, and any flow explains plain background. But
-    its flow begins at unchanged pixels, while the flow of a thing begins at pixels that it has
-    left.
-    """
-    moving = _squares(pair.now, pair.before, _add_flow(pair.flow, 1.0))
-    left = cv2.remap(still, _add_flow(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
-    out: Mask = left > _NOISE_RATIO * noise
-    out &= moving < _LEFT_SHARE * (still - noise) + noise
-    return out
 
 
 def _add_flow(flow: Flow, sign: float) -> Flow:
