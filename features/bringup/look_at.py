@@ -68,7 +68,12 @@ def look_at(
         pose = kinematics.forward(joints)
         if fresh:
             fresh = False
-            refuse_inside(p_world_m, pose)
+            if norm(sub(p_world_m, pose.p_world_head_m)) < 0.03:
+                x, y, z = p_world_m
+                raise SetupError(
+                    f"{x:g} {y:g} {z:g} is inside the head: metres from the neck base, "
+                    "x forward, y left, z up, e.g. 1.0 0.2 0.3"
+                )
             oculomotor.reset(t_s, pose)
         gaze = oculomotor.step(target._replace(at_s=t_s), pose, t_s, max(dt_s, 1e-3))
         return kinematics.inverse(gaze)
@@ -154,17 +159,3 @@ def refuse_not_finite(p_world_m: Vec3) -> None:
     """
     if not all(map(isfinite, p_world_m)):
         raise SetupError(f"{p_world_m} is no point: three numbers in metres, e.g. 1.0 0.2 0.3")
-
-
-def refuse_inside(p_world_m: Vec3, pose: GazeState) -> None:
-    """Refuse a point that no eye can look at.
-
-    Raises:
-        SetupError: it is within 3 cm of the head's middle.
-    """
-    if norm(sub(p_world_m, pose.p_world_head_m)) < 0.03:
-        x, y, z = p_world_m
-        raise SetupError(
-            f"{x:g} {y:g} {z:g} is inside the head: metres from the neck base, "
-            "x forward, y left, z up, e.g. 1.0 0.2 0.3"
-        )

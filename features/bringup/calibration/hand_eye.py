@@ -485,17 +485,21 @@ def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: Han
         np.array((params.lens_error_percent / 100.0, centre_px, centre_px)),
         radians(params.joint_error_deg),
     )
-    starts = sorted(_starts(views, lens), key=lambda found: _median_error_px(observations, *found))
+    starts: list[tuple[float, Estimate]] = []
+    for camera, board in _starts(views, lens):
+        start = first_estimate(observations, camera, board)
+        errors = np.abs(observations.errors(start))
+        usual_px = float(np.median(np.where(np.isfinite(errors), errors, inf)))
+        starts.append((usual_px, start))
+    starts.sort(key=lambda one: one[0])
     if not starts:
         raise CameraCalibrationRefused(
             "the images of the board do not agree with any place of the camera: see that "
             "board, lens and joints are the ones calibrated"
         )
-    best = refine(observations, first_estimate(observations, *starts[0]))
+    best = refine(observations, starts[0][1])
     if not best.corner_px < _DOUBTFUL_PX:
-        others = [
-            refine(observations, first_estimate(observations, *other)) for other in starts[1:]
-        ]
+        others = [refine(observations, other) for _, other in starts[1:]]
         best = min((best, *others), key=lambda fit: fit.cost)
     # Joints that proved better than usual are trusted more.
     proven = min(max(best.joint_error_deg, _BEST_JOINT_DEG), params.joint_error_deg)
@@ -521,21 +525,11 @@ def _starts(views: Sequence[NeckView], lens: Intrinsics) -> list[tuple[Pose, Pos
         camera = Pose(np.asarray(R, dtype=np.float64), np.ravel(p).astype(np.float64))
         if np.isfinite(camera.R).all() and np.isfinite(camera.p).all():
             hung = [h.then(camera).then(b) for h, b in zip(heads, boards, strict=True)]
-            found.append((camera, _middle(hung)))
+            # The board in the middle of all: median place, mean rotation.
+            u, _, vt = np.linalg.svd(np.sum([pose.R for pose in hung], axis=0))
+            mean = u @ np.diag((1.0, 1.0, np.linalg.det(u @ vt))) @ vt
+            found.append((camera, Pose(mean, np.median([pose.p for pose in hung], axis=0))))
     return found
-
-
-def _median_error_px(observations: Observations, camera: Pose, board: Pose) -> float:
-    """Return the usual reprojection error of a start, by which starts are compared."""
-    errors = np.abs(observations.errors(first_estimate(observations, camera, board)))
-    return float(np.median(np.where(np.isfinite(errors), errors, inf)))
-
-
-def _middle(poses: Sequence[Pose]) -> Pose:
-    """Return the pose in the middle of several: median place, mean rotation."""
-    u, _, vt = np.linalg.svd(np.sum([pose.R for pose in poses], axis=0))
-    R = u @ np.diag((1.0, 1.0, np.linalg.det(u @ vt))) @ vt
-    return Pose(R, np.median([pose.p for pose in poses], axis=0))
 
 
 def _vec3(row: Floats) -> Vec3:

@@ -6,7 +6,7 @@ A PCA9685 keeps no errors; its registers are read, nothing is written. Sources: 
 User's Guide (0J40), sections 4.b, 4.e, 5.a and 5.e; NXP, PCA9685 data sheet, rev. 4.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -150,37 +150,28 @@ def examine(
         own: other findings of the make.
         well: description of a healthy board.
     """
-    findings = [*own, *_channels(rules, setups, pulses, channels)]
-    if not any(finding.level in ("warn", "error") for finding in findings):
-        given = sum(1 for pulse in pulses.values() if pulse)
-        well = f"{well}; pulses on {given} of {len(pulses)} channels"
-        findings.insert(0, Diagnostic("ok", well, WHERE))
-    return [*findings, ADVICE["no feedback"].at("the servos"), rules.note.at(WHERE)]
-
-
-def _channels(
-    rules: BoardRules,
-    setups: Sequence[ServoConfig],
-    pulses: Mapping[int, int | None],
-    channels: int,
-) -> Iterator[Diagnostic]:
-    """Return findings about the channels of the rig."""
+    findings = list(own)
     for setup in setups:
         pulse, where = pulses.get(setup.id), servo_label(setup)
         if setup.id >= channels:
-            yield ADVICE["beyond"].at(where, last=channels - 1)
+            findings.append(ADVICE["beyond"].at(where, last=channels - 1))
         elif setup.id not in pulses:
-            yield ADVICE["not read"].at(where)
+            findings.append(ADVICE["not read"].at(where))
         elif pulse is None:
-            yield ADVICE["silent"].at(where)
+            findings.append(ADVICE["silent"].at(where))
         elif 0 < pulse <= rules.most_input:
-            yield ADVICE["input"].at(where)
+            findings.append(ADVICE["input"].at(where))
         elif pulse:
             us, low, high = (one / US_STEPS for one in (pulse, setup.min_steps, setup.max_steps))
             inside = low <= us <= high
             remedy = (rules.left_on if inside else rules.outside).format(name=setup.name)
             advice = ADVICE["left on" if inside else "outside"]
-            yield advice.at(where, us=us, low=low, high=high, remedy=remedy)
+            findings.append(advice.at(where, us=us, low=low, high=high, remedy=remedy))
+    if not any(finding.level in ("warn", "error") for finding in findings):
+        given = sum(1 for pulse in pulses.values() if pulse)
+        well = f"{well}; pulses on {given} of {len(pulses)} channels"
+        findings.insert(0, Diagnostic("ok", well, WHERE))
+    return [*findings, ADVICE["no feedback"].at("the servos"), rules.note.at(WHERE)]
 
 
 # --- Maestro
@@ -210,7 +201,22 @@ def visit_maestro(
     crc = "on" if found.crc else "off"
     named = f"{channels} channels{'' if size else ' assumed'}"
     well = f"answers in the {' and the '.join(found.forms)} form, CRC {crc}, {named}, no script"
-    own = list(_board_findings(params, found, size))
+    own = []
+    if params.protocol not in found.forms:
+        pololu = params.protocol == "pololu"
+        number = f"its device number is not {params.device}; " if pololu else ""
+        own.append(ADVICE["form"].at(WHERE, form=found.forms[0], params=params, number=number))
+    if found.crc != params.crc:
+        own.append(ADVICE["CRC" if found.crc else "no CRC"].at(WHERE))
+    if size is not None and size != params.channels:
+        own.append(ADVICE["size"].at(WHERE, size=size, params=params))
+    for error in found.errors:
+        # With a timeout set, every pause between two programs is one.
+        advice = ADVICE["timeout" if error == TIMEOUT else "error"]
+        cure = CURES.get(error, "look it up in Pololu's guide")
+        own.append(advice.at(WHERE, error=error, cure=cure))
+    if found.script:
+        own.append(ADVICE["script"].at(WHERE, Fix(BOARD, SCRIPT, 0, 1)))
     findings = examine(MAESTRO, setups, pulses, channels, own, well)
     wide = [
         ADVICE["wide range"].at(
@@ -257,26 +263,6 @@ def _board_params(params: MaestroParams, found: DetectedMaestro) -> MaestroParam
     """Return the protocol of a board that was found; the rig file may differ."""
     form = params.protocol if params.protocol in found.forms else found.forms[0]
     return replace(params, protocol=form, crc=found.crc)
-
-
-def _board_findings(
-    params: MaestroParams, found: DetectedMaestro, size: int | None
-) -> Iterator[Diagnostic]:
-    """Return findings about protocol, size, errors and script."""
-    if params.protocol not in found.forms:
-        pololu = params.protocol == "pololu"
-        number = f"its device number is not {params.device}; " if pololu else ""
-        yield ADVICE["form"].at(WHERE, form=found.forms[0], params=params, number=number)
-    if found.crc != params.crc:
-        yield ADVICE["CRC" if found.crc else "no CRC"].at(WHERE)
-    if size is not None and size != params.channels:
-        yield ADVICE["size"].at(WHERE, size=size, params=params)
-    for error in found.errors:
-        # With a timeout set, every pause between two programs is one.
-        advice = ADVICE["timeout" if error == TIMEOUT else "error"]
-        yield advice.at(WHERE, error=error, cure=CURES.get(error, "look it up in Pololu's guide"))
-    if found.script:
-        yield ADVICE["script"].at(WHERE, Fix(BOARD, SCRIPT, 0, 1))
 
 
 def stop_script(port: BusPort, params: MaestroParams) -> str:

@@ -225,25 +225,19 @@ class _CalibrationSession:
         self._tell(self._steering.update(tick))
         for event in group_events(tick.events):
             say(event)
-        self._say_what_is_due(tick.t_s)
+        # Name the part once, and report if no face has been seen for a while.
+        part, seen = self._steering.state.part, self._steering.face is not None
+        self._seen_s = tick.t_s if seen else self._seen_s
+        due = part is not None and self._said != (part, seen)
+        if part is not None and due and seen:
+            self._said = part, seen
+            self._tell(f"{PART_NAMES_TEXT[part]}: steer until the gaze meets it, then Enter")
+        elif due and tick.t_s - self._seen_s >= _UNSEEN_S:
+            self._said = part, seen
+            self._tell("no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it")
         if self._live_line and tick.t_s - self._shown_s >= _SHOW_S:
             self._shown_s = tick.t_s
             status(status_text(self._steering))
-
-    def _say_what_is_due(self, t_s: float) -> None:
-        """Name the part once, and report if no face has been seen for a while."""
-        part, seen = self._steering.state.part, self._steering.face is not None
-        if seen:
-            self._seen_s = t_s
-        if part is None or self._said == (part, seen):
-            return
-        if seen:
-            self._tell(f"{PART_NAMES_TEXT[part]}: steer until the gaze meets it, then Enter")
-        elif t_s - self._seen_s < _UNSEEN_S:
-            return
-        else:
-            self._tell("no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it")
-        self._said = part, seen
 
     def _tell(self, what: str | None) -> None:
         if what is not None:
