@@ -29,7 +29,7 @@ from remote_rig import (
 )
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.model import lead, commands
+from gazerig.robot.model import commands, lead
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.remote import client

@@ -24,6 +24,8 @@ from moving_bus import (
 )
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
+from gazerig.testing.bus_bench import rows
 
 RIGS: dict[str, Callable[[], Any]] = {
     **{f"dynamixel {way}": partial(DynamixelRig, *chosen) for way, chosen in WAYS.items()},
@@ -202,3 +204,106 @@ def test_a_blocked_write(rig):
     assert "accepts no bytes" in rig.bus.events()[0]
     rig.until_all()
     assert rig.longest_s < 0.3
+
+
+def test_servos_that_stay_away_are_given_up(make):
+    rig = make(give_up_s=1.0).start()
+    rig.command("lose all")
+    with pytest.raises(BusLost, match="no servo has answered for 1.0 s"):
+        for _ in range(300):
+            rig.tick()
+
+
+def test_replugged_under_the_same_name(rig):
+    rig.tick([2500] * 4)
+    rig.command("unplug for 3.0")
+    for _ in range(250):
+        assert rig.heard() == [False] * 4
+    while None in (readings := rig.tick([2500] * 4)):
+        pass
+    assert [(r.rearmed, r.torque) for r in readings] == [(True, True)] * 4
+    assert [r.rearmed for r in rig.tick([2500] * 4)] == [False] * 4
+
+
+def test_two_servos_with_one_id(rig):
+    rig.command("turn 2 300")
+    rig.command("collide 2")
+    rig.command("turn 2 -111")
+    for _ in range(200):
+        # Without the judgement of a tick: there are two values of servo 2.
+        rig.now_s += 0.01
+        began_s = rig.now_s
+        readings = rows(rig.bus.read(rig.now_s))
+        assert None not in (readings[0], readings[2], readings[3])
+        assert rig.now_s - began_s < LONGEST_S
+        rig.bus.write([2000] * 4)
+    assert any(line.startswith("jaw (servo 2) answers, but") for line in rig.bus.events())
+
+
+def test_a_brown_out_in_the_middle_of_a_long_way_ends_where_it_is(rig):
+    for _ in range(3):
+        rig.tick([2900] * 4)
+    rig.command("brown-out 3")
+    memory, seen = rig.chain[3].memory, []
+    for _ in range(150):
+        rig.now_s += 0.01
+        at = rig.chain.positions_steps()[2]
+        reading = rows(rig.bus.read(rig.now_s))[2]
+        if reading is not None and reading.rearmed:
+            assert abs(reading.position_steps - at) <= 2
+            assert abs(memory.get("goal_position") - at) <= 2
+            seen.append(at)
+        rig.bus.write([2900] * 4)
+    assert len(seen) == 1
+    assert rig.bus.faults() == ()
+    assert "neck (servo 3) restarted: set up again" in rig.bus.events()
+    assert memory.get("torque_enable") == 1
+
+
+def test_a_servo_that_keeps_restarting_stays_limp(rig):
+    for _ in range(5):
+        rig.command("brown-out 2")
+        for _ in range(150):
+            rig.tick()
+    assert rig.bus.faults() == (f"jaw (servo 2): {AGAIN_AND_AGAIN}",)
+    reading = rig.tick()[1]
+    assert (reading.torque, reading.fault) == (False, AGAIN_AND_AGAIN)
+    assert not rig.chain[2].torque
+    assert rig.chain[1].torque
+    rig.bus.enable_torque()
+    if isinstance(rig, sts_rig.Rig):
+        assert rig.bus.faults() == ()
+        assert rig.tick()[1].fault == ""
+
+
+def test_a_stuck_joint_is_seen_by_its_load(rig):
+    for _ in range(50):
+        rig.tick([2000] * 4)
+    rig.command("stick 2")
+    at = rig.chain.positions_steps()[1]
+    for _ in range(30):
+        readings = rig.tick([2600] * 4)
+    assert abs(readings[1].position_steps - at) <= 1
+    assert abs(readings[1].load) > 0.3
+    for _ in range(600):
+        readings = rig.tick([2600] * 4)
+    assert None not in readings
+    assert readings[1].fault == "overload"
+    assert abs(readings[1].load) < 0.3
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        partial(DynamixelRig, check_baud=True, servo_baud=1_000_000),
+        partial(sts_rig.Rig, baud=1_000_000),
+    ],
+    ids=["dynamixel", "feetech"],
+)
+def test_factory_defaults(made):
+    rig = made().start()
+    rig.bus.disable_torque()
+    rig.command("reset 3")
+    rig.now_s += 1.0
+    with pytest.raises(ServoMissing, match=r"neck \(servo 3\) does not answer"):
+        rig.bus.open()

@@ -1,25 +1,4 @@
-"""Single reads and writes, with every fault that a single answer can have.
-
-Faults of a single read and their tests:
-
-no answer, absent, wrong id, wrong baud     test_no_good_answer
-byte lost, truncated, LEN too large or 0    test_no_good_answer
-bit flipped, bad CRC                        test_no_good_answer
-noise before or after, echo                 test_answers_that_are_good_all_the_same
-late but in time, a gap inside              test_answers_that_are_good_all_the_same
-late after the time limit                   test_a_late_answer_is_never_that_of_another_register
-duplicate                                   test_a_duplicate_is_never_that_of_another_register
-wrong id, then the right one                test_answers_that_are_good_all_the_same
-error 07 without data                       test_a_refusal_is_no_value_and_no_exception
-error 0 with too few or too many bytes      test_no_good_answer
-alert                                       test_an_alert_is_data_and_a_note
-answer of another protocol, an instruction  test_no_good_answer
-babble                                      test_babble_takes_a_bounded_time
-port vanishes                               test_a_port_that_vanished_is_not_busy_for_ever
-stuffed on send, unstuffed on arrival       test_what_looks_like_a_header_passes_both_ways
-a status left behind by reboot              test_nothing_is_left_behind_by_a_reboot
-a check of one byte, an echo                test_faults_of_answers_with_a_check_of_one_byte
-"""
+"""Single reads and writes, with every fault that a single answer can have."""
 
 import struct
 from itertools import pairwise
