@@ -8,14 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from desk import GAZE_JOINTS, LIDS
 
-from gazerig.gaze.angles import (
-    add,
-    angle_between,
-    direction,
-    scale,
-    sub,
-    unit,
-)
+from gazerig.gaze.angles import add, angle_between, direction, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.gesture.breathing import Breathing
 from gazerig.gaze.lids.lids import LidParams, Lids

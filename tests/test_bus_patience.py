@@ -13,12 +13,7 @@ from gazerig.drivers.event_log import MOST, EventLog, register_label
 from gazerig.drivers.serial.reconnect import Reconnect
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
 from gazerig.drivers.servo_bus.read_plan import CALM_S
-from gazerig.drivers.servo_bus.transaction import (
-    REFILL,
-    RESERVE_S,
-    WINDOW,
-    AdaptiveTimeout,
-)
+from gazerig.drivers.servo_bus.transaction import REFILL, RESERVE_S, WINDOW, AdaptiveTimeout
 from gazerig.drivers.types import ServoConfig
 
 

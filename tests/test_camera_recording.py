@@ -16,8 +16,8 @@ from mcap.reader import make_reader
 from present import present
 from stand_in import StandIn
 
-from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera import recorder as recording_write
+from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay, Recording
 from gazerig.drivers.camera.recorder import CameraRecorder, RecordingWriter

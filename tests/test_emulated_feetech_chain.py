@@ -1,16 +1,7 @@
 """The emulated STS bus against the written rules: instructions, memory, lock, groups, quirks."""
 
 import pytest
-from servo_bench import (
-    ALL,
-    CALIBRATE,
-    FACTORY_RESET,
-    PING,
-    READ,
-    REBOOT,
-    WRITE,
-    FeetechBench,
-)
+from servo_bench import ALL, CALIBRATE, FACTORY_RESET, PING, READ, REBOOT, WRITE, FeetechBench
 
 from gazerig.drivers.feetech import memory_table as feetech_table
 from gazerig.sim_mock.feetech.tables import STS

@@ -17,21 +17,12 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.rig_description import shape_of
-from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glb
-from gazerig.robot.dashboard.view.glow import glow
-from gazerig.robot.dashboard.view.head_view import head_dimensions
-from gazerig.robot.dashboard.view.lid_edges import lid_edges
+from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glb, glow
+from gazerig.robot.dashboard.view.head_view import head_dimensions, lid_edges, with_shown_lids
 from gazerig.robot.dashboard.view.scene_node import turned_up
-from gazerig.robot.dashboard.view.snapshot_shape import with_shown_lids
-from gazerig.robot.dashboard.view.views import BOTH, FACE, SHOULDER, View, view
+from gazerig.robot.dashboard.view.viewpoints import BOTH, FACE, SHOULDER, View, view
 from gazerig.robot.description import head_mesh
-from gazerig.robot.description.head_shape import (
-    EYE_RADIUS,
-    eye_rim,
-    field,
-    measures_of,
-    surface,
-)
+from gazerig.robot.description.head_shape import EYE_RADIUS, eye_rim, field, measures_of, surface
 from gazerig.robot.description.mesh import Mesh, grid
 from gazerig.robot.description.paint import Painted, merged
 from gazerig.robot.description.parts import LOWER_LID, UPPER_LID

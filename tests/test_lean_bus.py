@@ -14,13 +14,7 @@ from gazerig.drivers.bus.bus_plugins import DYNAMIXEL, FEETECH, MAESTRO, PCA9685
 from gazerig.robot.control.body import Body, setups
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS
-from gazerig.sim_mock.devices import (
-    DynamixelLine,
-    FeetechLine,
-    MaestroLine,
-    Pca9685Line,
-    build,
-)
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine, Pca9685Line, build
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec

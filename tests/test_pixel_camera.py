@@ -32,12 +32,7 @@ from gazerig.sim_mock.cameras.draw_person import (
 )
 from gazerig.sim_mock.cameras.draw_room import draw_room
 from gazerig.sim_mock.cameras.optics import blur_along
-from gazerig.sim_mock.cameras.rendered import (
-    Exposure,
-    PixelCamera,
-    PixelCameraParams,
-    draw_scene,
-)
+from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams, draw_scene
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 WIDTH, HEIGHT = 640, 400

@@ -18,15 +18,7 @@ from typing import Any
 
 import pytest
 from branch import Branch
-from remote_rig import (
-    BLINKS,
-    RATE,
-    Beat,
-    Broken,
-    SecondTuning,
-    hung_up,
-    server_closed,
-)
+from remote_rig import BLINKS, RATE, Beat, Broken, SecondTuning, hung_up, server_closed
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.model import commands, lead

@@ -14,14 +14,10 @@ from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
 from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
 from gazerig.features.world.world_spec import WorldSpec  # noqa: E402
-from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
+from gazerig.robot.app.run_bus import emulated_lines  # noqa: E402
 from gazerig.robot.control.tick import Tick  # noqa: E402
 from gazerig.sim_mock.pty.line import BusSettings  # noqa: E402
-from gazerig.sim_mock.pty.server import (  # noqa: E402
-    Server,
-    ServerSettings,
-    SurroundingsSettings,
-)
+from gazerig.sim_mock.pty.server import Server, ServerSettings, SurroundingsSettings  # noqa: E402
 
 NECK = ("neck_yaw", "neck_pitch", "neck_roll")
 
