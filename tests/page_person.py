@@ -25,7 +25,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick
-from gazerig.robot.dashboard.view.views import BOTH, HALF_WIDTH, view
+from gazerig.robot.dashboard.view.viewpoints import BOTH, HALF_WIDTH, view
 from gazerig.robot.model.commands import Renew
 
 YAW = GAZE_JOINTS.index("neck_yaw")

@@ -14,8 +14,8 @@ from viser import transforms
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.rig_description import shape_of
-from gazerig.robot.dashboard.view.commanded_pose import CommandedPoseView
 from gazerig.robot.dashboard.view.head_view import HeadView
+from gazerig.robot.dashboard.view.overlays import CommandedPoseView
 from gazerig.robot.model.types import CommandedPose, JointState, Snapshot
 
 

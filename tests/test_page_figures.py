@@ -8,14 +8,14 @@ import pytest
 from desk import GAZE_JOINTS
 
 from gazerig.gaze.types import PARTS
-from gazerig.robot.analysis.heatmap_face import on_canvas
+from gazerig.robot.analysis.heatmap import on_canvas
 from gazerig.robot.analysis.human_norms import BY_KEY, fastest_peak, slowest_peak
 from gazerig.robot.dashboard.panels.dwell_chart import BIN_S, BINS, DwellChart
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.panels.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face
 from gazerig.robot.dashboard.panels.main_sequence_chart import KEPT, MainSequenceChart
 from gazerig.robot.dashboard.panels.run_figures import RunFigure, RunFigures, compare_with_band
-from gazerig.robot.dashboard.view.view_frusta import field_edge
+from gazerig.robot.dashboard.view.overlays import field_edge
 from gazerig.robot.model.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -32,7 +32,7 @@ from gazerig.robot.dashboard.panels.servo_health import (
     strain_of_voltage,
 )
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.view.lid_edges import lid_edges
+from gazerig.robot.dashboard.view.head_view import lid_edges
 from gazerig.robot.dashboard.view.overlays import OverlayPanel
 from gazerig.robot.dashboard.widgets.widget import Html, Widget
 from gazerig.robot.dashboard.widgets.widgets import Widgets

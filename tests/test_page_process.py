@@ -25,7 +25,7 @@ from gazerig.robot.dashboard.page_main import free_port as first_free_port
 from gazerig.robot.dashboard.page_main import watch
 from gazerig.robot.dashboard.requests.inbox import BEAT
 from gazerig.robot.dashboard.requests.outbox import Outbox
-from gazerig.robot.dashboard.view.views import BOTH, NAMES, view
+from gazerig.robot.dashboard.view.viewpoints import BOTH, NAMES, view
 from gazerig.robot.dashboard.widgets.widgets import PANELS
 from gazerig.robot.model.types import SeenFace
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.view.glow import glow
+from gazerig.robot.dashboard.view.glb import glow
 from gazerig.robot.description import head_mesh, person_shape
 from gazerig.robot.description.mesh import Mesh, cap, smooth_normals
 from gazerig.robot.description.paint import Painted, merged, mirrored, mix, moved, painted, plain

@@ -21,12 +21,11 @@ from gazerig.robot.dashboard.panels.controls import Controls
 from gazerig.robot.dashboard.panels.panel import PanelView
 from gazerig.robot.dashboard.panels.replay import ReplayView
 from gazerig.robot.dashboard.requests.outbox import Outbox
+from gazerig.robot.dashboard.view.glb import furnish
 from gazerig.robot.dashboard.view.head_view import HeadView
-from gazerig.robot.dashboard.view.lights import furnish
 from gazerig.robot.dashboard.view.overlays import OverlayPanel
 from gazerig.robot.dashboard.view.people import PeopleView
-from gazerig.robot.dashboard.view.viewpoints import Viewpoints
-from gazerig.robot.dashboard.view.views import NAMES
+from gazerig.robot.dashboard.view.viewpoints import NAMES, Viewpoints
 from gazerig.robot.dashboard.view.world_view import WorldView
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.leader import Leader, sentence

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gazerig.gaze.angles import add, rotate, scale, unit
 from gazerig.gaze.types import Floats
 from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.analysis.heatmap import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from gazerig.robot.model.types import Snapshot
 
 SHRINK = 3

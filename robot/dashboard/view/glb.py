@@ -1,19 +1,22 @@
 """Shapes with colours by vertex and a surface finish, as binary glTF that browsers draw.
 
-All but the eyes are lit here, once, as under the lights of the scene (lights.py), so that a browser
-without a graphics card need not light every pixel of every picture.
+All but the eyes are lit here, once, as under the lights of the scene, so that a browser without a
+graphics card need not light every pixel of every picture.
 """
 
+import json
+import struct
 from math import pi
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+import viser
 from PIL import Image
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.dashboard.view.glb_file import glb_file
-from gazerig.robot.description.mesh import smooth_normals
-from gazerig.robot.description.paint import Colour, Painted
+from gazerig.robot.description.mesh import Mesh, smooth_normals, turned
+from gazerig.robot.description.paint import Colour, Painted, plain
 from gazerig.robot.description.texture import TexturedMesh
 
 
@@ -124,7 +127,17 @@ def glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
         rgba[:, :3] = lit(rgba[:, :3], normals if pose is None else normals @ pose.T, finish)
         gain = float(rgba[:, :3].max())
         rgba[:, :3] /= gain
-    material = _material(finish, by_browser, gain, see_through=colours.shape[1] == 4)
+    material: dict[str, Any] = {
+        "pbrMetallicRoughness": {
+            "metallicFactor": 0.0,
+            "roughnessFactor": finish.roughness,
+            "baseColorFactor": [gain, gain, gain, 1.0],
+        },
+        "doubleSided": False,
+        "extensions": {} if by_browser else {"KHR_materials_unlit": {}},
+    }
+    if colours.shape[1] == 4:
+        material["alphaMode"] = "BLEND"
     if not by_browser:
         normals = None
     elif normals is None:
@@ -144,19 +157,17 @@ def lit(colours: Floats, normals: Floats, finish: Finish) -> Floats:
         (n, 3); may exceed 1.
     """
     up = 0.5 + 0.5 * normals[:, 2:]
-    around = up * _of(SKY) + (1.0 - up) * _of(GROUND)
+    sky, ground = _linear(np.array((SKY, GROUND)) / 255.0)
+    around = up * sky + (1.0 - up) * ground
     found = colours * around * (SKY_INTENSITY / pi)
     for light in LIGHTS:
         way = np.array(light.position) / np.linalg.norm(light.position)
         facing = np.clip(normals @ way, 0.0, None)[:, None]
         half = (way + _TO_EYE) / np.linalg.norm(way + _TO_EYE)
         gleam = finish.shine * np.clip(normals @ half, 0.0, 1.0)[:, None] ** finish.tight
-        found = found + light.intensity * _of(light.colour) * (colours * facing / pi + gleam)
+        colour = _linear(np.array(light.colour) / 255.0)
+        found = found + light.intensity * colour * (colours * facing / pi + gleam)
     return np.asarray(found)
-
-
-def _of(colour: Colour) -> Floats:
-    return _linear(np.array(colour) / 255.0)
 
 
 def _linear(share: Floats) -> Floats:
@@ -164,16 +175,88 @@ def _linear(share: Floats) -> Floats:
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
-def _material(finish: Finish, by_browser: bool, gain: float, see_through: bool) -> dict[str, Any]:
-    """Return a glTF material."""
-    plain = {"metallicFactor": 0.0, "roughnessFactor": finish.roughness}
-    material: dict[str, Any] = {
-        "pbrMetallicRoughness": plain | {"baseColorFactor": [gain, gain, gain, 1.0]},
-        "doubleSided": False,
-        "extensions": {"KHR_materials_unlit": {}},
+_UNSIGNED_BYTE: Final = 5121
+_UNSIGNED_INT: Final = 5125
+_FLOAT: Final = 5126
+_TRIANGLES: Final = 4
+
+
+def glb_file(
+    mesh: Mesh, rgba: npt.NDArray[np.uint8], normals: Floats | None, material: dict[str, Any]
+) -> bytes:
+    """Return the file.
+
+    Args:
+        mesh: what is drawn.
+        rgba: (n, 4), of the vertices.
+        normals: (n, 3) of the vertices, for what the browser lights.
+        material: as glTF has it.
+    """
+    columns: dict[str, tuple[npt.NDArray[Any], int, str]] = {
+        "": (mesh.faces.astype("<u4").reshape(-1, 1), _UNSIGNED_INT, "SCALAR"),
+        "POSITION": (mesh.vertices.astype("<f4"), _FLOAT, "VEC3"),
+        "COLOR_0": (rgba, _UNSIGNED_BYTE, "VEC4"),
     }
-    if by_browser:
-        material["extensions"] = {}
-    if see_through:
-        material["alphaMode"] = "BLEND"
-    return material
+    if normals is not None:
+        columns["NORMAL"] = (normals.astype("<f4"), _FLOAT, "VEC3")
+    accessors, views, data = list[dict[str, Any]](), list[dict[str, int]](), b""
+    for number, (values, kind, shape) in enumerate(columns.values()):
+        accessor = {"bufferView": number, "componentType": kind, "count": len(values)}
+        bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        normalized = {"normalized": True} if kind == _UNSIGNED_BYTE else {}
+        accessors.append({**accessor, "type": shape, **bounds, **normalized})
+        part = values.tobytes()  # every column is of whole words of four bytes
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(part)})
+        data += part
+    attributes = {name: number for number, name in enumerate(columns) if name}
+    primitive = {"attributes": attributes, "indices": 0, "mode": _TRIANGLES, "material": 0}
+    tree: dict[str, Any] = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive]}],
+        "materials": [material],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+    }
+    if used := sorted(material["extensions"]):
+        tree["extensionsUsed"] = used
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    length = 12 + 8 + len(text) + 8 + len(data)
+    head = struct.pack("<4sII", b"glTF", 2, length)
+    return b"".join(
+        (head, struct.pack("<I4s", len(text), b"JSON"), text,
+         struct.pack("<I4s", len(data), b"BIN\0"), data)
+    )  # fmt: skip
+
+
+def glow(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
+    """Return a flat disc of radius 1, facing up, that fades out from its middle."""
+    radius = np.linspace(1.0, 0.0, rings)
+    mesh = turned([(r, 0.0) for r in radius.tolist()])
+    alpha = np.repeat(
+        (0.5 + 0.5 * np.cos(pi * radius)) ** 1.3 * inner[3], len(mesh.vertices) // rings
+    )
+    colours = np.column_stack((plain(mesh, inner[:3]), alpha))
+    return Painted(mesh, colours, np.tile((0.0, 0.0, 1.0), (len(mesh.vertices), 1)))
+
+
+def furnish(scene: viser.SceneApi) -> None:
+    """Add the lights; the scene has no background, so that of the page is visible."""
+    scene.world_axes.visible = False
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(enabled=False, cast_shadow=False)
+    scene.add_light_hemisphere(
+        "/light/sky", sky_color=SKY, ground_color=GROUND, intensity=SKY_INTENSITY
+    )
+    # The light from behind is only for surfaces lit in advance; it does not reach the eyes' front.
+    for number, light in enumerate(LIGHTS[:2]):
+        scene.add_light_directional(
+            f"/light/{number}",
+            color=light.colour,
+            intensity=light.intensity,
+            position=light.position,
+        )

@@ -8,20 +8,18 @@ import numpy as np
 import viser
 
 from gazerig.gaze.angles import compose, rotate_back, rotation, sub
-from gazerig.gaze.types import Floats, Mat3
-from gazerig.robot.dashboard.view.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Finish, glb
-from gazerig.robot.dashboard.view.glow import glow
-from gazerig.robot.dashboard.view.lid_edges import LidEdges, lid_edges
+from gazerig.gaze.types import Mat3
+from gazerig.robot.dashboard.view.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Finish, glb, glow
 from gazerig.robot.dashboard.view.scene_node import put
-from gazerig.robot.dashboard.view.snapshot_shape import shape_of, with_shown_lids
 from gazerig.robot.description import links
 from gazerig.robot.description.build import SIDES, RigShape, describe
 from gazerig.robot.description.head_shape import HeadMeasures, measures_of
-from gazerig.robot.description.links import Description, Link, Visual, turn_about
+from gazerig.robot.description.links import Description, Link, turn_about
 from gazerig.robot.description.paint import Colour
-from gazerig.robot.description.parts import FLOOR_M
-from gazerig.robot.model.frames import quaternion
-from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.description.parts import FLOOR_M, meeting_rad
+from gazerig.robot.model.frames import CameraParams, quaternion
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LIDS, GeometryParams
 from gazerig.robot.model.types import Snapshot
 
 _SIGHT: dict[str, Colour] = {
@@ -57,6 +55,7 @@ class HeadView:
 
     shape: geometry of the rig; None: derived from snapshots
     on_table: whether it is on an object of a drawn world, and needs no shade of its own
+    lid_edges: positions of the lid edges; without lids before the first snapshot
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:
@@ -64,6 +63,7 @@ class HeadView:
         self.shape: RigShape | None = None
         self.on_table = False
         self.links: dict[str, _Node] = {}
+        self._paths: dict[str, str] = {}
         self._drawn: RigShape | None = None
         self._seen: tuple[tuple[str, ...], HeadMeasures] | None = None
         self._description: Description | None = None
@@ -71,12 +71,7 @@ class HeadView:
         self._shade = self._add("/shade", glb(glow((20, 24, 34, 140), 10), FLAT))
         self._sights: list[viser.LineSegmentsHandle] = []
         self._colour = _SIGHT["fixate"]
-        self._edges = LidEdges({}, {})
-
-    @property
-    def lid_edges(self) -> LidEdges:
-        """Return the positions of the lid edges; without lids before the first snapshot."""
-        return self._edges
+        self.lid_edges = LidEdges({}, {})
 
     def _add(self, name: str, data: bytes) -> viser.GlbHandle:
         return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
@@ -89,7 +84,14 @@ class HeadView:
             sight: with the lines of sight.
             camera: with the camera's housing, which else is left out of the face.
         """
-        self._fit(snapshot)
+        shape = with_shown_lids(self.shape) if self.shape is not None else None
+        if shape is None:
+            seen = snapshot.joints, head_dimensions(snapshot)
+            shape = self._drawn if seen == self._seen else shape_of(*seen, snapshot)
+            self._seen = seen
+        if shape != self._drawn and shape is not None:  # the geometry has changed
+            self._drawn, self.lid_edges = shape, lid_edges(shape)
+            self._draw(describe(shape), shape)
         description, shape = self._description, self._drawn
         assert description is not None and shape is not None  # fitted
         angles = description.angles(snapshot.joints, snapshot.measured_rad)
@@ -101,39 +103,27 @@ class HeadView:
         for look in self.links[description.camera.link].looks:
             look.visible = camera
         self._shade.visible = not self.on_table
-        self._show_sight(snapshot, sight)
-
-    def _show_sight(self, snapshot: Snapshot, wanted: bool) -> None:
         colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
         for line, p_world_m in zip(self._sights, snapshot.p_world_eyes_m, strict=True):
-            if wanted:
+            if sight:
                 # As long as the target's distance: the lines meet there only if the eyes fixate it.
                 line.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
-            line.visible = wanted
+            line.visible = sight
             if colour != self._colour:
                 line.colors = np.array(colour, np.uint8)
         self._colour = colour
 
-    def _fit(self, snapshot: Snapshot) -> None:
-        """Draw another rig if the geometry has changed."""
-        shape = with_shown_lids(self.shape) if self.shape is not None else None
-        if shape is None:
-            seen = snapshot.joints, head_dimensions(snapshot)
-            shape = self._drawn if seen == self._seen else shape_of(*seen, snapshot)
-            self._seen = seen
-        if shape != self._drawn and shape is not None:
-            self._drawn, self._edges = shape, lid_edges(shape)
-            self._draw(describe(shape), shape)
-
     def _draw(self, description: Description, shape: RigShape) -> None:
         """Draw a rig; if it has the same links, only those that look different."""
         before, self._description = self._description, description
-        if before is None or _tree(before) != _tree(description):
-            before = None
-            self._add_frames(description)
+        paths: dict[str, str] = {}  # link -> path of its node, in that of its parent
+        for link in description.links:
+            paths[link.name] = f"{paths[link.parent] if link.parent else '/rig'}/{link.name}"
+        if self._paths != paths:
+            self._paths, before = paths, None
+            self._add_frames(paths)
         at_rest = dict.fromkeys((joint.name for joint in description.joints), 0.0)
         lit = description.poses(at_rest | lid_angles(shape, (_LIT_OPEN,) * 2, (_LIT_OPEN,) * 2))
-        paths = _paths(description)
         for link in description.links:
             node = self.links[link.name]
             put(node.frame, link.p_m, quaternion(link.R))
@@ -142,19 +132,24 @@ class HeadView:
             while node.looks:
                 node.looks.pop().remove()
             for look in link.visuals:
-                pose = _lit_as(link, look, lit[link.name][0])
-                node.looks.append(self._add_look(paths[link.name], look, pose))
+                R_lit = compose(lit[link.name][0], look.R)
+                moved = link.joint.name if link.joint is not None else ""
+                if look.name.endswith("still_lid") or "lower_lid" in moved:
+                    R_lit = _LIT_LOWER_LID
+                data = glb(look.painted, _FINISHES[look.finish], np.array(R_lit))
+                handle = self._add(f"{paths[link.name]}/look_{look.name}", data)
+                handle.position, handle.wxyz = look.p_m, quaternion(look.R)
+                node.looks.append(handle)
         self._shade.scale = _SHADE * shape.geometry.interocular_mm / 1e3
         (base, *_) = description.links
         if base.visuals:
             x, y, _ = base.visuals[0].p_m
             put(self._shade, (x, y, FLOOR_M + 0.001))
 
-    def _add_frames(self, description: Description) -> None:
-        """Add a frame for every link to the scene, in that of its parent."""
+    def _add_frames(self, paths: dict[str, str]) -> None:
+        """Add a frame for every link to the scene, at its path."""
         self._root.remove()
         self._root = self._scene.add_frame("/rig", show_axes=False)
-        paths = _paths(description)
         self.links = {
             name: _Node(self._scene.add_frame(path, show_axes=False), [])
             for name, path in paths.items()
@@ -167,25 +162,6 @@ class HeadView:
             for side in SIDES
         ]  # fmt: skip
 
-    def _add_look(self, path: str, look: Visual, lit: Floats) -> viser.GlbHandle:
-        handle = self._add(
-            f"{path}/look_{look.name}", glb(look.painted, _FINISHES[look.finish], lit)
-        )
-        handle.position, handle.wxyz = look.p_m, quaternion(look.R)
-        return handle
-
-
-def _paths(description: Description) -> dict[str, str]:
-    """Return the pose of each link in the frame of its parent."""
-    found: dict[str, str] = {}
-    for link in description.links:
-        found[link.name] = f"{found[link.parent] if link.parent else '/rig'}/{link.name}"
-    return found
-
-
-def _tree(description: Description) -> list[tuple[str, str | None]]:
-    return [(link.name, link.parent) for link in description.links]
-
 
 def _look_alike(one: Link, other: Link) -> bool:
     """Return whether two links look alike in their own frames."""
@@ -195,13 +171,6 @@ def _look_alike(one: Link, other: Link) -> bool:
         and np.array_equal(a.painted.colours, b.painted.colours)
         for a, b in zip(one.visuals, other.visuals, strict=True)
     )
-
-
-def _lit_as(link: Link, look: Visual, R_world_link: Mat3) -> Floats:
-    """Return the rotation in the scene for which a mesh is lit."""
-    if look.name.endswith("still_lid") or (link.joint and "lower_lid" in link.joint.name):
-        return np.array(_LIT_LOWER_LID)
-    return np.array(compose(R_world_link, look.R))
 
 
 def lid_angles(
@@ -230,3 +199,63 @@ def head_dimensions(snapshot: Snapshot) -> HeadMeasures:
         x, y, z = rotate_back(snapshot.R_world_head, off)
         pivot_m = (round(x, 4), round(y, 4), round(z, 4))
     return measures_of(*snapshot.p_world_eyes_m, pivot_m)
+
+
+class LidEdges(NamedTuple):
+    """Elevations above the eye's equator, in radians.
+
+    meeting_rad: elevation at which the lids of each side meet
+    span_rad: how far each lid opens from there, by its name
+    """
+
+    meeting_rad: Mapping[str, float]
+    span_rad: Mapping[str, float]
+
+    def elevation_rad(self, lid: str, opening: float) -> float:
+        """Return the elevation of a lid's edge at an opening, 0..1."""
+        side, which, _ = lid.split("_")
+        up = 1.0 if which == "upper" else -1.0
+        return self.meeting_rad[side] + up * opening * self.span_rad[lid]
+
+
+def lid_edges(shape: RigShape) -> LidEdges:
+    """Return the lid edges of a rig; a rig without lids has none."""
+    span_rad = {
+        name: abs(wide - shut)
+        for name, (shut, wide) in ((name, shape.lids.get(name, (0.0, 0.0))) for name in LIDS)
+    }
+    meeting = {
+        side: meeting_rad(span_rad[f"{side}_upper_lid"], span_rad[f"{side}_lower_lid"])
+        for side in SIDES
+    }
+    return LidEdges(meeting, span_rad)
+
+
+_LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}
+"""Rotation of shown lids from closed to open, about that of a person. Servos of a small head
+move them less, so that it would always look sleepy."""
+_JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
+
+
+def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot) -> RigShape:
+    """Return a rig with the joints and the dimensions of a snapshot.
+
+    Args:
+        joints: their names.
+        measures: of the head.
+        snapshot: has the pose of the head.
+    """
+    x, _, z = measures.pivot_m
+    pivot_m = snapshot.p_world_pivot_m
+    above_base_m = pivot_m[2] if pivot_m is not None else snapshot.p_world_head_m[2] + z
+    geometry = GeometryParams(
+        max(0.0, 1e3 * above_base_m), -1e3 * x, -1e3 * z, 1e3 * measures.interocular_m
+    )
+    lids = dict.fromkeys((name for name in LIDS if name in joints), (0.0, 0.0))
+    shape = RigShape("rig", geometry, dict.fromkeys(joints, _JOINT), lids, {}, CameraParams())
+    return with_shown_lids(shape)
+
+
+def with_shown_lids(shape: RigShape) -> RigShape:
+    """Return a rig whose lids have the rotation that is shown."""
+    return shape._replace(lids={name: (0.0, _LID_RAD[name.split("_")[1]]) for name in shape.lids})

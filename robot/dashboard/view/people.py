@@ -6,8 +6,7 @@ import numpy as np
 import viser
 
 from gazerig.gaze.types import PARTS, Floats, Vec3
-from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glb
-from gazerig.robot.dashboard.view.glow import glow
+from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glb, glow
 from gazerig.robot.dashboard.view.scene_node import along, put, turn_to
 from gazerig.robot.description.mesh import Mesh, cap, ring
 from gazerig.robot.description.paint import Colour
@@ -130,36 +129,27 @@ class _FaceView:
             f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, side="double"
         )
 
-    def _add_part(self, part: str) -> viser.FrameHandle:
-        frame = self._scene.add_frame(f"{self._name}/{part}", show_axes=False)
-        self._add(f"{part}/mark", cap(0.0042, np.pi, 8), _TARGET)
-        return frame
-
     def show(self, face: SeenFace, p_world_target_m: Vec3, parts: bool) -> None:
         """Move the person; ``parts``: with marks at the parts, a halo around the one looked at."""
         put(self._frame, face.p_world_m, quaternion(face.R_world_face))
         self._label.text = face_label(face)
-        parts_m = _parts_in_face(face)
+        from_centre_m = np.array(face.parts_world_m) - face.p_world_m
+        parts_m: Floats = (from_centre_m @ np.array(face.R_world_face)).round(3)
         size = float(np.linalg.norm(parts_m[_LEFT_EYE] - parts_m[_RIGHT_EYE])) / PUPIL_DISTANCE_M
         self._shape.show(face, parts_m[_NOSE])
-        self._fit(round(size, 2))
-        self._show_parts(face, parts_m, p_world_target_m, parts)
-
-    def _fit(self, size: float) -> None:
-        """Scale the face to its measured size."""
+        size = round(size, 2)
         if self._size != size:
             self._size = size
             self._shape.fit(size)
             self._label.position = (-0.09, 0.0, _LABEL_ABOVE_M * size)
-
-    def _show_parts(
-        self, face: SeenFace, parts_m: Floats, p_world_target_m: Vec3, wanted: bool
-    ) -> None:
-        looked_at = fixated_part(face, p_world_target_m) if wanted else None
-        if wanted and not self._parts:
-            self._parts = [self._add_part(part) for part in PARTS]
+        looked_at = fixated_part(face, p_world_target_m) if parts else None
+        if parts and not self._parts:
+            for part in PARTS:
+                path = f"{self._name}/{part}"
+                self._parts.append(self._scene.add_frame(path, show_axes=False))
+                self._add(f"{part}/mark", cap(0.0042, np.pi, 8), _TARGET)
         for handle, p_m in zip(self._parts, parts_m.tolist(), strict=False):
-            handle.visible = wanted
+            handle.visible = parts
             put(handle, p_m)
         self._halo.visible = looked_at is not None
         if looked_at is not None:
@@ -179,7 +169,7 @@ class _BodyView:
     def __init__(self, scene: viser.SceneApi, body: SeenBody, *, marks: bool) -> None:
         name = f"/bodies/{body.id}"
         self._frame = scene.add_frame(name, show_axes=False)
-        self._kind = body.kind
+        self.kind = body.kind
         self._shape: viser.GlbHandle | viser.IcosphereHandle
         if marks:
             self._shape = scene.add_icosphere(
@@ -197,10 +187,6 @@ class _BodyView:
             )
         self._label = scene.add_label(f"{name}/label", body.kind, anchor="bottom-center")
         self._shade = None if marks else _Shade(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
-
-    def fits(self, body: SeenBody) -> bool:
-        """Return whether this drawing fits a body."""
-        return self._kind == body.kind
 
     def show(self, body: SeenBody) -> None:
         """Move it; a hand shows the rig its palm."""
@@ -257,7 +243,7 @@ class PeopleView:
             self._faces[face.id].show(face, snapshot.p_world_target_m, parts)
         for body in bodies.values():
             shown = self._bodies.get(body.id)
-            if shown is None or not shown.fits(body):
+            if shown is None or shown.kind != body.kind:
                 if shown is not None:
                     shown.remove()
                 self._bodies[body.id] = _BodyView(self._scene, body, marks=self._as_marks)
@@ -278,10 +264,3 @@ def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:
     away_m = np.linalg.norm(np.array(face.parts_world_m) - p_world_target_m, axis=1)
     nearest = int(away_m.argmin())
     return nearest if away_m[nearest] < FIXATED_WITHIN_M else None
-
-
-def _parts_in_face(face: SeenFace) -> Floats:
-    """Return the parts (8, 3) in the face's frame, to the millimetre."""
-    from_centre_m = np.array(face.parts_world_m) - face.p_world_m
-    in_face_m: Floats = from_centre_m @ np.array(face.R_world_face)
-    return in_face_m.round(3)

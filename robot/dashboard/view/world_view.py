@@ -76,8 +76,11 @@ def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
     for part in parts:
         if part.moves:
             continue
-        if isinstance(part.shape, Painted):
-            plain.setdefault(part.finish, []).append(_with_normals(part.shape))
+        shape = part.shape
+        if isinstance(shape, Painted):
+            if shape.normals is None:
+                shape = shape._replace(normals=smooth_normals(shape.mesh))
+            plain.setdefault(part.finish, []).append(shape)
         else:
             files.append(part_glb(part))
     return [glb(merged(shapes), _FINISHES[finish]) for finish, shapes in plain.items()] + files
@@ -89,7 +92,3 @@ def part_glb(part: WorldPart) -> bytes:
     if isinstance(part.shape, Painted):
         return glb(part.shape, finish)
     return textured_glb(part.shape, finish)
-
-
-def _with_normals(shape: Painted) -> Painted:
-    return shape._replace(normals=smooth_normals(shape.mesh)) if shape.normals is None else shape
