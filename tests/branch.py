@@ -40,12 +40,7 @@ _SIGNALS = (
 
 
 class Branch(subprocess.Popen[Any]):
-    """A program in a fork of this process, with all that subprocess.Popen has.
-
-    Args:
-        work: the program; what it raises becomes an exit status as it does in Python.
-        options: as for subprocess.Popen.
-    """
+    """A program in a fork of this process, with all that subprocess.Popen has."""
 
     def __init__(self, work: Callable[[], object], **options: Any) -> None:
         self._work = work
@@ -79,16 +74,7 @@ def become(
     env: dict[str, str] | None = None,
     first: Callable[[], object] | None = None,
 ) -> NoReturn:
-    """Be another program from here on, in a process that has just been forked.
-
-    Args:
-        work: the program.
-        standard: what becomes standard input, output and error; -1 leaves what there is.
-        ends: the parent's ends of pipes.
-        cwd: working directory.
-        env: environment.
-        first: called before the program begins.
-    """
+    """Be another program from here on, in a process that has just been forked."""
     code = 1
     try:
         for fd in ends:
@@ -233,10 +219,7 @@ def branched_children() -> Iterator[None]:
 
 @contextmanager
 def branched_cameras() -> Iterator[None]:
-    """Have cameras' processes start as forks of this one.
-
-    What such a process is given goes through pickle, as it does on its way to another Python.
-    """
+    """Have cameras' processes start as forks of this one."""
     context = multiprocessing.get_context("fork")
 
     def process(

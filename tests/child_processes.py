@@ -17,10 +17,7 @@ _PROC = Path("/proc")
 
 
 def running() -> dict[int, str]:
-    """Return the children of this process that run, by id, each with its command line.
-
-    Those that multiprocessing keeps for itself are not among them, nor those that have ended.
-    """
+    """Return the children of this process that run, by id, each with its command line."""
     own = (resource_tracker._resource_tracker, forkserver._forkserver)
     kept = {getattr(one, name, None) for one in own for name in ("_pid", "_forkserver_pid")}
     found = {}

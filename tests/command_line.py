@@ -69,14 +69,7 @@ def answers_in(folder: Path, *lines: str) -> str:
 
 
 def parse(words: Sequence[str]) -> None:
-    """Read a command as the program would, and do nothing.
-
-    Args:
-        words: what stands after ``gazerig``.
-
-    Raises:
-        ValueError: there is no such command or option, or a word is no value of it.
-    """
+    """Read a command as the program would, and do nothing."""
     command, rest = typer.main.get_command(app), [word for word in words if word != "--help"]
     while isinstance(command, TyperGroup):
         if not rest or rest[0] not in command.commands:

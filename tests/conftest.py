@@ -194,10 +194,7 @@ def branched_camera() -> Iterator[None]:
 
 @pytest.fixture
 def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw figures small and without finding room for their labels, in a third of the time.
-
-    tests/lab/test_report.py draws all of them as users see them.
-    """
+    """Draw figures small and without finding room for their labels, in a third of the time."""
     plotting = pytest.importorskip("gazerig.features.lab.report.plotting")
 
     monkeypatch.setattr(plotting, "_LAYOUT", None)

@@ -47,13 +47,7 @@ Poses = Mapping[str, tuple[Floats, Floats]]
 
 
 def compare(rig: Rig, angles: Mapping[str, float], poses: Poses) -> None:
-    """Assert that links are where the program has them.
-
-    Args:
-        rig: whose description it is.
-        angles: of its joints.
-        poses: of all links as somebody else works them out.
-    """
+    """Assert that links are where the program has them."""
     state, camera = expected(rig, angles)
     _same(poses["head"], (np.array(state.R_world_head), np.array(state.p_world_head_m)))
     _same(poses["camera_optical_frame"], camera)

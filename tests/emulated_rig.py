@@ -7,7 +7,7 @@ from pathlib import Path
 from mixed_rig import mixed_text
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.run_bus import emulated_lines, place_of
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -21,12 +21,7 @@ def mixed_rig(folder: Path) -> Rig:
 
 
 class EmulatedRig:
-    """A rig's buses by name: what is emulated, its port, and the packets sent to it.
-
-    Args:
-        rig: whose servos.
-        lines: what is emulated, by the name of the bus; None: the rig's servos.
-    """
+    """A rig's buses by name: what is emulated, its port, and the packets sent to it."""
 
     def __init__(self, rig: Rig, lines: Mapping[str, Emulated] | None = None) -> None:
         self.rig, self.clock = rig, SimulatedClock()

@@ -28,11 +28,7 @@ START, REPORT, FINISH, WARNING, READY = "start", "report", "finish", "warning", 
 
 
 def count(config: pytest.Config) -> int:
-    """Return how many workers are wanted: one means none besides this process.
-
-    Raises:
-        pytest.UsageError: the option is neither ``auto`` nor a whole number from 1 on.
-    """
+    """Return how many workers are wanted: one means none besides this process."""
     said = str(config.getoption("--workers"))
     if said == "auto":
         return enough()
@@ -51,12 +47,7 @@ def enough() -> int:
 
 
 def run(session: pytest.Session, workers: int) -> None:
-    """Run the collected tests.
-
-    Args:
-        session: with the tests, those of a file one after the other.
-        workers: how many files run at the same time.
-    """
+    """Run the collected tests."""
     by_file = groupby(session.items, key=lambda item: item.nodeid.partition("::")[0])
     files = deque([list(items) for _, items in by_file])
     factory: Any = session.config._tmp_path_factory  # type: ignore[attr-defined]

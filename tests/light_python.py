@@ -36,11 +36,7 @@ for line in sys.stdin:
 
 
 class LightPython:
-    """Runs code in a process that has imported gazerig.robot.app.session alone.
-
-    Args:
-        folder: for what the code writes to its standard output and error.
-    """
+    """Runs code in a process that has imported gazerig.robot.app.session alone."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._count = folder, 0
@@ -51,11 +47,7 @@ class LightPython:
         assert self._process.stdout is not None and self._process.stdout.readline() == "loaded\n"
 
     def run(self, code: str, folder: Path) -> tuple[str, str]:
-        """Run code in a folder; return what it wrote to its standard output and error.
-
-        Raises:
-            AssertionError: it raised an exception, or ended otherwise.
-        """
+        """Run code in a folder; return what it wrote to its standard output and error."""
         self._count += 1
         said = [self._folder / f"{self._count}.{stream}" for stream in ("out", "err")]
         asked = {"code": code, "folder": str(folder), "said": [str(file) for file in said]}

@@ -1,7 +1,4 @@
-"""Servo buses over a noisy emulated line, tick by tick: what they give as fresh, against the truth.
-
-Everything is in this process and on simulated time. Steps are the servos' own.
-"""
+"""Servo buses over a noisy emulated line: what they give as fresh, against the truth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -75,12 +72,7 @@ class Outcome:
 
 
 class Noisy:
-    """Six servos of one kind, the truth about them, and a line that faults strike.
-
-    Args:
-        kind: one of ``KINDS``.
-        seed: of the line's noise.
-    """
+    """Six servos of one kind, the truth about them, and a line that faults strike."""
 
     def __init__(self, kind: str, seed: int = 1) -> None:
         self.kind = kind

@@ -1,7 +1,4 @@
-"""Four moving smart servos in this process, and the faults that all such buses live through.
-
-A bus's own test makes the chain and the driver; here is what is done with them.
-"""
+"""Four moving smart servos in this process, and the faults that all such buses live through."""
 
 from typing import Any
 

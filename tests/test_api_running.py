@@ -350,10 +350,7 @@ def test_states_are_the_newest_and_cost_the_loop_nothing(head: gazerig.Head) -> 
 def run_script(
     file: Path, *arguments: str, fresh: bool = False
 ) -> subprocess.CompletedProcess[str]:
-    """Run a program of its own, which finds the helpers of the tests.
-
-    fresh: in a Python that starts for it, not in a branch of this process.
-    """
+    """Run a program of its own, which finds the helpers of the tests."""
     pipe = subprocess.PIPE
     if fresh:
         tests = str(Path(__file__).parent)

@@ -1,11 +1,4 @@
-"""What befalls every kind of bus while a head moves on it, and how each of it ends.
-
-A fault lasts for 0.6 s in a running loop of bus and guard at 100 Hz. In every tick the
-true servos are judged (gazerig.testing): goals inside the limits, places inside the range,
-speeds below the top. After it all joints move as before, or some are left limp or still,
-each named with its cause. tests/bench/bench_faults.py runs the same on the shipped rigs with
-all their joints, for a second and at 200 Hz.
-"""
+"""What befalls every kind of bus while a head moves on it, and how each of it ends."""
 
 from dataclasses import replace
 from functools import cache

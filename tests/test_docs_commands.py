@@ -79,10 +79,7 @@ def _tried(word: str) -> str:
 
 
 def quick_commands() -> list[str]:
-    """Return the commands that need no terminal, camera, running rig or recording.
-
-    Those of the tutorial build on each other: test_tutorial tries them.
-    """
+    """Return the commands that need no terminal, camera, running rig or recording."""
     runs = [words for words in COMMANDS if words.startswith("run ") and "--mock" in words]
     quick = ("check ", "schema ")
     others = [words for words in COMMANDS if words.startswith(quick)]

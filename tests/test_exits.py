@@ -1,7 +1,4 @@
-"""Whatever ends a program that holds heads: no servo keeps its torque.
-
-All exits of all interfaces on all kinds of bus: tests/attack/exits.py.
-"""
+"""Whatever ends a program that holds heads: no servo keeps its torque."""
 
 import faulthandler
 import subprocess

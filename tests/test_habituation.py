@@ -43,10 +43,7 @@ def arc(*away_m: float) -> Bodies:
 def watch(
     seen: Bodies, seconds: float, later: Bodies | None = None, **params: float
 ) -> list[Target]:
-    """Let attention look at a scene that stays as it is, 30 pictures a second.
-
-    later: the scene for as long again
-    """
+    """Let attention look at a scene that stays as it is, 30 pictures a second."""
     model = Attention(
         AttentionParams(habituation=HabituationParams(**params)),
         FieldOfView(FieldOfViewParams()),

@@ -1,7 +1,4 @@
-"""How far the head goes from any start to any target: never past it, and no less for more interest.
-
-Numbered checks are listed in docs/checks.md.
-"""
+"""How far the head goes from any start to any target: never past it."""
 
 from math import degrees, radians
 from typing import Literal

@@ -1,8 +1,4 @@
-"""Head, blinks and idle gaze of the running product: the rows of the bench in a short form.
-
-All but one run on servos without bytes; the bench has them byte-true. Numbered checks are listed in
-docs/checks.md.
-"""
+"""Head, blinks and idle gaze of the running product: the rows of the bench in a short form."""
 
 from human import row_05_homeward_head, row_14_blinks, row_15_head_share, row_16_idle
 from human.measured_run import half_rate_run, measured_run

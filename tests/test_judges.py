@@ -1,8 +1,4 @@
-"""Clients that others wrote do all they can on the emulated bus: Rust, and two vendor SDKs.
-
-None of them knows that there are no servos. The older SDK lives beside the environment
-(`make test` puts it into .venv/other-sdk) and judges in a process of its own.
-"""
+"""Clients that others wrote do all they can on the emulated bus: Rust, and two vendor SDKs."""
 
 import os
 import subprocess

@@ -1,7 +1,4 @@
-"""A client that others wrote does all it can on the emulated STS bus: rustypot, in Rust.
-
-It does not know that there are no servos: it has packets, signs and units of its own.
-"""
+"""A client that others wrote does all it can on the emulated STS bus: rustypot, in Rust."""
 
 import math
 import time

@@ -1,8 +1,4 @@
-"""What processes do not import: that of the control loop has NumPy, the serial port, rig files.
-
-OpenCV, detectors, the page's server and what writes recordings belong to processes of their own, a
-world's physics and graphics too.
-"""
+"""What processes do not import: that of the control loop has NumPy, the serial port, rig files."""
 
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -77,10 +73,7 @@ def test_the_process_of_the_loop_imports_little(
 
 @with_mujoco
 def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_path: Path) -> None:
-    """Nor does that of a world in real time know MuJoCo: it is in two other processes.
-
-    Where people are it reads from a file of the process that has the world.
-    """
+    """Nor does that of a world in real time know MuJoCo: it is in two other processes."""
     pytest.importorskip("gazerig.features.world")
     code = (
         "import sys; from gazerig.robot.app.assemble import assemble; "

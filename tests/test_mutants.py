@@ -30,10 +30,7 @@ def test_no_two_mutants_are_one() -> None:
 
 
 def claims() -> dict[str, set[str]]:
-    """Return the rows of both papers, and the tests that each names: test files, or functions.
-
-    The sections of gaze.md name none.
-    """
+    """Return the rows of both papers, and the tests that each names: test files, or functions."""
     found: dict[str, set[str]] = {}
     for line in (ROOT / "docs/checks.md").read_text("utf-8").splitlines():
         if number := re.match(r"\| ([ESRBA]\d+) \|", line):

@@ -1,7 +1,4 @@
-"""A camera upside down, on its side, mirrored, of any and of changing size: the same directions.
-
-Numbered checks are listed in docs/checks.md.
-"""
+"""A camera upside down, on its side, mirrored, of any and of changing size: the same directions."""
 
 import pickle
 import threading

@@ -1,9 +1,4 @@
-"""Hundreds of thousands of random wishes with random servos: nothing outside any limit leaves.
-
-Wishes, measurements, ages, faults, torque, heat, load, voltage, restarts and ticks are drawn
-at random, in sequences of one mood each; every command is then judged by itself, without
-the guard's own arithmetic.
-"""
+"""Hundreds of thousands of random wishes with random servos: nothing outside any limit leaves."""
 
 import os
 from collections.abc import Callable

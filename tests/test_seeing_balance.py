@@ -1,7 +1,4 @@
-"""Row 12 of seeing in a short form: on film, the gaze is on the face that is there.
-
-What is looked at is in the picture.
-"""
+"""Row 12 of seeing in a short form: on film, the gaze is on the face that is there."""
 
 import pytest
 from seeing.material import at_hand, carphone

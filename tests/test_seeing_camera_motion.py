@@ -1,7 +1,4 @@
-"""A camera that is shaken, bumped or panned without anybody knowing sees what really moves.
-
-Numbered checks are listed in docs/checks.md.
-"""
+"""A camera that is shaken, bumped or panned without anybody knowing sees what really moves."""
 
 import pytest
 from seeing.moving_room import FIELD_RAD, Pose, frames, still

@@ -1,7 +1,4 @@
-"""What compression, light and shadows do to a room that stands still is no moving thing.
-
-Numbered checks are listed in docs/checks.md.
-"""
+"""What compression, light and shadows do to a room that stands still is no moving thing."""
 
 from dataclasses import replace
 from types import ModuleType

@@ -1,7 +1,4 @@
-"""Sync reads of every family: whole answers at once, damaged ones piece by piece, and who is asked.
-
-What their values become, and which of them are believed, is here, too.
-"""
+"""Sync reads of every family: whole answers at once, damaged ones piece by piece."""
 
 import struct
 from collections.abc import Callable

@@ -1,8 +1,4 @@
-"""True joints of emulated rigs: range, speed and acceleration, late ticks and slow entries.
-
-Judged on the emulator's own shafts in every millisecond, not on what is read or sent.
-tests/attack/true_motion.py prints the whole table and runs for hours.
-"""
+"""True joints of emulated rigs: range, speed and acceleration, late ticks and slow entries."""
 
 from collections.abc import Iterator
 from math import radians

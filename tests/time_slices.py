@@ -25,14 +25,7 @@ _ATTRIBUTES = "=IIQiIQQQ"
 
 
 def ask_for(slice_s: float | None) -> bool:
-    """Ask for turns of this length for the calling thread; processes it starts have usual ones.
-
-    Args:
-        slice_s: 100 us to 100 ms; None: the usual length.
-
-    Returns:
-        Whether the system took the wish, which stands for processes without real-time priority.
-    """
+    """Ask for turns of this length for the calling thread; processes it starts have usual ones."""
     call = _SCHED_SETATTR.get(platform.machine())
     if sys.platform != "linux" or call is None:
         return False

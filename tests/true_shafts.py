@@ -19,9 +19,9 @@ from gazerig.config.schema import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.emulation import emulated_lines, place_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.app.run_bus import emulated_lines, place_of
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.types import JointAngles
@@ -35,7 +35,7 @@ SPEED_MS, ACCEL_MS = 5, 10
 PULSE_MS = 20
 GROUPS = {"eye": "eyes", "lid": "lids", "neck": "neck"}
 STOP_DEG = 4.0
-"""Emulated mechanical stops lie so far beyond a joint's range (robot/app/emulation.py)."""
+"""Emulated mechanical stops lie so far beyond a joint's range (robot/app/run_bus.py)."""
 
 
 def group_of(joint: str) -> str:
@@ -44,14 +44,7 @@ def group_of(joint: str) -> str:
 
 
 class Shafts(SimulatedClock):
-    """A simulated clock that looks at every true joint in each millisecond that passes.
-
-    Args:
-        rig: the joints.
-
-    Attributes:
-        angles_rad: one row a millisecond since the last ``clear``, in the order of the joints.
-    """
+    """A simulated clock that looks at every true joint in each millisecond that passes."""
 
     def __init__(self, rig: Rig) -> None:
         super().__init__()
@@ -113,11 +106,7 @@ class Worst(NamedTuple):
 
 
 class Judge:
-    """Gathers what true joints did at worst.
-
-    Args:
-        rig: the joints and their limits.
-    """
+    """Gathers what true joints did at worst."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -239,12 +228,7 @@ def run(
 
 
 class Bench:
-    """A rig's guard and bus without gaze: wishes in, true shafts out.
-
-    Args:
-        rig: what is emulated.
-        where_rad: where joints truly stand at first, by name.
-    """
+    """A rig's guard and bus without gaze: wishes in, true shafts out."""
 
     def __init__(self, rig: Rig, where_rad: dict[str, float] | None = None) -> None:
         self.rig = rig

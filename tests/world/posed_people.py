@@ -50,15 +50,7 @@ class Pose(NamedTuple):
 
 
 class PosedPeople:
-    """A world with one figure of each look, of which one at a time is before the camera.
-
-    Args:
-        looks: which.
-        size_px: of the pictures.
-        noise_grey: of the camera.
-        params: of the renderer.
-        shadows: the window's light casts shadows.
-    """
+    """A world with one figure of each look, of which one at a time is before the camera."""
 
     def __init__(
         self,

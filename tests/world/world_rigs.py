@@ -11,8 +11,8 @@ from gazerig.features.world.run.run_world import rig_in_world
 from gazerig.robot.app import run_bus
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.emulation import emulated_lines, place_of
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_bus import emulated_lines, place_of
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build
@@ -26,12 +26,7 @@ def mujoco_or_skip() -> Any:
 
 
 class WorldBench:
-    """A shipped rig twice on one clock: its servos in a world, and with mechanics of their own.
-
-    Attributes:
-        world: the world.
-        servos: those in it, and own: those with mechanics of their own, by joint.
-    """
+    """A shipped rig twice on one clock: its servos in a world, and with mechanics of their own."""
 
     def __init__(self, rig: str | Rig, mjcf_file: Path | None = None) -> None:
         from gazerig.features.world.model import world_model
@@ -94,13 +89,7 @@ def arm(servo: Any, gains: tuple[int, ...] = ()) -> None:
 
 
 class WorldRun:
-    """A run of a shipped rig in a world without people, looking at a scene's.
-
-    Attributes:
-        rig: the rig.
-        made: the run's parts.
-        world: the world, with the servos of all its buses.
-    """
+    """A run of a shipped rig in a world without people, looking at a scene's."""
 
     def __init__(self, name: str, monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
         from gazerig.features.world.model import world_model
