@@ -250,7 +250,12 @@ class _Reader:
         for key, value in node.value:
             line = _line(key)
             if not isinstance(key, ScalarNode) or str(key.tag) != f"{_TAG}str":
-                self._note(line, path, _bad_key(key))
+                if str(key.tag) == f"{_TAG}merge":
+                    bad_key = "merge keys (<<) are not read; write the keys out"
+                else:
+                    name = abbreviated(key.value) if isinstance(key, ScalarNode) else "this"
+                    bad_key = f"key {name} is not text; put it in quotes"
+                self._note(line, path, bad_key)
             elif key.value in entries:
                 first = entries[key.value].line
                 self._note(line, (*path, key.value), f"key stands twice, first in line {first}")
@@ -261,14 +266,6 @@ class _Reader:
     def _note(self, line: int, path: tuple[Step, ...], rule: str) -> None:
         """Record a fault."""
         self._faults.append(ConfigFault(self._file, line, ".".join(map(str, path)), "", rule))
-
-
-def _bad_key(key: Node) -> str:
-    """Return why a key is not accepted."""
-    if str(key.tag) == f"{_TAG}merge":
-        return "merge keys (<<) are not read; write the keys out"
-    name = abbreviated(key.value) if isinstance(key, ScalarNode) else "this"
-    return f"key {name} is not text; put it in quotes"
 
 
 def _whole(text: str) -> int | str:

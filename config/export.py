@@ -120,26 +120,19 @@ def _rule(shape: Shape, details: ErrorDetails) -> str:
             return " ".join(str(details["ctx"]["error"]).split())
         case "literal_error" if isinstance(value, str):
             return f"{abbreviated(value)} is not {expected(shape)}{suggestion(value, map(str, shape.choices))}"
-    return f"{_named(value)}, wanted {expected(shape)}{_hint(shape, value)}"
-
-
-def _named(value: object) -> str:
-    """Return a value and its type, as text."""
     if value is None:
-        return "is empty"
-    if isinstance(value, dict | tuple):
-        return f"is {_TYPE_WORDS[type(value)]}"
-    return f"{abbreviated(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
-
-
-def _hint(shape: Shape, value: object) -> str:
-    """Return the correction of a value of the wrong type if it is obvious, else ""."""
+        named = "is empty"
+    elif isinstance(value, dict | tuple):
+        named = f"is {_TYPE_WORDS[type(value)]}"
+    else:
+        named = f"{abbreviated(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
+    hint = ""  # the correction if it is obvious
     if shape.form == "text" and isinstance(value, bool | int | float):
-        return "; put it in quotes"
-    if shape.form in ("number", "whole") and isinstance(value, str):
+        hint = "; put it in quotes"
+    elif shape.form in ("number", "whole") and isinstance(value, str):
         bare = value.replace(".", "", 1).removeprefix("-").isdecimal()
-        return "; take the quotes away" if bare else ""
-    return ""
+        hint = "; take the quotes away" if bare else ""
+    return f"{named}, wanted {expected(shape)}{hint}"
 
 
 def _range(shape: Shape) -> str:

@@ -119,23 +119,14 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     Raises:
         gazerig.config.load.ConfigError: with every fault, as in loading a file.
     """
-    made = _judged(rig, changes)
-    return made if made is not None else _weighed(rig, changes)
-
-
-def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
-    """Return the changed rig, None where anything is wrong with it.
-
-    Sections in which nothing changes go through the judge as they are, already checked.
-    """
+    # Sections in which nothing changes go through the judge as they are, already checked.
     data = _opened(rig, [tuple(key.split(".")) for key in changes])
-    if any([_put(_root(rig), data, key, _frozen(value)) for key, value in changes.items()]):
-        return None
-    into, problems = extended(Rig, data)
-    made, _ = validate(into, data)
-    if problems or made is None or any(True for rule in RULES for _ in rule(made)):
-        return None
-    return made
+    if not any([_put(_root(rig), data, key, _frozen(value)) for key, value in changes.items()]):
+        into, problems = extended(Rig, data)
+        made, _ = validate(into, data)
+        if not problems and made is not None and not any(True for r in RULES for _ in r(made)):
+            return made
+    return _weighed(rig, changes)
 
 
 def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
@@ -323,7 +314,8 @@ def _put(root: Shape, data: dict[str, Any], key: str, value: Value) -> list[Conf
     held: Any = data
     shape: Shape | None = root
     for step in over:
-        shape = _below(shape, step)
+        if shape is not None:
+            shape = shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
         if isinstance(held, dict) and held.get(step, {}) is None and shape is not None:
             held[step] = {}
         held = held.setdefault(step, {}) if isinstance(held, dict) else None
@@ -338,12 +330,6 @@ def _put(root: Shape, data: dict[str, Any], key: str, value: Value) -> list[Conf
     else:
         held[last] = value
     return []
-
-
-def _below(shape: Shape | None, step: str) -> Shape | None:
-    if shape is None:
-        return None
-    return shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
 
 
 def _laid_over(low: dict[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:

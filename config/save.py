@@ -151,7 +151,15 @@ def _proposal(
     mark = b"\xef\xbb\xbf" if base.startswith(b"\xef\xbb\xbf") else b""
     try:
         text = edited(before.text, changes, into)
-        _refuse_side_effects(before.data, text, changes)
+        # An anchor lends its value to other places, which must not change unseen.
+        kept, fresh = _leaves(before.data), _leaves(_document(text.encode()).data)
+        for key in sorted({*kept, *fresh}):
+            requested = key in changes or any(c.startswith(f"{key}.") for c in changes)
+            if not requested and kept.get(key, _ABSENT) != fresh.get(key, _ABSENT):
+                raise EditRefused(
+                    f"{key} would change as well, as an anchor (&) ties it to "
+                    f"{', '.join(changes)}; write its value out first"
+                )
     except EditRefused as error:
         raise _fault(target, str(error)) from None
     old = {key: _follow(before.data, key) for key in changes}
@@ -193,22 +201,6 @@ def _follow(value: Any, key: str) -> Any:
         else:
             value = getattr(value, step, _ABSENT)
     return value
-
-
-def _refuse_side_effects(before: dict[str, Any], text: str, changes: Mapping[str, Value]) -> None:
-    """Check that the new text differs in the requested values only.
-
-    An anchor lends its value to other places, which must not change unseen.
-    """
-    after = _document(text.encode()).data
-    kept, found = _leaves(before), _leaves(after)
-    for key in sorted({*kept, *found}):
-        requested = key in changes or any(c.startswith(f"{key}.") for c in changes)
-        if not requested and kept.get(key, _ABSENT) != found.get(key, _ABSENT):
-            raise EditRefused(
-                f"{key} would change as well, as an anchor (&) ties it to "
-                f"{', '.join(changes)}; write its value out first"
-            )
 
 
 def _leaves(value: Any, path: str = "") -> dict[str, Any]:

@@ -90,7 +90,26 @@ class BusLossSuite(BusBenches):
 
     def test_a_port_that_stays_away_is_given_up_and_told_at_release(self, another):
         for name in another().bench.buses:
-            _expect_give_up(another().bench, name)
+            here = another().bench
+            here.pulses_on()
+            bus = here.bus(give_up_s=1.0)
+            bus.open()
+            bus.enable_torque()
+            here.command("unplug", name)
+            began_s = here.now_s()
+            with pytest.raises(BusLost, match=f"emulated {name} has been gone for 1.[012] s"):
+                here.run(bus, 3.0, here.starts())
+            assert here.now_s() - began_s < 1.3
+            with pytest.raises(BusLost, match=f"emulated {name} is gone.*cut the servo power"):
+                bus.disable_torque()
+            # The servos that could be reached were released nevertheless.
+            assert [on for p, on in enumerate(here.holding()) if here.on[p] != name] == [False] * (
+                here.count - len(here.buses[name])
+            )
+            here.command("plug", name)
+            bus.disable_torque()
+            assert not any(here.holding())
+            bus.close()
 
     def test_no_read_takes_long_while_nobody_answers(self, here):
         here.pulses_on()
@@ -136,7 +155,18 @@ class BusLossSuite(BusBenches):
         bus.open()
         bus.enable_torque()
         here.run(bus, 0.3, here.starts())
-        _apply_fault(here, bus, befalls)
+        if befalls == "unplug":
+            here.command("unplug for 0.2")
+        elif befalls:
+            if befalls == "power cut":
+                here.command("lose all for 1")
+            for place in range(here.count):
+                if not here.is_board(place) or place == min(here.buses[here.on[place]]):
+                    here.strike("brown-out", place)
+        if befalls:
+            here.until(bus, lambda r: None in r or any(row.rearmed for row in r), here.starts())
+            here.until(bus, well, here.starts())
+            bus.events()
         before_s, before = here.now_s(), here.steps(here.truth())
         for _ in range(30):
             here.run(bus, 0.0, [0.95] * here.count)
@@ -204,41 +234,3 @@ def _run_until_recovered(twin, bus, gone):
         twin.wait(0.01)
     twin.run(bus, 0.3, goals)
     return rearmed
-
-
-def _expect_give_up(here, name):
-    here.pulses_on()
-    bus = here.bus(give_up_s=1.0)
-    bus.open()
-    bus.enable_torque()
-    here.command("unplug", name)
-    began_s = here.now_s()
-    with pytest.raises(BusLost, match=f"emulated {name} has been gone for 1.[012] s"):
-        here.run(bus, 3.0, here.starts())
-    assert here.now_s() - began_s < 1.3
-    with pytest.raises(BusLost, match=f"emulated {name} is gone.*cut the servo power"):
-        bus.disable_torque()
-    # The servos that could be reached were released nevertheless.
-    assert [on for p, on in enumerate(here.holding()) if here.on[p] != name] == [False] * (
-        here.count - len(here.buses[name])
-    )
-    here.command("plug", name)
-    bus.disable_torque()
-    assert not any(here.holding())
-    bus.close()
-
-
-def _apply_fault(here, bus, what):
-    """Apply a fault to all servos while they hold, until all hold again."""
-    if what == "unplug":
-        here.command("unplug for 0.2")
-    elif what:
-        if what == "power cut":
-            here.command("lose all for 1")
-        for place in range(here.count):
-            if not here.is_board(place) or place == min(here.buses[here.on[place]]):
-                here.strike("brown-out", place)
-    if what:
-        here.until(bus, lambda r: None in r or any(row.rearmed for row in r), here.starts())
-        here.until(bus, well, here.starts())
-        bus.events()

@@ -183,15 +183,11 @@ class Machine:
         if isinstance(device, Bridge):
             return device.body.width_steps(place, self.clock.now_s()) or None
         if not isinstance(device, ServoChain):
-            return self._reported_goal(device, i)
+            reports = json.loads(device.faults.command("status"))["servos"]
+            (servo,) = (one for one in reports if one["id"] == self.setups[i].id)
+            return int(servo["goal"]) if servo["torque"] else None
         servo = device.servos[place]
         return int(servo.memory.get("goal_position")) if servo.torque else None
-
-    def _reported_goal(self, device: Device, i: int) -> int | None:
-        """Return the goal that a package's device reports for a joint's servo."""
-        reports = json.loads(device.faults.command("status"))["servos"]
-        (servo,) = (one for one in reports if one["id"] == self.setups[i].id)
-        return int(servo["goal"]) if servo["torque"] else None
 
     # --- ticks
 

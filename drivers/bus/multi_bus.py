@@ -116,10 +116,6 @@ class MultiBus:
             timer.update(feedbacks[i], now_s)
         if lost:
             raise lost[0]
-        return self._combine(feedbacks)
-
-    def _combine(self, feedbacks: Sequence[Feedback]) -> Feedback:
-        """Return the feedback of all buses as one."""
         columns = [tuple(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]
         missing = list[int]()
         if columns.pop():

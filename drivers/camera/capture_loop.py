@@ -101,7 +101,11 @@ class FrameAnalyzer:
         """Find and locate faces (unless the camera has found them), people, palms and motion."""
         began_s = perf_counter()
         height, width = shot.image.shape[:2]
-        faces = self._faces(shot)
+        if shot.faces is None:
+            faces = self._detector.find(shot.image)
+        else:
+            add_meshes = getattr(self._detector, "add_meshes", None)
+            faces = shot.faces if add_meshes is None else add_meshes(shot.image, shot.faces)
         for line in self._off_frame.report(faces, width, height):
             self._faults.setdefault(line, False)
         faces = tuple([face for face in faces if not is_off_frame(face, width, height)])
@@ -119,6 +123,14 @@ class FrameAnalyzer:
             "people and hands": bodies_s - faces_s,
             "motion": perf_counter() - bodies_s,
         }
+        field_rad = getattr(self._locate, "field_rad", None)
+        field_assumed = (
+            self._has_unknown_lens
+            and shot.lens is None
+            and getattr(self._locate, "lens", None) is None
+            and field_rad is not None
+            and abs(degrees(field_rad) - ASSUMED_FIELD_DEG) < 1e-6
+        )
         found = Detections(
             shot.captured_s,
             shot.number,
@@ -133,26 +145,11 @@ class FrameAnalyzer:
             scene=self._cuts.scene(shot.image),
             people=people,
             palms=palms,
-            conditions=self._health.look(shot, faces, spent_s, self._field_assumed(shot)),
+            conditions=self._health.look(shot, faces, spent_s, field_assumed),
         )
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)
         return found.located_by(self._locate)
-
-    def _field_assumed(self, shot: Shot) -> bool:
-        """Return whether the field of view is not measured."""
-        if not self._has_unknown_lens or shot.lens is not None:
-            return False
-        if getattr(self._locate, "lens", None) is not None:
-            return False
-        field_rad = getattr(self._locate, "field_rad", None)
-        return field_rad is not None and abs(degrees(field_rad) - ASSUMED_FIELD_DEG) < 1e-6
-
-    def _faces(self, shot: Shot) -> tuple[DetectedFace, ...]:
-        if shot.faces is None:
-            return self._detector.find(shot.image)
-        add_meshes = getattr(self._detector, "add_meshes", None)
-        return shot.faces if add_meshes is None else add_meshes(shot.image, shot.faces)
 
     def events(self) -> tuple[str, ...]:
         """Return events of detector and calibration since the last call, one line each."""

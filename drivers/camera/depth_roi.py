@@ -48,7 +48,16 @@ def depth_at(
     depth = np.asarray(depth_m)
     if depth.ndim != 2 or not depth.size or (mask is not None and mask.shape != depth.shape):
         return _NOTHING
-    top, bottom, left, right = _window(depth.shape, box_px, shrink)
+    height, width = depth.shape
+    top, bottom, left, right = 0, height, 0, width
+    if box_px is not None:
+        if not np.isfinite(box_px).all():
+            return _NOTHING
+        x, y, w, h = box_px
+        middle_x, middle_y = x + w / 2.0, y + h / 2.0
+        half_x, half_y = max(0.5, shrink * w / 2.0), max(0.5, shrink * h / 2.0)
+        top, bottom = np.clip([round(middle_y - half_y), round(middle_y + half_y)], 0, height)
+        left, right = np.clip([round(middle_x - half_x), round(middle_x + half_x)], 0, width)
     seen = np.asarray(depth[top:bottom, left:right], dtype=np.float64)
     if mask is not None:
         seen = seen[mask[top:bottom, left:right]]
@@ -93,21 +102,6 @@ def resize_depth(depth_m: Depth, width_px: int, height_px: int) -> Depth:
     found = np.asarray(cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST), np.float32)
     found.setflags(write=False)
     return found
-
-
-def _window(
-    shape: tuple[int, ...], box_px: tuple[float, float, float, float] | None, shrink: float
-) -> tuple[int, int, int, int]:
-    """Return the rows and columns to read: top, bottom, left, right."""
-    height, width = shape[0], shape[1]
-    if box_px is None or not np.isfinite(box_px).all():
-        return (0, height, 0, width) if box_px is None else (0, 0, 0, 0)
-    x, y, w, h = box_px
-    middle_x, middle_y = x + w / 2.0, y + h / 2.0
-    half_x, half_y = max(0.5, shrink * w / 2.0), max(0.5, shrink * h / 2.0)
-    top, bottom = np.clip([round(middle_y - half_y), round(middle_y + half_y)], 0, height)
-    left, right = np.clip([round(middle_x - half_x), round(middle_x + half_x)], 0, width)
-    return int(top), int(bottom), int(left), int(right)
 
 
 def _nearest_layer(valid_m: NDArray[np.float64]) -> NDArray[np.float64]:

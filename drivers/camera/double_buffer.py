@@ -183,7 +183,12 @@ class PoseBuffer:
 
     def at(self, t_s: float) -> Floats | None:
         """Return R_world_camera (3, 3) at a time; None if it is not stored."""
-        known = self._known()
+        # The complete entries in the order of time: (n, 10).
+        before = int(self._count.value)
+        entries = np.frombuffer(self._entries, np.float64).reshape(_ENTRIES, _WIDTH).copy()
+        after = int(self._count.value)
+        first = 0 if after <= _ENTRIES - _MARGIN else after - _ENTRIES + _MARGIN
+        known = entries[np.arange(first, before) % _ENTRIES]
         if not len(known) or t_s < known[0, 0] or t_s > known[-1, 0] + _NEWEST_SERVES_S:
             return None
         after = int(np.searchsorted(known[:, 0], t_s))
@@ -203,11 +208,3 @@ class PoseBuffer:
         """Return R_now_before (3, 3), which turns directions in camera axes; None if unknown."""
         now, before = self.at(now_s), self.at(before_s)
         return None if now is None or before is None else np.asarray(now.T @ before)
-
-    def _known(self) -> Floats:
-        """Return the complete entries in the order of time: (n, 10)."""
-        before = int(self._count.value)
-        entries = np.frombuffer(self._entries, np.float64).reshape(_ENTRIES, _WIDTH).copy()
-        after = int(self._count.value)
-        first = 0 if after <= _ENTRIES - _MARGIN else after - _ENTRIES + _MARGIN
-        return entries[np.arange(first, before) % _ENTRIES]

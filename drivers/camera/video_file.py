@@ -123,7 +123,17 @@ class _Film:
         elif times.rate_hz == stated[0]:
             # The stated number of frames is often the length times the rate: if the rate is wrong,
             # so is the number.
-            _check_complete(path, self._capture, len(first_s))
+            frames = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+            if frames > len(first_s):
+                self._capture.set(cv2.CAP_PROP_POS_FRAMES, frames - 1)
+                reached = frames
+                if not self._capture.grab():
+                    reached = int(self._capture.get(cv2.CAP_PROP_POS_FRAMES))
+                if reached < _LEAST_COMPLETE * frames:
+                    raise CameraError(
+                        f"{path} is cut short after {reached} of {frames} frames: "
+                        "copy it again or convert it"
+                    )
         self.times = times
         self._rewind()
         self._number, self._index = 0, 0  # last frame reached, and its index in this repeat
@@ -182,22 +192,6 @@ def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
             break
         found.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
     return found
-
-
-def _check_complete(path: Path, capture: cv2.VideoCapture, seen: int) -> None:
-    """Reject a film that ends long before its stated end.
-
-    seen: number of frames read already
-    """
-    stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    if stated <= seen:  # complete, or a stream without an index
-        return
-    capture.set(cv2.CAP_PROP_POS_FRAMES, stated - 1)
-    reached = stated if capture.grab() else int(capture.get(cv2.CAP_PROP_POS_FRAMES))
-    if reached < _LEAST_COMPLETE * stated:
-        raise CameraError(
-            f"{path} is cut short after {reached} of {stated} frames: copy it again or convert it"
-        )
 
 
 def _check_forward(number: int, least: int) -> None:

@@ -104,7 +104,14 @@ class Webcam:
         self._rate_hz = capture.get(cv2.CAP_PROP_FPS)
         self._rate = FrameRateMonitor(f"camera {self._file}", self._rate_hz)
         self._left_s = None
-        self._report_once(self._refused_format(capture))
+        given = int(capture.get(cv2.CAP_PROP_FOURCC))
+        name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
+        wanted = _FOURCC[self._params.format]
+        if name and name != wanted:
+            self._report_once(
+                f"camera {self._file} uses {name} instead of {wanted} (webcam.format): large frames "
+                "may come slowly"
+            )
         for line in apply_controls(self._file, self._params):
             self._report_once(f"camera {self._file} {line}")
 
@@ -161,18 +168,6 @@ class Webcam:
         """Store a line once, even if the camera is reopened."""
         self._report(line)
         self._told.add(line)
-
-    def _refused_format(self, capture: cv2.VideoCapture) -> str:
-        """Return a message if the camera uses another format than requested, otherwise ""."""
-        given = int(capture.get(cv2.CAP_PROP_FOURCC))
-        name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
-        wanted = _FOURCC[self._params.format]
-        if not name or name == wanted:
-            return ""
-        return (
-            f"camera {self._file} uses {name} instead of {wanted} (webcam.format): large frames may "
-            "come slowly"
-        )
 
 
 # From linux/v4l2-controls.h and videodev2.h.

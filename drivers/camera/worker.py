@@ -101,7 +101,17 @@ def run(
                     slots[1].put(depth) if depth is not None else None,
                 )
             )
-            _retune(camera, requests, pipe)
+            # Of several detectors only the last is created.
+            detector: Callable[[], FaceDetector] | None = None
+            while requests:
+                message = requests.popleft()
+                detector = message.detector or detector
+                camera.retune(None, message.motion, message.locate)
+            if detector is not None:
+                try:
+                    camera.retune(detector, None)
+                except SetupError as error:
+                    pipe.send(f"the detector is unchanged: {error}")
     except OSError:  # the parent has ended
         pass
     except Exception as failure:
@@ -121,18 +131,3 @@ def _receive_requests(pipe: Connection, stop: threading.Event, requests: deque[R
     # A thread that is blocked in a camera's driver would keep that camera busy forever.
     threading.Event().wait(LONGEST_END_S)
     os._exit(1)
-
-
-def _retune(camera: CaptureLoop, requests: deque[Retune], pipe: Connection) -> None:
-    """Apply queued requests; of several detectors only the last is created."""
-    detector: Callable[[], FaceDetector] | None = None
-    while requests:
-        message = requests.popleft()
-        detector = message.detector or detector
-        camera.retune(None, message.motion, message.locate)
-    if detector is None:
-        return
-    try:
-        camera.retune(detector, None)
-    except SetupError as error:
-        pipe.send(f"the detector is unchanged: {error}")

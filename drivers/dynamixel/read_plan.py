@@ -55,7 +55,10 @@ class FastSyncRead:
         at = raw.find(self._head)
         if at < 0:
             # An answer of another length is an earlier one, in front of the expected one.
-            at = _past_packet(raw)
+            at = 0
+            if raw.startswith(_OTHERS) and len(raw) >= len(_OTHERS) + 2:
+                length = int.from_bytes(raw[5:7], "little")
+                at = 7 + length if length <= _LONGEST else 0
         return max(0, at + self.reply_length - len(raw))
 
     def pieces(self, raw: bytes) -> PartialReply:
@@ -106,14 +109,6 @@ def _all_intact(parts: tuple[bytes, ...], checks: tuple[int, ...]) -> bool:
 
 
 _OTHERS = HEADER + bytes((BROADCAST,))
-
-
-def _past_packet(raw: bytes) -> int:
-    """Return the end of a broadcast packet at the beginning, 0 if there is none."""
-    if not raw.startswith(_OTHERS) or len(raw) < len(_OTHERS) + 2:
-        return 0
-    length = int.from_bytes(raw[5:7], "little")
-    return 7 + length if length <= _LONGEST else 0
 
 
 _LONGEST = 2048

@@ -156,7 +156,16 @@ def statuses(raw: bytes) -> list[Status]:
             params = raw[at + 5 : end - 1]
             found.append((at, end, Status(raw[at + 2], raw[at + 4], params, intact, at)))
         at = _header(raw, at + 1)
-    return _apart(found)
+    # Remove statuses found inside an intact one; mark overlapping intact ones as damaged.
+    right = [(at, end) for at, end, status in found if status.intact]
+    kept = []
+    for at, end, status in found:
+        across = [span for span in right if span != (at, end) and span[0] < end and at < span[1]]
+        if not across:
+            kept.append(status)
+        elif status.intact:
+            kept.append(status._replace(intact=False))
+    return kept
 
 
 CHECK = "B"
@@ -179,19 +188,6 @@ def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
     Adler-32 is the sum plus 1, and is computed nine times as fast.
     """
     return not any(map((0xFF).__and__, map(adler32, parts)))
-
-
-def _apart(found: Sequence[tuple[int, int, Status]]) -> list[Status]:
-    """Remove statuses found inside an intact one; mark overlapping intact ones as damaged."""
-    right = [(at, end) for at, end, status in found if status.intact]
-    kept = []
-    for at, end, status in found:
-        across = [span for span in right if span != (at, end) and span[0] < end and at < span[1]]
-        if not across:
-            kept.append(status)
-        elif status.intact:
-            kept.append(status._replace(intact=False))
-    return kept
 
 
 def bytes_missing(raw: bytes, count: int, length: int) -> int:

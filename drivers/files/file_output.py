@@ -72,7 +72,19 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
-                _put_in_place(fresh, target, path, force)
+                if target.exists():
+                    shutil.copymode(target, fresh)
+                if force:
+                    os.replace(fresh, target)
+                else:
+                    try:  # unlike a rename, it never replaces a file created meanwhile
+                        os.link(fresh, target)
+                    except FileExistsError:
+                        raise SetupError(_exists_message(path)) from None
+                    except OSError:  # a file system without links
+                        if target.exists():
+                            raise SetupError(_exists_message(path)) from None
+                        os.replace(fresh, target)
             finally:
                 fresh.unlink(missing_ok=True)
 
@@ -112,23 +124,6 @@ def make_folder(path: Path) -> None:
     """
     with _clear(path):
         path.mkdir(parents=True, exist_ok=True)
-
-
-def _put_in_place(fresh: Path, target: Path, path: Path, force: bool) -> None:
-    """Move a finished file to its path."""
-    if target.exists():
-        shutil.copymode(target, fresh)
-    if force:
-        os.replace(fresh, target)
-        return
-    try:
-        os.link(fresh, target)  # unlike a rename, it never replaces a file created meanwhile
-    except FileExistsError:
-        raise SetupError(_exists_message(path)) from None
-    except OSError:  # a file system without links
-        if target.exists():
-            raise SetupError(_exists_message(path)) from None
-        os.replace(fresh, target)
 
 
 def _exists_message(path: Path) -> str:

@@ -164,7 +164,10 @@ class HobbyBoardBus(PortBus):
             BusLost: the port is lost.
             ServoMissing: the board does not answer, or a channel does not accept its goal.
         """
-        self._apply_wanted()
+        self._setups = self._wanted
+        self._apply_limits()
+        for channel, setup in zip(self._channels, self._setups, strict=True):
+            channel.set_target(setup)
         try:
             if not self._reported:
                 self._reported = True
@@ -212,23 +215,16 @@ class HobbyBoardBus(PortBus):
         errors = self._supervisor.recent_errors(self._port.now_s())
         return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
 
-    # --- holding
-
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         for setup in setups:
             self._board.params.check(setup)
+
+    # --- holding
 
     def _apply_limits(self) -> None:
         """Apply the ranges of the active setups."""
         self._lowest = tuple(setup.min_steps for setup in self._setups)
         self._highest = tuple(setup.max_steps for setup in self._setups)
-
-    def _apply_wanted(self) -> None:
-        """Apply the setups stored since the servos were last held."""
-        self._setups = self._wanted
-        self._apply_limits()
-        for channel, setup in zip(self._channels, self._setups, strict=True):
-            channel.set_target(setup)
 
     # --- reading
 

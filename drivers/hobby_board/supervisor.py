@@ -175,25 +175,19 @@ class BoardSupervisor:
             if channel not in odd:
                 channel.confirmed(found[channel])
         if away or home:
-            self._restore()
+            # Arm the limits again, which a restart loses, then send the active goals. A board that
+            # moves its channels home at their armed speed has not moved them far yet. A goal to a
+            # channel that an error has just left without pulses would not be ramped, so goals are
+            # sent only if the limits arrived intact.
+            held = [channel for channel in self._channels if channel.held]
+            if held:
+                if not self._board.send_limits(held, confirmed=True):
+                    self.sure = False
+                else:
+                    self._board.send_goals(held)
         for channel in self.pending:
             channel.found(found[channel])
         return True
-
-    def _restore(self) -> None:
-        """Arm the limits again, which a restart loses, then send the active goals.
-
-        A board that moves its channels home at their armed speed has not moved them far yet. A goal
-        to a channel that an error has just left without pulses would not be ramped, so goals are
-        sent only if the limits arrived intact.
-        """
-        held = [channel for channel in self._channels if channel.held]
-        if not held:
-            return
-        if not self._board.send_limits(held, confirmed=True):
-            self.sure = False
-            return
-        self._board.send_goals(held)
 
     def _off_goal(self, channel: Channel, pulse: int) -> None:
         """Record that a channel stays off its goal, at a limit of the board's own range."""
@@ -226,7 +220,15 @@ class BoardSupervisor:
         self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
         self._restarts.append(now_s)
         if len(self._restarts) > MOST_RESTARTS:
-            self._give_up()
+            # Channels that lose their pulses repeatedly stay without.
+            fault = "restarts again and again: supply too weak"
+            for channel in self.pending:
+                channel.fault = fault
+                self._log.add(f"{channel.setup.label('channel')}: {fault}")
+            self._board.stop([channel.id for channel in self.pending])
+            for channel in self.pending:
+                channel.stop()
+            self.pending.clear()
         else:
             self._log.add(f"{who} restarted: set up again")
 
@@ -258,17 +260,6 @@ class BoardSupervisor:
         if channel.held:
             channel.release()
             self.pending.append(channel)
-
-    def _give_up(self) -> None:
-        """Give up channels that lose their pulses repeatedly, leaving them without pulses."""
-        fault = "restarts again and again: supply too weak"
-        for channel in self.pending:
-            channel.fault = fault
-            self._log.add(f"{channel.setup.label('channel')}: {fault}")
-        self._board.stop([channel.id for channel in self.pending])
-        for channel in self.pending:
-            channel.stop()
-        self.pending.clear()
 
     def _recover_next(self, now_s: float) -> None:
         """Enable one channel again; the next one at the next read, to spare the supply."""

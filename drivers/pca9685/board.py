@@ -198,10 +198,7 @@ class Pca9685Board:
         prescale = found[2][0] if with_prescale else usual
         if found[0][0] == AWAKE and prescale == usual:
             return ChannelStatus(self._pulse_steps(channel.id, counts_of(found[1]), prescale))
-        return self._recheck(channel)
-
-    def _recheck(self, channel: Channel) -> ChannelStatus | None:
-        """Check a board again that has lost its setup or was read badly."""
+        # The board has lost its setup, or was read badly.
         address, _ = self._places[channel.id]
         now, pulses = self._modes(address), self.pulses((channel.id,))
         if now is None or pulses is None:

@@ -52,7 +52,22 @@ def check_board(line: I2cLine, address: int) -> None:
     tries = (_registers(line, address) for _ in range(TRIES))
     found = next((one for one in tries if one is not None), None)
     if found is None:
-        raise ServoMissing(f"{where}{_silence_reason(line, address)}")
+        if line.failure == "bus stuck":
+            silence_reason = (
+                "the I2C bus is stuck, its data or clock line is held low: switch the "
+                "supply of its devices off and on, check SDA and SCL for a short"
+            )
+        elif line.failure != "not acknowledged":
+            silence_reason = (
+                f"no answer as an I2C bus ({line.failure}): a PCA9685 is reached over "
+                "an I2C bus such as /dev/i2c-1: write it under bus.port"
+            )
+        else:
+            silence_reason = (
+                f"no PCA9685 answers at {address:#x}: has the board its logic supply (VCC, "
+                "not V+ alone)? check SDA, SCL and ground; its jumpers make the address"
+            )
+        raise ServoMissing(f"{where}{silence_reason}")
     first_six, outputs, prescale = found
     if not plausible(first_six, outputs, prescale):
         raise ServoMissing(
@@ -64,24 +79,6 @@ def check_board(line: I2cLine, address: int) -> None:
             f"{where}the board at {address:#x} was set to an external clock: switch its logic "
             "supply off and on"
         )
-
-
-def _silence_reason(line: I2cLine, address: int) -> str:
-    """Return the reason of a failed read, with the remedy."""
-    if line.failure == "bus stuck":
-        return (
-            "the I2C bus is stuck, its data or clock line is held low: switch the "
-            "supply of its devices off and on, check SDA and SCL for a short"
-        )
-    if line.failure != "not acknowledged":
-        return (
-            f"no answer as an I2C bus ({line.failure}): a PCA9685 is reached over "
-            "an I2C bus such as /dev/i2c-1: write it under bus.port"
-        )
-    return (
-        f"no PCA9685 answers at {address:#x}: has the board its logic supply (VCC, "
-        "not V+ alone)? check SDA, SCL and ground; its jumpers make the address"
-    )
 
 
 def _registers(line: I2cLine, address: int) -> tuple[bytes, bytes, int] | None:

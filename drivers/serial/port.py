@@ -300,7 +300,20 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.closePort()
         if termios is None:
             raise PortError(f"{self.port_name}: real servos need Linux; here there is --mock")
-        where = self._where()
+        # A port that was open is found by its adaptor's serial number.
+        lasting, name = self._lasting, str(self.port_name)
+        if lasting is None:
+            where = name
+        elif os.path.exists(lasting):
+            same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
+            where = name if same else lasting
+        else:
+            now = persistent_name(self.port_name, self._by_id)
+            if now not in (None, lasting):
+                raise PortError(
+                    f"{self.port_name} is another adaptor now ({now}): plug in {lasting}"
+                )
+            where = name
         try:
             self.ser = Serial(where, cflag_baud, timeout=0, exclusive=self._exclusive or None)
         except (SerialException, OSError) as error:
@@ -320,23 +333,6 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.is_using = False
         self.tx_time_per_byte = 1000.0 * BITS_PER_BYTE / cflag_baud
         return True
-
-    def _where(self) -> str:
-        """Return the path to open; a port that was open is found by its adaptor's serial number.
-
-        Raises:
-            PortError: another adaptor now has its name.
-        """
-        lasting, name = self._lasting, str(self.port_name)
-        if lasting is None:
-            return name
-        if os.path.exists(lasting):
-            same = os.path.realpath(lasting) == os.path.realpath(self.port_name)
-            return name if same else lasting
-        now = persistent_name(self.port_name, self._by_id)
-        if now not in (None, lasting):
-            raise PortError(f"{self.port_name} is another adaptor now ({now}): plug in {lasting}")
-        return name
 
     def closePort(self) -> None:
         """Close; safe to call twice."""

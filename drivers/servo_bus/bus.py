@@ -1,7 +1,7 @@
 """Smart servos of one family on one serial bus: one read and one write per tick."""
 
 import struct
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 
 from gazerig.drivers.bus.goal_limits import clip_goals
@@ -196,18 +196,6 @@ class SmartServoBus(PortBus):
         self._unconfirmed -= {*kept, *self._poll_list.out}
         return kept
 
-    def _send_to_others(self, withheld: Collection[int], goals: Sequence[int]) -> None:
-        """Send goals to all servos except the withheld ones.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-        speeds = self._goal_speeds()
-        kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
-        if kept:
-            some = self._family.goals([self._ids[k] for k in kept])
-            self._line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
-
     def _goal_speeds(self) -> Sequence[int]:
         """Return the speeds that are sent with goals, if the family has them."""
         entering = self._supervisor.entering
@@ -340,7 +328,13 @@ class SmartServoBus(PortBus):
             packet = self._goals.packet(goals, speeds)
         try:
             if withheld:
-                self._send_to_others(withheld, goals)
+                speeds = self._goal_speeds()
+                kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
+                if kept:
+                    some = self._family.goals([self._ids[k] for k in kept])
+                    self._line.send(
+                        some.packet([goals[k] for k in kept], [speeds[k] for k in kept])
+                    )
             else:
                 line.send(packet)
         except BusLost as lost:
@@ -391,11 +385,7 @@ class SmartServoBus(PortBus):
         self._supervisor.mark_all_for_recovery()
 
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
-        """Check that ranges are within one turn: a servo forgets whole turns when it restarts.
-
-        Raises:
-            ValueError: a range is not.
-        """
+        # Ranges are within one turn: a servo forgets whole turns when it restarts.
         turn = self._family.steps_per_turn
         for setup in setups if self._family.single_turn else ():
             if not 0 <= setup.min_steps <= setup.max_steps < turn:

@@ -255,7 +255,17 @@ def find(
     if not any(found.values()) and not strangers:
         raise ServoMissing(f"{where}: no servo answers: check servo power, cable and baud rate")
     if problems:
-        raise ServoMissing(_message(family, where, problems, strangers, found))
+        there = "; ".join(problems)
+        if strangers:
+            named = ", ".join(
+                f"{i} ({family.model_name(one.model_number)})"
+                for i, one in sorted(strangers.items())
+            )
+            there += f"; unexpected: servo {named}"
+        swapped = (
+            "; is one of them the missing one?" if strangers and None in found.values() else ""
+        )
+        raise ServoMissing(f"{where}: {there}: check cables and ids{swapped}")
     for servo_id, identity in sorted(strangers.items()):
         model = family.model_name(identity.model_number)
         log.add(f"servo {servo_id} ({model}) belongs to no joint: not used")
@@ -275,22 +285,3 @@ def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
             "update it with the maker's tool"
         )
     return ""
-
-
-def _message(
-    family: Family,
-    where: str,
-    problems: Sequence[str],
-    strangers: Mapping[int, Identity],
-    found: Mapping[int, Identity | None],
-) -> str:
-    """Return all problems in one line, with the remedy."""
-    there = "; ".join(problems)
-    if strangers:
-        named = ", ".join(
-            f"{i} ({family.model_name(one.model_number)})" for i, one in sorted(strangers.items())
-        )
-        there += f"; unexpected: servo {named}"
-    if strangers and None in found.values():
-        return f"{where}: {there}: check cables and ids; is one of them the missing one?"
-    return f"{where}: {there}: check cables and ids"

@@ -130,7 +130,12 @@ class ServoHealth:
             self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return
         if self.all_silent_since_s is None:
-            self._report_silent(out, now_s, garbling)
+            for servo_id in out:
+                silent_s = now_s - self._silent_since[servo_id]
+                if servo_id not in self._reported and silent_s >= SAY_SILENT_S:
+                    self._reported.add(servo_id)
+                    what = GARBLES if servo_id in garbling else "does not answer"
+                    self._log.add(f"{self._setups[servo_id].label()} {what}")
         elif not self._all_silent and now_s - self.all_silent_since_s >= BLAME_S:
             self._all_silent = True
             self._log.add("no servo answers: check servo power and cable")
@@ -168,14 +173,6 @@ class ServoHealth:
                 f"{servos} stopped them, as packets get lost: check cable and plugs; they continue "
                 "from their position", now_s, "lost",
             )  # fmt: skip
-
-    def _report_silent(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
-        for servo_id in out:
-            silent_s = now_s - self._silent_since[servo_id]
-            if servo_id not in self._reported and silent_s >= SAY_SILENT_S:
-                self._reported.add(servo_id)
-                what = GARBLES if servo_id in garbling else "does not answer"
-                self._log.add(f"{self._setups[servo_id].label()} {what}")
 
     def silent_for_s(self, now_s: float) -> float:
         """Return the time for which no servo has answered, seconds."""

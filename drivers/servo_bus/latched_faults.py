@@ -99,7 +99,25 @@ class LatchedFaultSupervisor(Supervisor):
             if due is not None:
                 self._check(due)
         if not covered and now_s >= self._slow_at_s:
-            self._ask_slow(group, now_s)
+            # Torque, or voltage and temperature, of one servo; the next call reads the next.
+            self._slow_at_s = now_s + SLOW_S
+            self._slow = (self._slow + 1) % (2 * len(self._ids))
+            slot, climate = divmod(self._slow, 2)
+            servo_id = self._ids[slot]
+            if servo_id in group:
+                if climate:
+                    registers = self._family.registers
+                    volts = registers["present_input_voltage"]
+                    warm = registers["present_temperature"]
+                    span = warm.address + warm.size - volts.address
+                    for data in self._line.ask_bytes((servo_id,), volts.address, span).values():
+                        tenths = volts.decode(data[: volts.size])
+                        self._feedback.set_climate(slot, tenths, warm.decode(data[-warm.size :]))
+                else:
+                    for torque in self._line.ask((servo_id,), "torque_enable").values():
+                        self._feedback.set_torque(slot, bool(torque))
+                        if self._lacks_torque(servo_id, torque):
+                            self._suspect(servo_id)
         self.due_s = min(
             -inf if self.entering.places or self._rearmed else inf,
             self._recover_at_s if self._suspects else inf,
@@ -134,24 +152,3 @@ class LatchedFaultSupervisor(Supervisor):
             self._line.starved = True
         elif state != armed and servo_id not in self._health.faults:
             self._suspect(servo_id)
-
-    def _ask_slow(self, group: Collection[int], now_s: float) -> None:
-        """Read torque, or voltage and temperature, of one servo; the next call reads the next."""
-        self._slow_at_s = now_s + SLOW_S
-        self._slow = (self._slow + 1) % (2 * len(self._ids))
-        slot, climate = divmod(self._slow, 2)
-        servo_id = self._ids[slot]
-        if servo_id not in group:
-            return
-        if climate:
-            registers = self._family.registers
-            volts, warm = registers["present_input_voltage"], registers["present_temperature"]
-            span = warm.address + warm.size - volts.address
-            for data in self._line.ask_bytes((servo_id,), volts.address, span).values():
-                tenths, celsius = volts.decode(data[: volts.size]), warm.decode(data[-warm.size :])
-                self._feedback.set_climate(slot, tenths, celsius)
-        else:
-            for torque in self._line.ask((servo_id,), "torque_enable").values():
-                self._feedback.set_torque(slot, bool(torque))
-                if self._lacks_torque(servo_id, torque):
-                    self._suspect(servo_id)

@@ -69,7 +69,16 @@ class Provisioning:
             self._correct(differences)
             for _ in range(self._family.passes - 1):
                 self._correct(self.differences(ids))
-            self._raise_differences(self.differences(ids))
+            differences = self.differences(ids)
+            if differences:
+                named = "; ".join(
+                    f"{self._setups[servo_id].label()} does not take "
+                    f"{register_label(register.name)} {wanted}, it has {found}"
+                    for servo_id, register, found, wanted in differences
+                )
+                raise ServoMissing(
+                    f"{self._where}: {named}: restart its power or correct the rig file"
+                )
         if self._block is not None:
             # Write the indirect addresses that differ.
             block = self._block
@@ -171,17 +180,6 @@ class Provisioning:
         found = self._line.ask_bytes(ids, block.address, len(block.data))
         self._raise_missing(ids, found, "indirect addresses")
         return found
-
-    def _raise_differences(self, differences: Sequence[Difference]) -> None:
-        """Raise an error for registers that still have wrong values."""
-        if not differences:
-            return
-        named = "; ".join(
-            f"{self._setups[servo_id].label()} does not take "
-            f"{register_label(register.name)} {wanted}, it has {found}"
-            for servo_id, register, found, wanted in differences
-        )
-        raise ServoMissing(f"{self._where}: {named}: restart its power or correct the rig file")
 
     def _raise_missing(self, ids: Iterable[int], found: Mapping[int, object], what: str) -> None:
         missing = [self._setups[i].label() for i in ids if i not in found]

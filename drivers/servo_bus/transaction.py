@@ -64,17 +64,13 @@ class AdaptiveTimeout:
                 self.seconds = min(self._most_s, FACTOR * worst_s[0])
         self._count += 1
         if self._count >= WINDOW:
-            self._turn()
+            late_s = max(self._before_s, self._worst_s[0])
+            self.seconds = min(self._most_s, max(self._least_s, FACTOR * late_s))
+            self._before_s, self._worst_s, self._count = self._worst_s[0], [0.0] * RANK, 0
 
     def missed(self) -> None:
         """Record that an answer came after its time-out."""
         self.update(self.seconds)
-
-    def _turn(self) -> None:
-        """Discard the window before the last."""
-        worst_s = max(self._before_s, self._worst_s[0])
-        self.seconds = min(self._most_s, max(self._least_s, FACTOR * worst_s))
-        self._before_s, self._worst_s, self._count = self._worst_s[0], [0.0] * RANK, 0
 
 
 TRIES, HURRIED = 3, 4.0

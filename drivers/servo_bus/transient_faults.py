@@ -138,45 +138,6 @@ class TransientFaultSupervisor(Supervisor):
         wanted = self._family.armed(self._setups[servo_id]).items()
         return all(limit is None or getattr(sample, name) == limit for name, limit in wanted)
 
-    def _reread_doubtful(self, group: Collection[int]) -> None:
-        """Read marked servos once more, and schedule recovery of those that are not armed.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-        window = self._plan.armed
-        if window is None:
-            return
-        ids = tuple(i for i in self._ids if i in self._doubted and i in group)
-        for servo_id, data in self._line.ask_bytes(ids, window.address, window.length).items():
-            self._doubted.discard(servo_id)
-            sample = window.sample(0, data)
-            if sample.torque != 1:
-                self._torque_off.add(servo_id)
-                if not self._has_known_reason(servo_id):
-                    self._suspects.add(servo_id)
-            elif not self._is_armed(servo_id, sample):
-                # A restart too short to be noticed, after which a goal switched torque on.
-                self._suspects.add(servo_id)
-
-    def _check_settings(self, group: Collection[int], now_s: float) -> None:
-        """Compare one servo's settings on a disturbed line; the next servo at the next call.
-
-        An instruction changed by noise may pass the one-byte checksum and overwrite any register:
-        limits, gains, mode. A servo that differs is set up again at low speed.
-
-        Raises:
-            BusLost: the port is lost.
-        """
-        servo_id = self._next_to_check(group, now_s + CHECK_S)
-        if servo_id is None:
-            return
-        # Shortly after trouble on the line the answers do not contain torque.
-        self._doubted.add(servo_id)
-        if self._recovery.differs(servo_id):
-            self._line.errors["setting changed"] += 1
-            self._suspects.add(servo_id)
-
     def _has_known_reason(self, servo_id: int) -> bool:
         """Return whether the reason for a servo's lack of torque is known."""
         if servo_id not in self._health.faults:
@@ -195,9 +156,31 @@ class TransientFaultSupervisor(Supervisor):
         """
         disturbed = now_s - self._feedback.places.damaged_s <= DISTURBED_S
         if disturbed and self.engaged and now_s >= self._check_at_s:
-            self._check_settings(group, now_s)
+            # One servo's settings on a disturbed line; the next servo at the next call. An
+            # instruction changed by noise may pass the one-byte checksum and overwrite any
+            # register: limits, gains, mode. A servo that differs is set up again at low speed.
+            servo_id = self._next_to_check(group, now_s + CHECK_S)
+            if servo_id is not None:
+                # Shortly after trouble on the line the answers do not contain torque.
+                self._doubted.add(servo_id)
+                if self._recovery.differs(servo_id):
+                    self._line.errors["setting changed"] += 1
+                    self._suspects.add(servo_id)
         if self._doubted and group:
-            self._reread_doubtful(group)
+            window = self._plan.armed
+            if window is not None:
+                ids = tuple(i for i in self._ids if i in self._doubted and i in group)
+                found = self._line.ask_bytes(ids, window.address, window.length)
+                for servo_id, data in found.items():
+                    self._doubted.discard(servo_id)
+                    sample = window.sample(0, data)
+                    if sample.torque != 1:
+                        self._torque_off.add(servo_id)
+                        if not self._has_known_reason(servo_id):
+                            self._suspects.add(servo_id)
+                    elif not self._is_armed(servo_id, sample):
+                        # A restart too short to be noticed, after which a goal switched torque on.
+                        self._suspects.add(servo_id)
         if self._suspects and now_s >= self._recover_at_s:
             self._recover(group, now_s)
         if self.entering.places:

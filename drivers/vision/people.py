@@ -83,7 +83,20 @@ class PeopleDetector:
         if captured_s < self._due_s or image.size == 0:
             return ()
         frame = as_bgr(image)
-        squares = _squares(frame.shape[1], frame.shape[0])
+        # Overlapping squares as high as the frame cover it.
+        height, width = frame.shape[:2]
+        count = max(1, ceil((width - height) / (_STEP * height)) + 1)
+        if count == 1:
+            side = float(max(width, height))
+            squares = [_Square((width - side) / 2.0, side, -np.inf, np.inf)]
+        else:
+            apart = (width - height) / (count - 1)
+            edges = [-np.inf, *[(i + 0.5) * apart + height / 2.0 for i in range(count - 1)], np.inf]
+            both = _BOTH * height
+            squares = [
+                _Square(i * apart, float(height), edges[i] - both, edges[i + 1] + both)
+                for i in range(count)
+            ]
         self._next %= len(squares)
         if self._next == 0:
             self._started_s = captured_s
@@ -108,21 +121,6 @@ class PeopleDetector:
             if not any(_is_same(person, other) for other in found):
                 found.append(person)
         return tuple(found)
-
-
-def _squares(width: int, height: int) -> list[_Square]:
-    """Return overlapping squares as high as a frame that cover it."""
-    count = max(1, ceil((width - height) / (_STEP * height)) + 1)
-    if count == 1:
-        side = float(max(width, height))
-        return [_Square((width - side) / 2.0, side, -np.inf, np.inf)]
-    apart = (width - height) / (count - 1)
-    edges = [-np.inf, *[(i + 0.5) * apart + height / 2.0 for i in range(count - 1)], np.inf]
-    both = _BOTH * height
-    return [
-        _Square(i * apart, float(height), edges[i] - both, edges[i + 1] + both)
-        for i in range(count)
-    ]
 
 
 def confidences(scores: Floats) -> NDArray[np.float64]:

@@ -52,7 +52,14 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
     Raises:
         UnusableModel: it is for another chip, or does not detect faces with five landmarks.
     """
-    wrong = _made_for_another(archive, platform)
+    # Why an archive does not run on a chip, "" if it does.
+    chips = list(archive.getSupportedPlatforms())
+    if not chips:
+        wrong = "its network is not converted for the chip of an OAK camera"
+    elif platform not in chips:
+        wrong = f"it is made for {', '.join(chip.name for chip in chips)}, this is {platform.name}"
+    else:
+        wrong = ""
     heads = archive.getConfig().model.heads or []
     parsers = [str(head.parser) for head in heads]
     kind: FaceNet | None = None
@@ -85,16 +92,6 @@ def _yunet_fault(archive: Any) -> str:
     size = archive.getInputSize()
     if size is None or size[0] % STRIDES[-1] or size[1] % STRIDES[-1]:
         return f"its frames of {size} are no multiples of {STRIDES[-1]} px"
-    return ""
-
-
-def _made_for_another(archive: Any, platform: Any) -> str:
-    """Return why an archive does not run on a chip, "" if it does."""
-    chips = list(archive.getSupportedPlatforms())
-    if not chips:
-        return "its network is not converted for the chip of an OAK camera"
-    if platform not in chips:
-        return f"it is made for {', '.join(chip.name for chip in chips)}, this is {platform.name}"
     return ""
 
 

@@ -101,7 +101,27 @@ def read_calibration(dai: Any, calibration: Any, params: OakParams) -> OakCalibr
         raise CameraError(f"{_NO_LENS} ({' '.join(str(error).split())}): {_BOARD}") from error
     if not np.isfinite(K).all() or min(K[0, 0], K[1, 1]) < _LEAST_FOCAL_PX:
         raise CameraError(f"{_NO_LENS}: {_BOARD}")
-    own, fit_px = _five_numbers(K, coefficients, fisheye, size)
+    # Fit k1 k2 p1 p2 k3 to a lens of any OpenCV model; return them and the residual, px.
+    u, v = np.meshgrid(np.linspace(0, size[0] - 1, 33), np.linspace(0, size[1] - 1, 21))
+    pixels = np.column_stack((u.ravel(), v.ravel()))[:, None]
+    if fisheye:
+        rays = cv2.fisheye.undistortPoints(pixels, K, coefficients[:4])[:, 0]
+    else:
+        rays = cv2.undistortPointsIter(pixels, K, coefficients, _AXES, _AXES, _PRECISELY)[:, 0]
+    seen = (pixels[:, 0] - K[:2, 2]) / K[[0, 1], [0, 1]]
+    x, y = np.asarray(rays, dtype=np.float64).T
+    r2 = x * x + y * y
+    # The model of the OpenCV manual is linear in its five numbers.
+    of_x = np.column_stack((x * r2, x * r2**2, 2 * x * y, r2 + 2 * x * x, x * r2**3))
+    of_y = np.column_stack((y * r2, y * r2**2, r2 + 2 * y * y, 2 * x * y, y * r2**3))
+    table, right = np.vstack((of_x, of_y)), np.concatenate((seen[:, 0] - x, seen[:, 1] - y))
+    if not (np.isfinite(table).all() and np.isfinite(right).all()):
+        own, fit_px = _STRAIGHT, np.inf
+    else:
+        numbers = np.linalg.lstsq(table, right, rcond=None)[0]
+        left = (table @ numbers - right).reshape(2, -1) * K[[0, 1], [0, 1]][:, None]
+        a, b, c, d, e = numbers.tolist()
+        own, fit_px = (a, b, c, d, e), float(np.sqrt((left**2).sum(axis=0).mean()))
     if not params.undistort and not fit_px <= _MOST_FIT_PX:
         raise CameraError(
             f"the lens of this OAK camera bends frames more than k1 k2 p1 p2 k3 can say "
@@ -132,28 +152,3 @@ def _place(calibration: Any, socket: Any, colour: Any) -> Vec3 | None:
         return None
     x, y, z = (found[:3, 3] / 100.0).tolist()
     return x, y, z
-
-
-def _five_numbers(
-    K: Floats, coefficients: Floats, fisheye: bool, size: tuple[int, int]
-) -> tuple[Distortion, float]:
-    """Fit k1 k2 p1 p2 k3 to a lens of any OpenCV model; return them and the residual, px."""
-    u, v = np.meshgrid(np.linspace(0, size[0] - 1, 33), np.linspace(0, size[1] - 1, 21))
-    pixels = np.column_stack((u.ravel(), v.ravel()))[:, None]
-    if fisheye:
-        rays = cv2.fisheye.undistortPoints(pixels, K, coefficients[:4])[:, 0]
-    else:
-        rays = cv2.undistortPointsIter(pixels, K, coefficients, _AXES, _AXES, _PRECISELY)[:, 0]
-    seen = (pixels[:, 0] - K[:2, 2]) / K[[0, 1], [0, 1]]
-    x, y = np.asarray(rays, dtype=np.float64).T
-    r2 = x * x + y * y
-    # The model of the OpenCV manual is linear in its five numbers.
-    of_x = np.column_stack((x * r2, x * r2**2, 2 * x * y, r2 + 2 * x * x, x * r2**3))
-    of_y = np.column_stack((y * r2, y * r2**2, r2 + 2 * y * y, 2 * x * y, y * r2**3))
-    table, right = np.vstack((of_x, of_y)), np.concatenate((seen[:, 0] - x, seen[:, 1] - y))
-    if not (np.isfinite(table).all() and np.isfinite(right).all()):
-        return _STRAIGHT, np.inf
-    numbers = np.linalg.lstsq(table, right, rcond=None)[0]
-    left = (table @ numbers - right).reshape(2, -1) * K[[0, 1], [0, 1]][:, None]
-    a, b, c, d, e = numbers.tolist()
-    return (a, b, c, d, e), float(np.sqrt((left**2).sum(axis=0).mean()))

@@ -77,7 +77,13 @@ class Gyro:
             self._reject(device_s, rates_rad_s)
             return
         self._absurd_since_s = None
-        if self._is_stuck(device_s, rates_rad_s):
+        # Readings are always noisy.
+        if rates_rad_s != self._last or self._same_since_s is None:
+            self._last, self._same_since_s = rates_rad_s, device_s
+        elif device_s - self._same_since_s > _STUCK_S:
+            x, y, z = map(degrees, rates_rad_s)
+            self._fail(f"is stuck: always the same reading ({x:.2f}, {y:.2f}, {z:.2f} deg/s)")
+        if self.fault:
             return
         x, y, z = (self._R_camera_imu @ rates_rad_s).tolist()
         self._bias.add(device_s, (x, y, z))
@@ -134,15 +140,6 @@ class Gyro:
         self._times.append(device_s)
         self._turned.append(turned)
         self._rates.append(rates)
-
-    def _is_stuck(self, device_s: float, rates: Rates) -> bool:
-        """Return whether readings have not changed for too long, although they are always noisy."""
-        if rates != self._last or self._same_since_s is None:
-            self._last, self._same_since_s = rates, device_s
-        elif device_s - self._same_since_s > _STUCK_S:
-            x, y, z = map(degrees, rates)
-            self._fail(f"is stuck: always the same reading ({x:.2f}, {y:.2f}, {z:.2f} deg/s)")
-        return bool(self.fault)
 
     def _reject(self, device_s: float, rates: Rates) -> None:
         """Reject an impossible reading; a single one may be a disturbance."""

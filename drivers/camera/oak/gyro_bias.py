@@ -44,27 +44,24 @@ class GyroBias:
             self._means.append(np.mean(self._block, axis=0))
         self._block, self._began_s = [], t_s
         if len(self._means) == _BLOCKS:
-            self._assess(np.array(self._means))
+            # The gyro was at rest if these averages agree.
+            means = np.array(self._means)
+            mean = means.mean(axis=0)
+            if np.abs(means - mean).max() > _SPREAD_RAD_S or np.abs(mean).max() > _MOST_RAD_S:
+                self._elsewhere = 0
+            elif self.rad_s is None:
+                self._take(mean)
+            else:
+                off = mean - self.rad_s
+                if np.abs(off).max() <= _STEP_RAD_S:
+                    self._elsewhere = 0
+                    self._take(np.asarray(self.rad_s) + _SHARE * off)
+                else:
+                    self._elsewhere += 1
+                    if self._elsewhere == _LASTING:
+                        self._elsewhere = 0
+                        self._take(mean)
             self._means.clear()
-
-    def _assess(self, means: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
-        """Replace the bias by these averages if the gyro was at rest."""
-        mean = means.mean(axis=0)
-        if np.abs(means - mean).max() > _SPREAD_RAD_S or np.abs(mean).max() > _MOST_RAD_S:
-            self._elsewhere = 0
-            return
-        if self.rad_s is None:
-            self._take(mean)
-            return
-        off = mean - self.rad_s
-        if np.abs(off).max() <= _STEP_RAD_S:
-            self._elsewhere = 0
-            self._take(np.asarray(self.rad_s) + _SHARE * off)
-            return
-        self._elsewhere += 1
-        if self._elsewhere == _LASTING:
-            self._elsewhere = 0
-            self._take(mean)
 
     def _take(self, bias: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
         x, y, z = bias.tolist()

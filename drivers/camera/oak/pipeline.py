@@ -78,7 +78,21 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
     )
     if not params.face_model:
         return outputs
-    found = _faces(dai, pipeline, params, camera)
+    # A YuNet is decoded on the host.
+    archive = read_archive(dai, params.face_model)
+    platform = pipeline.getDefaultDevice().getPlatform()
+    if kind_of(archive, platform, params.face_model) == "yunet":
+        network = pipeline.create(dai.node.NeuralNetwork)
+        # Letterboxed: if cropped to the network's shape, the sides would not be searched.
+        whole = dai.ImgResizeMode.LETTERBOX
+        network = network.build(camera, archive, fps=params.rate_hz, resizeMode=whole)
+        size = archive.getInputSize()
+        found = yunet_faces(dai, pipeline, network.out, size, params.min_confidence)
+    else:
+        network = pipeline.create(dai.node.DetectionNetwork)
+        network = network.build(camera, archive, fps=params.rate_hz)
+        network.setConfidenceThreshold(params.min_confidence)
+        found = FoundFaces(network.out)
     return outputs._replace(faces=found.out, face_fault=found.fault)
 
 
@@ -89,23 +103,6 @@ def _imu(dai: Any, pipeline: Any) -> Any:
     imu.setBatchReportThreshold(_GYRO_BATCH)
     imu.setMaxBatchReports(10 * _GYRO_BATCH)
     return imu.out
-
-
-def _faces(dai: Any, pipeline: Any, params: OakParams, camera: Any) -> FoundFaces:
-    """Create the face network on the camera; a YuNet is decoded on the host."""
-    archive = read_archive(dai, params.face_model)
-    platform = pipeline.getDefaultDevice().getPlatform()
-    if kind_of(archive, platform, params.face_model) == "yunet":
-        network = pipeline.create(dai.node.NeuralNetwork)
-        # Letterboxed: if cropped to the network's shape, the sides would not be searched.
-        whole = dai.ImgResizeMode.LETTERBOX
-        network = network.build(camera, archive, fps=params.rate_hz, resizeMode=whole)
-        size = archive.getInputSize()
-        return yunet_faces(dai, pipeline, network.out, size, params.min_confidence)
-    network = pipeline.create(dai.node.DetectionNetwork)
-    network = network.build(camera, archive, fps=params.rate_hz)
-    network.setConfidenceThreshold(params.min_confidence)
-    return FoundFaces(network.out)
 
 
 def join_outputs(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:

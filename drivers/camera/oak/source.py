@@ -8,7 +8,6 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gazerig.drivers.camera.clock_sync import ClockSync, FrameRateMonitor
 from gazerig.drivers.camera.oak.abilities import full_line_text, supported_settings, usb2_text
@@ -29,10 +28,9 @@ from gazerig.drivers.camera.oak.pipeline import (
     imu_queue,
     join_outputs,
 )
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import CameraTurn, DetectedFace
+from gazerig.drivers.types import DetectedFace
 
 _SLICE = timedelta(milliseconds=100)  # longest delay of a stop request
 # The camera's stamp in host time is used if it is not older than this and not in the future.
@@ -104,7 +102,22 @@ class OakSource:
             self._queue = join_outputs(self._dai, self._pipeline, outputs, self._asked.rate_hz)
             self._gyro_queue, self._face_fault = imu_queue(outputs), outputs.face_fault
             self._pipeline.start()
-            self._settle_gyro()
+            # Wait until the gyro has found its bias, before the head moves.
+            if self._gyro_queue is not None:
+                if self._asked.imu_rotation_deg is not None:
+                    R = rotation_of(self._asked.imu_rotation_deg)
+                else:
+                    found = None
+                    if self._device is not None:
+                        found = imu_to_camera(self._dai, self._device.readCalibration())
+                    R = np.eye(3) if found is None else found
+                self._gyro = Gyro(R)
+                pause = threading.Event()
+                for _ in range(_SETTLING):
+                    self._read_gyro()
+                    if self._gyro.settled:
+                        break
+                    pause.wait(_SETTLING_S)
         except RuntimeError as error:
             self.close()
             text = _line(error)
@@ -115,28 +128,6 @@ class OakSource:
             self.close()
             raise
         self._bridge, self._in_step, self._number = ClockSync(), True, 0
-
-    def _settle_gyro(self) -> None:
-        """Wait until the gyro has found its bias, before the head moves."""
-        if self._gyro_queue is None:
-            return
-        R = self._R_camera_imu()
-        self._gyro = Gyro(R)
-        pause = threading.Event()
-        for _ in range(_SETTLING):
-            self._read_gyro()
-            if self._gyro.settled:
-                break
-            pause.wait(_SETTLING_S)
-
-    def _R_camera_imu(self) -> NDArray[np.float64]:
-        """Return the gyro's orientation, from the rig or the camera's calibration."""
-        if self._asked.imu_rotation_deg is not None:
-            return rotation_of(self._asked.imu_rotation_deg)
-        found = None
-        if self._device is not None:
-            found = imu_to_camera(self._dai, self._device.readCalibration())
-        return np.eye(3) if found is None else found
 
     def _read_gyro(self) -> None:
         """Pass new readings to the gyro, and collect its events."""
@@ -246,23 +237,35 @@ class OakSource:
         self._number += 1
         height, width = image.shape[:2]
         captured_s = self._captured_s(group[COLOUR], arrived_s)
-        self._watch_line(captured_s)
+        # Report a USB 2 line that does not carry the requested frames.
+        if self._slow_line is not None:
+            # Before a frame that was queued, others may have been lost because the reader was late.
+            line = self._slow_line.update(captured_s, 0.0 if self._waited else inf)
+            measured_hz = self._slow_line.measured_hz
+            if line and measured_hz is not None:
+                if measured_hz < self._asked.rate_hz and "again" not in line:
+                    line = full_line_text(self._asked, measured_hz)
+                self._events.append(line)
+        # The lens of a frame, with distortion if the camera has not undistorted it.
+        lens, stored = lens_of(group), self._calibration
+        if lens is not None and not self._asked.undistort and isinstance(stored, OakCalibration):
+            lens = replace(lens, distortion=stored.own_distortion)
+        # The camera's orientation at the middle of a frame's exposure.
+        turn = None
+        if self._gyro is not None:
+            self._read_gyro()
+            middle = self._dai.CameraExposureOffset.MIDDLE
+            turn = self._gyro.at(group[COLOUR].getTimestampDevice(middle).total_seconds())
+            self._events.extend(self._gyro.events())
         return Shot(
             captured_s,
             self._number,
             image,
             depth_of(group, width, height),
-            self._lens(group),
+            lens,
             self._faces(group, width, height),
-            self._turn(group[COLOUR]),
+            turn,
         )
-
-    def _lens(self, group: Any) -> Intrinsics | None:
-        """Return the lens of a frame, with distortion if the camera has not undistorted it."""
-        lens, stored = lens_of(group), self._calibration
-        if lens is None or self._asked.undistort or not isinstance(stored, OakCalibration):
-            return lens
-        return replace(lens, distortion=stored.own_distortion)
 
     def _faces(self, group: Any, width_px: int, height_px: int) -> tuple[DetectedFace, ...] | None:
         """Return the faces that the camera found; None if it did not or cannot search."""
@@ -276,29 +279,6 @@ class OakSource:
                 "are found on the host; take another archive, or leave oak.face_model empty"
             )
         return None
-
-    def _turn(self, frame: Any) -> CameraTurn | None:
-        """Return the camera's orientation at the middle of a frame's exposure."""
-        if self._gyro is None:
-            return None
-        self._read_gyro()
-        middle = self._dai.CameraExposureOffset.MIDDLE
-        turn = self._gyro.at(frame.getTimestampDevice(middle).total_seconds())
-        self._events.extend(self._gyro.events())
-        return turn
-
-    def _watch_line(self, captured_s: float) -> None:
-        """Report a USB 2 line that does not carry the requested frames."""
-        if self._slow_line is None:
-            return
-        # Before a frame that was queued, others may have been lost because the reader was late.
-        line = self._slow_line.update(captured_s, 0.0 if self._waited else inf)
-        measured_hz = self._slow_line.measured_hz
-        if not line or measured_hz is None:
-            return
-        if measured_hz < self._asked.rate_hz and "again" not in line:
-            line = full_line_text(self._asked, measured_hz)
-        self._events.append(line)
 
     def _captured_s(self, frame: Any, arrived_s: float) -> float:
         """Return the host time of a frame's exposure.

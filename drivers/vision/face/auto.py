@@ -80,18 +80,15 @@ def far_tiles(
     tiles: list[Tile] = []
     scale = min(far_width_px / width_px, _MOST_ENLARGED)
     while scale > near_scale / _SHRINK**0.5:
-        tiles = [*_of_level(width_px, height_px, scale), *tiles]
+        if min(width_px, height_px) * scale >= WINDOW_PX:
+            # Tiles of equal size cover the frame at one scale.
+            across, down = _spans(width_px, scale), _spans(height_px, scale)
+            width = round((across[0][1] - across[0][0]) * scale)
+            height = round((down[0][1] - down[0][0]) * scale)
+            level = [Tile(x0, y0, x1, y1, width, height) for y0, y1 in down for x0, x1 in across]
+            tiles = [*level, *tiles]
         scale *= _SHRINK
     return tuple(tiles)
-
-
-def _of_level(width_px: int, height_px: int, scale: float) -> list[Tile]:
-    """Return tiles of equal size that cover a frame at one scale."""
-    across, down = _spans(width_px, scale), _spans(height_px, scale)
-    if min(width_px, height_px) * scale < WINDOW_PX:
-        return []
-    size = round((across[0][1] - across[0][0]) * scale), round((down[0][1] - down[0][0]) * scale)
-    return [Tile(x0, y0, x1, y1, *size) for y0, y1 in down for x0, x1 in across]
 
 
 def _spans(length_px: int, scale: float) -> list[tuple[int, int]]:

@@ -59,7 +59,12 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
         ModelFileError: a model file is missing or damaged.
         PluginError: the detector of another package cannot be created.
     """
-    detector = _finder(params)
+    part = load(DETECTOR, params.kind, DetectorPlugin)
+    if is_ours(DETECTOR, params.kind):
+        detector = cast(FaceDetector, part.make(params))
+    else:
+        found = create(DETECTOR, params.kind, part, getattr(params, params.kind))
+        detector = CheckedDetector(found, find(DETECTOR, params.kind).label, lambda: mtcnn(params))
     if params.mesh_faces > 0:
         from gazerig.drivers.vision.face.mesh import MeshedDetector
 
@@ -69,20 +74,6 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
 
         detector = add_body_detection(detector, params)
     return detector
-
-
-def _finder(params: FaceDetectorParams) -> FaceDetector:
-    """Create the detector set in the parameters.
-
-    Raises:
-        ModelFileError: its model file is missing or damaged.
-        PluginError: the detector of another package cannot be created.
-    """
-    part = load(DETECTOR, params.kind, DetectorPlugin)
-    if is_ours(DETECTOR, params.kind):
-        return cast(FaceDetector, part.make(params))
-    found = create(DETECTOR, params.kind, part, getattr(params, params.kind))
-    return CheckedDetector(found, find(DETECTOR, params.kind).label, lambda: mtcnn(params))
 
 
 class CheckedDetector:

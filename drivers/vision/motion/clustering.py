@@ -207,17 +207,7 @@ def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
     middle: (2,) centre of the patch
     offset: (2,) offset of the point from its centre in the previous image
     """
-    apart = _standing_out(group, grey)
-    if apart.mean() < _LEAST_SHARE:
-        apart[:] = True
-    places = np.column_stack((group.x[apart], group.y[apart])).astype(np.float64)
-    wanted = middle + _KEPT * offset
-    out: Floats = places[int(np.argmin(((places - wanted) ** 2).sum(axis=1)))]
-    return out
-
-
-def _standing_out(group: Group, grey: Grey) -> Mask:
-    """Return a mask (n,) of a patch's pixels that differ in brightness from the background."""
+    # Pixels of the patch that differ in brightness from the background.
     x, y, width, height = group.box
     left, top = max(0, x - _MARGIN_PX), max(0, y - _MARGIN_PX)
     crop = grey[top : y + height + _MARGIN_PX, left : x + width + _MARGIN_PX].astype(np.float32)
@@ -230,5 +220,10 @@ def _standing_out(group: Group, grey: Grey) -> Mask:
     square = cv2.blur(crop * crop * outside, window, borderType=edge) / count
     spread = np.sqrt(np.maximum(square - mean * mean, 0.0))
     unlike = np.abs(cv2.blur(crop, (3, 3)) - mean) > np.maximum(_UNLIKE * spread, _LEAST_LEVELS)
-    out: Mask = unlike[group.y - top, group.x - left]
+    apart: Mask = unlike[group.y - top, group.x - left]
+    if apart.mean() < _LEAST_SHARE:
+        apart[:] = True
+    places = np.column_stack((group.x[apart], group.y[apart])).astype(np.float64)
+    wanted = middle + _KEPT * offset
+    out: Floats = places[int(np.argmin(((places - wanted) ** 2).sum(axis=1)))]
     return out

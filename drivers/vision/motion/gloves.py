@@ -117,7 +117,27 @@ class GloveDetector:
                 < _TAKEN * one.radius + _BEYOND * circle.radius
                 for one in circles[:row]
             ) or not (cut or _is_whole(mask, row, circles))
-            glove = self._assign_id(circle, cut, covered, captured_s)
+            # The number is that of the nearest earlier glove. A partly hidden glove keeps its last
+            # size, or that of its visible part; without either it is left out.
+            x, y, radius, sure = circle
+            near = [
+                (np.hypot(one.x - x, one.y - y), one)
+                for one in self._known
+                if np.hypot(one.x - x, one.y - y) < _MOVES * max(radius, one.radius)
+            ]
+            if near:
+                before = min(near)[1]
+                self._known.remove(before)
+                if (cut or covered) and sure <= before.radius:
+                    glove = _Glove(before.id, x, y, before.radius, captured_s, before.sized_s)
+                else:
+                    radius = sure if cut or covered else radius
+                    glove = _Glove(before.id, x, y, radius, captured_s, captured_s)
+            elif cut or covered:
+                glove = None
+            else:
+                self._next_id += 1
+                glove = _Glove(self._next_id - 1, x, y, radius, captured_s, captured_s)
             if glove is not None:
                 gloves.append(glove)
         found = {glove.id for glove in gloves}
@@ -126,38 +146,6 @@ class GloveDetector:
         ]
         self._known = [*gloves, *rest]
         return tuple(_blob(glove, share, lens) for glove in gloves)
-
-    def _assign_id(
-        self, circle: Circle, cut: bool, covered: bool, captured_s: float
-    ) -> _Glove | None:
-        """Return a circle with the number of the nearest earlier glove.
-
-        A partly hidden glove keeps its last size, or that of its visible part; None if that is not
-        known.
-
-        Args:
-            circle: The largest circle within the glove.
-            cut: Whether the edge of the image hides a part of it.
-            covered: Whether something in front of it hides a part of it.
-            captured_s: Time of the image, seconds.
-        """
-        x, y, radius, sure = circle
-        near = [
-            (np.hypot(one.x - x, one.y - y), one)
-            for one in self._known
-            if np.hypot(one.x - x, one.y - y) < _MOVES * max(radius, one.radius)
-        ]
-        if near:
-            before = min(near)[1]
-            self._known.remove(before)
-            if (cut or covered) and sure <= before.radius:
-                return _Glove(before.id, x, y, before.radius, captured_s, before.sized_s)
-            radius = sure if cut or covered else radius
-            return _Glove(before.id, x, y, radius, captured_s, captured_s)
-        if cut or covered:
-            return None
-        self._next_id += 1
-        return _Glove(self._next_id - 1, x, y, radius, captured_s, captured_s)
 
 
 def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
