@@ -5,14 +5,19 @@ look for them. docs/README.md becomes the menu and the entry page of each sectio
 package gets a page of its reference. Links between them are turned to their pages on the site; a
 link to any other file of the repository, or to a page of a feature that was deleted, becomes its
 words. A link to nothing is left as it is, and the build fails on it.
+
+Menu and search contain what a user looks for. Pages for readers of the repository (the last heading
+of docs/README.md, and the reference) are reached by links.
 """
 
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
+from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
 
 from gazerig.drivers.plugins import SHIPPED
@@ -29,8 +34,14 @@ FROM_ELSEWHERE = {
 """Pages whose source is not in docs/, and their names on the site."""
 
 CONTENTS = "docs/README.md"
-"""The menu: one section for each of its headings, in this order."""
+"""The menu: one section for each of its headings but the last, in this order."""
 
+QUESTIONS = "docs/questions.md"
+"""What people search for, and its page: the words weigh more than a page's own text."""
+
+_QUESTION = re.compile(r"^\| ([^|]+?) \| \[.+\]\((.+)\) \|$", re.MULTILINE)
+_ARTICLE = re.compile(r"\b(a|an|of|the) ")
+_ANCHOR = re.compile(r"\]\(#([^)]+)\)")
 _LINK = re.compile(r"(!?\[([^\]]*)\])\(([^)#\s]*)(#[^)\s]*)?\)")
 
 
@@ -45,12 +56,33 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     config.nav = [{"Home": "index.md"}]
     for title, text in _sections().items():
         entry = f"{title.lower().replace(' ', '-')}/index.md"
-        files.append(
-            File.generated(config, entry, content=f"# {title}\n{_moved(text, CONTENTS, entry)}")
-        )
-        config.nav.append({title: [entry, *_menu(text, files)]})
-    config.nav[-1][title].append({"Reference": [*reference]})
+        listed = _ANCHOR.sub(r"](../\1/index.md)", _moved(text, CONTENTS, entry))
+        pages = [entry, *_menu(text, files)]
+        if title == list(_sections())[-1]:
+            packages = "\n".join(f"- [{page[10:-3]}](../{page})" for page in reference)
+            listed += f"\n## Reference\n\n{packages}\n"
+            config["hidden"] = {*_names(pages), *reference}
+        else:
+            config.nav.append({title: pages})
+        files.append(File.generated(config, entry, content=f"# {title}\n{listed}"))
+    for file in files.documentation_pages():
+        if file.src_uri in config["hidden"]:
+            file.inclusion = InclusionLevel.NOT_IN_NAV
     return files
+
+
+def questions() -> list[tuple[str, str]]:
+    """Return what people search for, with the page in docs/ that answers it."""
+    return _QUESTION.findall((ROOT / QUESTIONS).read_text(encoding="utf-8"))
+
+
+def _names(pages: Sequence[Any]) -> list[str]:
+    """Return the file names of a part of the menu."""
+    names = []
+    for page in pages:
+        inner = list(page.values()) if isinstance(page, dict) else page
+        names += [page] if isinstance(page, str) else _names(inner)
+    return names
 
 
 def _sections() -> dict[str, str]:
@@ -75,7 +107,12 @@ def _menu(text: str, files: Files) -> list[dict[str, str | list[str]]]:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Turn the links of a page in docs/ to their pages on the site."""
+    """Turn the links of a page to their pages on the site; hide records from the search."""
+    if page.file.src_uri in config["hidden"]:
+        page.meta["search"] = {"exclude": True}
+    page.meta["tags"] = [
+        _ARTICLE.sub("", asked) for asked, target in questions() if target == page.file.src_uri
+    ]
     if page.file.generated_by:
         return markdown
     return _moved(markdown, f"docs/{page.file.src_uri}", page.file.src_uri)
