@@ -247,7 +247,10 @@ def _described(shape: Shape) -> str:
 
 
 def params_text(params: Any) -> str:
-    """Return a dataclass of parameters as YAML: a world's script, or all in force of a rig."""
+    """Return a dataclass of parameters as YAML: a world's script, or all in force of a rig.
+
+    It is read back with ``gazerig.config.load.load``; values come back exactly.
+    """
     return "".join(_lines(plain(params)))
 
 

@@ -1,6 +1,7 @@
 """A servo bus of another package: its results are checked, its errors become one named line."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from itertools import chain
 from math import isfinite
 from typing import Any, TypeVar
@@ -127,7 +128,8 @@ class CheckedBus:
             pairs = list(zip(goals, self._setups, strict=True))
             if all(isinstance(g, int) and s.min_steps <= g <= s.max_steps for g, s in pairs):
                 return tuple(goals)
-        self._release_quietly()
+        with suppress(BusLost):
+            self.disable_torque()
         raise BusLost(
             f"{self._label}: enable_torque returned no goal within limits for every servo"
         )
@@ -212,9 +214,3 @@ class CheckedBus:
         outcome = self._call.call_in_order(call, longest_s)
         self._blocked = outcome is None
         return outcome
-
-    def _release_quietly(self) -> None:
-        try:
-            self.disable_torque()
-        except BusLost:
-            return

@@ -50,6 +50,11 @@ class _LastPosition(NamedTuple):
 class LimitRecovery:
     """Servos that move slowly into their limits.
 
+    A goal outside is never sent, so such a servo gets the nearest limit as its goal and a low
+    speed. It has arrived when it is at that limit, or stops short of it under its load. Until then
+    plans must not advance, or the servo would jump to them as soon as its full speed is restored.
+    So each of its answers is marked ``rearmed``, which makes plans begin at its position.
+
     Args:
         setups: The servos by id.
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import chain
 from math import inf
 from operator import itemgetter
@@ -139,7 +140,8 @@ class MultiBus:
                 for place, goal in zip(places, bus.enable_torque(), strict=True):
                     goals[place] = goal
         except BaseException:
-            self._release_quietly()
+            with suppress(BusLost):
+                self.disable_torque()
             raise
         return tuple(goals)
 
@@ -192,13 +194,6 @@ class MultiBus:
                 lost.append(str(error))
         if lost:
             raise BusLost("; ".join(lost))
-
-    def _release_quietly(self) -> None:
-        """Release every servo that answers, without raising: another error is raised already."""
-        try:
-            self.disable_torque()
-        except BusLost:
-            return
 
     def health(self) -> BusHealth:
         """Return the sums of byte and error counts."""

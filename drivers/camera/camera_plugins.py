@@ -1,4 +1,7 @@
-"""Our kinds of cameras, registered like those of packages, and creation of sources by name."""
+"""Our kinds of cameras, registered like those of packages, and creation of sources by name.
+
+OpenCV and depthai are large, so the control loop's process only names the source.
+"""
 
 import threading
 from collections.abc import Callable

@@ -12,7 +12,12 @@ from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, Locate
 
 
 def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
-    """Return whether a face is outside the frame by its landmarks."""
+    """Return whether a face is outside the frame by its landmarks.
+
+    A network may guess points of a face cut by the edge; a face whose centre is outside is not in
+    view. If a face or a landmark is farther outside than the size of the face, the detector is
+    wrong, usually because its pixels belong to another frame size; that is reported.
+    """
     points: list[tuple[float, float]] = face.landmarks_px.tolist()
     if not points:
         return False  # a face without points: its consumer reports that

@@ -165,6 +165,10 @@ _NEWEST_SERVES_S = 0.05
 class PoseBuffer:
     """Orientations of the camera over the last few seconds.
 
+    Motion detection needs the camera's own rotation between two frames. The ring is shared memory
+    without a lock: the loop writes an entry and then increments the count. The reader reads the
+    count before and after, and discards entries that may have been overwritten meanwhile.
+
     It can be passed as an argument to a new process.
     """
 

@@ -24,6 +24,8 @@ _SYNC_NS = 1_000_000_000
 class RecordingWriter:
     """An MCAP file of frames.
 
+    The file has no chunks, so after a kill it can be read up to the last complete frame.
+
     written: number of frames so far
     """
 

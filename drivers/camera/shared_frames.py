@@ -137,6 +137,9 @@ _UNREAD: Any = object()
 class SharedDetections(Detections):
     """Detections with image and depth in shared memory.
 
+    The loop's process never reads most frames: the page shows ten per second, a recording contains
+    two, and copying all of them takes longer than a tick.
+
     Both are None if they are first read after their slots were overwritten, some frames later; once
     read, they stay.
 

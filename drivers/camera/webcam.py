@@ -186,6 +186,10 @@ _MAINS = {"off": 0, "50hz": 1, "60hz": 2, "auto": 3}
 def apply_controls(device: Path, params: WebcamParams) -> Iterator[str]:
     """Set the controls; yield one line for each setting that the camera rejects.
 
+    OpenCV supports only some of them and does not report why one was refused, so they are set on
+    the device file. A camera keeps its settings after the program ends, so automatic modes are set
+    as well.
+
     Settings without a value become automatic; a camera without automatic modes is not reported.
     """
     try:

@@ -17,18 +17,21 @@ from gazerig.drivers.dynamixel.control_table import (
     speed_units,
 )
 from gazerig.drivers.dynamixel.read_plan import read_plan
+from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Arming, Family
+from gazerig.drivers.servo_bus.registers import REPLY_S
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
-from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.registers import REPLY_S
 
 _PING = b"\xff\xff\xfe\x02\x01\xfe"
 
 
 def ping_protocol_1(port: BusPort) -> tuple[int, ...]:
-    """Ping all servos in Protocol 1.0; return the ids that answer."""
+    """Ping all servos in Protocol 1.0; return the ids that answer.
+
+    Servos of other manufacturers use it too. Source of the packets: ROBOTIS e-Manual, Protocol 1.0.
+    """
     port.drain()
     port.write(_PING)
     return protocol_1_ids(port.read_until(1 << 12, port.now_s() + REPLY_S))
@@ -86,11 +89,6 @@ def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     return wanted
 
 
-def _target(name: str, found: int, wanted: int) -> int:
-    """Return the value to write; a velocity limit higher than needed may stay."""
-    return max(found, wanted) if name == "velocity_limit" else wanted
-
-
 DYNAMIXEL = Family(
     name="dynamixel",
     codec=protocol,
@@ -123,7 +121,8 @@ DYNAMIXEL = Family(
         ("profile_acceleration", "profile_velocity"),
     ),
     wanted=wanted_settings,
-    target=_target,
+    # A velocity limit higher than needed may stay.
+    target=lambda name, found, wanted: max(found, wanted) if name == "velocity_limit" else wanted,
     passes=2,
     answer_level=2,
     lock=None,

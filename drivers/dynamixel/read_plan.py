@@ -14,6 +14,8 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from fastcrc.crc16 import umts
+
 from gazerig.drivers.dynamixel.control_table import (
     FAST_READ_SINCE,
     MODELS,
@@ -21,19 +23,28 @@ from gazerig.drivers.dynamixel.control_table import (
     indirect_blocks,
 )
 from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.servo_bus.read_plan import AddressMap, ReadPlan, ReadWindow, WindowSchedule
+from gazerig.drivers.dynamixel.protocol import BROADCAST, CHECK, HEADER, STATUS, sync_read
+from gazerig.drivers.servo_bus.read_plan import (
+    AddressMap,
+    PartialReply,
+    ReadPlan,
+    ReadWindow,
+    Sample,
+    WholeAnswer,
+    WindowSchedule,
+)
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
 
-from fastcrc.crc16 import umts
-
-from gazerig.drivers.dynamixel.protocol import BROADCAST, CHECK, HEADER, STATUS, sync_read
-from gazerig.drivers.servo_bus.read_plan import PartialReply, Sample, WholeAnswer
-
 
 class FastSyncRead:
-    """A fast sync read; implements ``GroupRead``."""
+    """A fast sync read; implements ``GroupRead``.
+
+    Each block ends with the CRC over all bytes since the header. If the whole answer is intact, one
+    unpacking returns all values. Otherwise the verified blocks are extracted one by one, so that a
+    faulty servo affects only itself.
+    """
 
     def __init__(self, ids: Sequence[int], window: ReadWindow) -> None:
         self.ids, self.window = tuple(ids), window

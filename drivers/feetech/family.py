@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech import protocol
 from gazerig.drivers.feetech.memory_table import (
     BAUD_RATES,
@@ -11,6 +12,7 @@ from gazerig.drivers.feetech.memory_table import (
     MULTI_TURN,
     REGISTERS,
     SCS_MODELS,
+    SET_MIDDLE,
     STEPS_PER_TURN,
     TORQUE_FULL,
     acceleration_units,
@@ -19,15 +21,13 @@ from gazerig.drivers.feetech.memory_table import (
 )
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import MOST_GOALS, GoalWrite
+from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Arming, Family
 from gazerig.drivers.servo_bus.read_plan import ReadPlan, ReadWindow, WindowSchedule
+from gazerig.drivers.servo_bus.registers import Registers
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
-from gazerig.drivers.errors import ServoFault, ServoMissing
-from gazerig.drivers.feetech.memory_table import SET_MIDDLE
-from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.registers import Registers
 
 POSITION_MODE = 0
 
@@ -117,11 +117,6 @@ def armed_limits(setup: "ServoConfig") -> dict[str, int | None]:
     return {"acceleration": acceleration, "torque_limit": limit}
 
 
-def _target(name: str, found: int, wanted: int) -> int:
-    """Return the value to write; of Phase only one bit is changed, the others stay as set."""
-    return found & ~MULTI_TURN if name == "phase" else wanted
-
-
 FEETECH = Family(
     name="feetech",
     codec=protocol,
@@ -146,7 +141,8 @@ FEETECH = Family(
     weak_check=True,
     spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
     wanted=wanted_settings,
-    target=_target,
+    # Of Phase only one bit is changed, the others stay as set.
+    target=lambda name, found, wanted: found & ~MULTI_TURN if name == "phase" else wanted,
     passes=1,
     answer_level=1,
     lock="lock",
@@ -177,6 +173,10 @@ NEAR_STEPS = 8
 def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
     """Set the present position of a servo without torque to 2048; return its offset in steps.
 
+    The servo computes the offset (31) itself on request (Torque Enable := 128) and keeps it in its
+    EEPROM. Earlier calibrations in steps are invalid afterwards. Source: Feetech memory table
+    STS3215, register 40.
+
     Raises:
         ServoMissing: it does not answer.
         ServoFault: its torque is on, or it rejects the instruction.
@@ -200,7 +200,7 @@ def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
         offset = registers.read(servo_id, "position_offset")
     if offset is None or not off or not locked:
         raise ServoFault(
-            f"{where} does not accept its present position as its middle (it reads {place}): switch its power "
-            "off and on and try again"
+            f"{where} does not accept its present position as its middle (it reads {place}): "
+            "switch its power off and on and try again"
         )
     return offset

@@ -158,10 +158,6 @@ class Board(Protocol):
         """Stop pulses; on the last try also by stronger means."""
         ...
 
-    def wait(self, until_s: float) -> None:
-        """Wait."""
-        ...
-
 
 def goals_of(channels: Sequence[Channel]) -> Mapping[int, int]:
     """Return the goals of channels by channel number."""

@@ -69,7 +69,11 @@ class HobbyBoardBus(PortBus):
         self._silence = SilenceMonitor(self._log, self._line.lateness)
         self._rx_bytes, self._byte_s = 0, -inf
         self._link = ReconnectingPort(
-            self._port, timing.baud, timing.give_up_s, self._log, self._reset_trust
+            self._port,
+            timing.baud,
+            timing.give_up_s,
+            self._log,
+            self._supervisor.mark_all_for_recovery,
         )
         self._heard_s = -inf
 
@@ -236,23 +240,19 @@ class HobbyBoardBus(PortBus):
             return True
         if not self._silence.due(now_s):
             return False
-        if self._silence.missed > TRIES and not self._wake(now_s):
-            return False
+        if self._silence.missed > TRIES:
+            # After a long silence a board may have to detect its baud rate again.
+            errors = self._board.wake()
+            if errors is None:
+                self._silence.miss(now_s, self._any_byte_s(now_s))
+                return False
+            self._supervisor.record_errors(errors, self._port.now_s())
         if not self._supervisor.watch():
             self._silence.miss(now_s, self._any_byte_s(now_s))
             return False
         self._heard_s = self._port.now_s()
         self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
         self._silence.answer(now_s)
-        return True
-
-    def _wake(self, now_s: float) -> bool:
-        """Wake a board after a long silence; it may have to detect its baud rate again."""
-        errors = self._board.wake()
-        if errors is None:
-            self._silence.miss(now_s, self._any_byte_s(now_s))
-            return False
-        self._supervisor.record_errors(errors, self._port.now_s())
         return True
 
     def _any_byte_s(self, now_s: float) -> float:
@@ -262,10 +262,6 @@ class HobbyBoardBus(PortBus):
         return self._byte_s
 
     # --- loss of the port
-
-    def _reset_trust(self) -> None:
-        """Reset the state after the port reconnects."""
-        self._supervisor.mark_all_for_recovery()
 
     def _switch_off(self) -> ReleaseResult:
         released = switch_off(self._board, self._ids)

@@ -15,6 +15,11 @@ _LONG_S = 5.0
 class Ramp:
     """Ramp of one channel's pulse and shaft.
 
+    A pulse moves towards its goal at a limited speed and acceleration, ramped by the board or by
+    the driver. The servo's shaft follows the pulse at its own speed. The shaft is not measured: the
+    result is an estimate, which is wrong for a stuck or loaded servo. Steps are quarter
+    microseconds.
+
     pulse_steps: present pulse; shaft_steps, shaft_steps_s: estimated position and speed of the
         servo
     speed_steps_s, accel_steps_s2: limits of the pulse; 0: unlimited

@@ -2,13 +2,12 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gazerig.params import Bounds
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoConfig
-from typing import NamedTuple
 
 US_STEPS = 4
 """Steps per microsecond: pulse widths are counted in quarter microseconds."""

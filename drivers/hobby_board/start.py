@@ -10,6 +10,7 @@ from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
 from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.hobby_board.release import TRIES
+from gazerig.drivers.serial.port import wait_until
 from gazerig.drivers.types import ServoConfig
 
 
@@ -23,6 +24,9 @@ class HoldResult(Enum):
 
 def hold_channel(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
     """Hold a channel at its present pulse, or without one at its last position.
+
+    A channel that already outputs pulses is held there. Without pulses the servo's position is
+    unknown, and a first pulse is not ramped: the servo moves there at its own speed.
 
     Speed and acceleration are armed before the goal is sent, and the pulse is read afterwards. A
     joint outside its limits moves inside at 30 deg/s.
@@ -99,7 +103,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
     start_s = -inf
     for channel, pulse in zip(channels, pulses, strict=True):
         if not pulse:
-            board.wait(start_s + board.timing.stagger_s)
+            wait_until(board.line.port, start_s + board.timing.stagger_s)
             start_s = board.line.port.now_s()
         _enable_channel(board, channel, pulse)
 

@@ -10,8 +10,6 @@ from gazerig.drivers.i2c.bridge import OUTCOMES, READ_STATUS
 from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 
-WAIT_PIECE_S = 0.1
-
 
 class I2cLine:
     """A port with an I2C bus; every method may raise BusLost.
@@ -87,11 +85,3 @@ class I2cLine:
     def write_confirmed(self, *packets: bytes) -> bool:
         """Send transfers that only write; return whether all were acknowledged."""
         return self.ask([(packet, 0) for packet in packets]) is not None
-
-    def wait(self, until_s: float) -> None:
-        """Wait and discard bytes that arrive meanwhile."""
-        # In pieces, as each is a sign of life for the guardian that watches this port.
-        while (now_s := self.port.now_s()) < until_s:
-            got = self.port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
-            if not got and self.port.now_s() <= now_s:
-                return  # an emulated port in simulated time, in which a wait takes no time

@@ -17,7 +17,7 @@ from typing import Any
 from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, I2cMessage, commands
+from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, commands
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
@@ -100,32 +100,28 @@ class I2cPort:
         if self._bus is None:
             raise self._lost("it is closed")
         for parts in commands(data):
-            if parts:
-                self._transfer(parts)
-            else:
+            if not parts:
                 self._waiting += bytes((self._status,))
-
-    def _transfer(self, parts: tuple[I2cMessage, ...]) -> None:
-        messages = [
-            i2c_msg.write(part.address, part.data)
-            if part.length is None
-            else i2c_msg.read(part.address, part.length)
-            for part in parts
-        ]
-        try:
-            self._check_free(parts[0].address)
-            self._bus.i2c_rdwr(*messages)
-        except OSError as error:
-            if error.errno in _GONE or (
-                self._bus.fd is not None and not os.path.exists(self.port_name)
-            ):
-                raise self._lost(error) from error
-            self._status = TIMED_OUT if error.errno in _STUCK else NO_ACKNOWLEDGE
-            return
-        self._status = OK
-        for part, message in zip(parts, messages, strict=True):
-            if part.length is not None:
-                self._waiting += bytes(message)
+                continue
+            messages = [
+                i2c_msg.write(part.address, part.data)
+                if part.length is None
+                else i2c_msg.read(part.address, part.length)
+                for part in parts
+            ]
+            try:
+                self._check_free(parts[0].address)
+                self._bus.i2c_rdwr(*messages)
+            except OSError as error:
+                unplugged = self._bus.fd is not None and not os.path.exists(self.port_name)
+                if error.errno in _GONE or unplugged:
+                    raise self._lost(error) from error
+                self._status = TIMED_OUT if error.errno in _STUCK else NO_ACKNOWLEDGE
+                continue
+            self._status = OK
+            for part, message in zip(parts, messages, strict=True):
+                if part.length is not None:
+                    self._waiting += bytes(message)
 
     def _check_free(self, address: int) -> None:
         """Check that no kernel driver has claimed an address.

@@ -60,7 +60,13 @@ class MaestroBoard:
         where = self.line.port.port_name
         register = self.line.greet()
         if register is None:
-            raise ServoMissing(f"{where}: no Maestro answers: {self._silence_causes()}")
+            params = self.params
+            number = f", its device number {params.device}" if params.protocol == "pololu" else ""
+            raise ServoMissing(
+                f"{where}: no Maestro answers: on USB take the first of its two ports and set it to "
+                "'USB Dual Port' in Pololu's program; on its serial pins check TX, RX, ground and "
+                f"{params.baud} bit/s{number}; its CRC must be {'on' if params.crc else 'off'}"
+            )
         if not self.line.expects_crc():
             raise ServoMissing(
                 f"{where}: the board expects no CRC: switch Enable CRC on in Pololu's program, as "
@@ -77,17 +83,6 @@ class MaestroBoard:
                     "move: set it to Servo in Pololu's program"
                 )
         return pulses
-
-    def _silence_causes(self) -> str:
-        """Return the possible causes of a board that does not answer."""
-        params = self.params
-        number = f", its device number {params.device}" if params.protocol == "pololu" else ""
-        check_byte = "on" if params.crc else "off"
-        return (
-            "on USB take the first of its two ports and set it to 'USB Dual Port' in Pololu's "
-            f"program; on its serial pins check TX, RX, ground and {params.baud} bit/s{number}; "
-            f"its CRC must be {check_byte}"
-        )
 
     def prepare(self, log: EventLog) -> None:
         """Stop the board's own script if one runs: it would move servos against this program."""
@@ -126,19 +121,17 @@ class MaestroBoard:
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
         """Arm speed and acceleration; return False if a requested confirmation fails."""
-        packet = b"".join(self._limits(channel) for channel in channels)
+        packet, speech = b"", self.line.speech
+        for channel in channels:
+            speed = speed_units(channel.top_speed_steps_s)
+            accel = accel_units(channel.setup.max_accel_steps_s2)
+            channel.ramp.speed_steps_s = speed * SPEED_STEPS_S
+            channel.ramp.accel_steps_s2 = accel * ACCEL_STEPS_S2
+            packet += speech.speed(channel.id, speed) + speech.acceleration(channel.id, accel)
         if confirmed:
             return self.line.send_checked(packet)
         self.line.send(packet)
         return True
-
-    def _limits(self, channel: Channel) -> bytes:
-        speed = speed_units(channel.top_speed_steps_s)
-        accel = accel_units(channel.setup.max_accel_steps_s2)
-        channel.ramp.speed_steps_s = speed * SPEED_STEPS_S
-        channel.ramp.accel_steps_s2 = accel * ACCEL_STEPS_S2
-        speech = self.line.speech
-        return speech.speed(channel.id, speed) + speech.acceleration(channel.id, accel)
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send the goals of channels."""
@@ -153,10 +146,6 @@ class MaestroBoard:
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses."""
         self.line.stop(channels)
-
-    def wait(self, until_s: float) -> None:
-        """Wait."""
-        self.line.wait(until_s)
 
 
 class MaestroBus(HobbyBoardBus):

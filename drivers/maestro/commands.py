@@ -199,6 +199,8 @@ MOST_ACCEL = 255
 def speed_units(steps_s: float) -> int:
     """Return the smallest speed limit that is not below a speed; 0 (unlimited) if there is none.
 
+    Source: Pololu Maestro User's Guide (0J40), section 5.e.
+
     Raises:
         ValueError: it is not a positive number.
     """

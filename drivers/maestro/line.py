@@ -17,7 +17,6 @@ AT_ONCE = 6
 
 GREETINGS = 4
 
-WAIT_PIECE_S = 0.1
 
 ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
 """Largest difference between two answers about a pulse, plus a speed times the time between
@@ -171,11 +170,3 @@ class MaestroLink:
                 return None
             found += got
         return found
-
-    def wait(self, until_s: float) -> None:
-        """Wait and discard bytes that arrive meanwhile."""
-        # In pieces, as each is a sign of life for the guardian that watches this port.
-        while (now_s := self.port.now_s()) < until_s:
-            got = self.port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
-            if not got and self.port.now_s() <= now_s:
-                return  # an emulated port in simulated time, in which a wait takes no time

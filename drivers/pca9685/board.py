@@ -38,7 +38,7 @@ from gazerig.drivers.pca9685.registers import (
     pulse,
     runs,
 )
-from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port import BusPort, wait_until
 from gazerig.drivers.types import ServoConfig
 
 LONGEST_LEAD_S = 0.05
@@ -145,7 +145,7 @@ class Pca9685Board:
             )
             if not asleep:
                 return False
-            self.line.wait(self.line.port.now_s() + START_S)
+            wait_until(self.line.port, self.line.port.now_s() + START_S)
             # Channels that slept with pulses on would resume here; there are none now.
             self.line.write_confirmed(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
             return self._modes(address) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale)
@@ -243,28 +243,18 @@ class Pca9685Board:
             if mode & SILENT:
                 pulses.update(dict.fromkeys((base + channel for channel in own), 0))
                 continue
-            outputs = self._outputs(address, own, bool(mode & AUTO_INCREMENT))
-            if outputs is None:
+            # Each channel in one transfer only if the board auto-increments.
+            size = BYTES if mode & AUTO_INCREMENT else 1
+            places = [output(channel) + k for channel in own for k in range(0, BYTES, size)]
+            found = self.line.ask([(bridge.read(address, at, size), size) for at in places])
+            if found is None:
                 return None
+            each = BYTES // size
+            outputs = [b"".join(found[k : k + each]) for k in range(0, len(found), each)]
             for channel, registers in zip(own, outputs, strict=True):
                 servo_id = base + channel
                 pulses[servo_id] = self._pulse_steps(servo_id, counts_of(registers), prescale)
         return tuple(pulses[servo_id] for servo_id in channels)
-
-    def _outputs(self, address: int, channels: Sequence[int], runs_on: bool) -> list[bytes] | None:
-        """Read the registers of channels, each in one transfer if the board auto-increments."""
-        if runs_on:
-            whole = [(bridge.read(address, output(channel), BYTES), BYTES) for channel in channels]
-            return self.line.ask(whole)
-        single = [
-            (bridge.read(address, output(channel) + k, 1), 1)
-            for channel in channels
-            for k in range(BYTES)
-        ]
-        found = self.line.ask(single)
-        if found is None:
-            return None
-        return [b"".join(found[k : k + BYTES]) for k in range(0, len(found), BYTES)]
 
     # --- sending
 
@@ -330,10 +320,6 @@ class Pca9685Board:
             for address in self._boards(channels):
                 packets.append(bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))))
         self.line.send(b"".join(packets))
-
-    def wait(self, until_s: float) -> None:
-        """Wait."""
-        self.line.wait(until_s)
 
 
 class Pca9685Bus(HobbyBoardBus):

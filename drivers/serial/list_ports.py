@@ -207,6 +207,9 @@ def usb_id_of(device: str, ports: Sequence[SerialPort]) -> str:
 def check_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
     """Check that packets of this kind of bus may be sent to a port.
 
+    Packets of smart servos begin with FF, which is a command to a Maestro that moves a servo.
+    Source: Pololu Maestro User's Guide (0J40), section 5.c.
+
     Raises:
         PortError: the port belongs to a board whose servos they would move.
     """

@@ -196,13 +196,6 @@ class SmartServoBus(PortBus):
         self._unconfirmed -= {*kept, *self._poll_list.out}
         return kept
 
-    def _goal_speeds(self) -> Sequence[int]:
-        """Return the speeds that are sent with goals, if the family has them."""
-        entering = self._supervisor.entering
-        if entering.places and self._family.goal_speed:
-            return self._recovery.speeds(self._ids, entering.ids)
-        return self._speeds
-
     # --- public interface
 
     def open(self) -> None:
@@ -320,7 +313,9 @@ class SmartServoBus(PortBus):
         if not supervisor.engaged or self._link.down or line.starved:
             return
         withheld = supervisor.withheld(self._now_s) if supervisor.withholds else ()
-        speeds = self._goal_speeds() if supervisor.entering.places else self._speeds
+        speeds, entering = self._speeds, supervisor.entering
+        if entering.places and self._family.goal_speed:
+            speeds = self._recovery.speeds(self._ids, entering.ids)
         try:
             packet = self._goals.packet(goals, speeds)
         except struct.error:  # goals are usually whole numbers
@@ -328,13 +323,10 @@ class SmartServoBus(PortBus):
             packet = self._goals.packet(goals, speeds)
         try:
             if withheld:
-                speeds = self._goal_speeds()
                 kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
                 if kept:
                     some = self._family.goals([self._ids[k] for k in kept])
-                    self._line.send(
-                        some.packet([goals[k] for k in kept], [speeds[k] for k in kept])
-                    )
+                    line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
             else:
                 line.send(packet)
         except BusLost as lost:

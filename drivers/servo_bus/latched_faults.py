@@ -125,10 +125,8 @@ class LatchedFaultSupervisor(Supervisor):
             self._check_at_s if self.engaged else inf,
             inf if covered else self._slow_at_s,
         )
-        if self.entering.places:
-            self._mark_entering(now_s)
-        if self._rearmed:
-            self._mark_rearmed()
+        if self.entering.places or self._rearmed:
+            self._mark_feedback(now_s)
 
     def _find_alerts(self, ids: Sequence[int]) -> None:
         """Read the latched errors of servos."""

@@ -80,7 +80,6 @@ class Provisioning:
                     f"{self._where}: {named}: restart its power or correct the rig file"
                 )
         if self._block is not None:
-            # Write the indirect addresses that differ.
             block = self._block
             for servo_id, data in self._addresses(ids, block).items():
                 if data != block.data:
@@ -115,36 +114,26 @@ class Provisioning:
         Raises:
             ServoMissing: a servo does not answer.
         """
-        different: list[Difference] = []
+        different, registers = list[Difference](), self._family.registers
         for first, last in self._family.spans:
-            start, end = (self._family.registers[name] for name in (first, last))
-            stop = end.address + end.size
+            start, stop = registers[first].address, registers[last].address + registers[last].size
             concerned = {
-                i: names for i in ids if (names := self._wanted_within(i, start.address, stop))
+                i: names
+                for i in ids
+                if (names := [n for n in self._wanted[i] if start <= registers[n].address < stop])
             }
             if not concerned:
                 continue
-            found = self._line.ask_bytes(tuple(concerned), start.address, stop - start.address)
+            found = self._line.ask_bytes(tuple(concerned), start, stop - start)
             self._raise_missing(concerned, found, first)
             for servo_id, names in concerned.items():
-                different += self._compare(servo_id, names, start.address, found[servo_id])
-        return different
-
-    def _wanted_within(self, servo_id: int, start: int, stop: int) -> list[str]:
-        registers = self._family.registers
-        return [n for n in self._wanted[servo_id] if start <= registers[n].address < stop]
-
-    def _compare(
-        self, servo_id: int, names: Iterable[str], start: int, data: bytes
-    ) -> list[Difference]:
-        different = []
-        for name in names:
-            register = self._family.registers[name]
-            at = register.address - start
-            found = register.decode(data[at : at + register.size])
-            wanted = self._family.target(name, found, self._wanted[servo_id][name])
-            if found != wanted:
-                different.append(Difference(servo_id, register, found, wanted))
+                for register in map(registers.__getitem__, names):
+                    at = register.address - start
+                    value = register.decode(found[servo_id][at : at + register.size])
+                    wanted = self._wanted[servo_id][register.name]
+                    wanted = self._family.target(register.name, value, wanted)
+                    if value != wanted:
+                        different.append(Difference(servo_id, register, value, wanted))
         return different
 
     def _correct(self, differences: Sequence[Difference]) -> None:

@@ -85,6 +85,11 @@ class ReadWindow(NamedTuple):
 class WindowSchedule:
     """Order of windows: the usual ones in rotation, spare ones for a while after a missing answer.
 
+    An answer contains neither its registers nor the time of its request; only its length identifies
+    it. So two consecutive reads never have the same length, and after trouble they have other,
+    distinct lengths for a while. A line that repeats its last answer, or delivers it one read too
+    late, is therefore not believed.
+
     Args:
         usual: Windows; neighbours, and the first and last, have different lengths.
         spare: Windows of different lengths; two alternate after each trouble, then the next two.
@@ -171,6 +176,10 @@ class GroupRead(Protocol):
 
 class WholeAnswer:
     """Expected bytes of an answer of all servos without errors.
+
+    If the whole answer is intact and no servo reports an error, one comparison and one unpacking
+    return all values. Otherwise the parts that can be verified are extracted one by one, so that a
+    faulty servo affects only itself.
 
     Most of these bytes are known in advance: headers, ids, errors, torque, limits. They are
     compared together, as one number under a mask; only the others are unpacked.

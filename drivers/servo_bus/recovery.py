@@ -187,27 +187,28 @@ class Recovery:
             write_verified(line, ids, "bus_watchdog", [0] * len(ids))
         present = read_positions(line, ids)
         if family.single_turn:
-            # Check that no servo would move into its range in the wrong direction.
             for servo_id, steps in zip(ids, present, strict=True):
                 if self.is_lost(servo_id, steps):
                     low, high = self._setups[servo_id].min_steps, self._setups[servo_id].max_steps
                     raise ServoFault(
-                        f"{self._line.label(servo_id)} is at {steps}, beyond its encoder's zero, and "
-                        f"would go the long way round into {low}..{high}: turn it into that range by hand"
+                        f"{self._line.label(servo_id)} is at {steps}, beyond its encoder's zero, "
+                        f"and would go the long way round into {low}..{high}: turn it into that "
+                        "range by hand"
                     )
         goals = [self.clip(i, p) for i, p in zip(ids, present, strict=True)]
         outside = {i for i, p, g in zip(ids, present, goals, strict=True) if p != g}
         speeds = self.speeds(ids, outside)
-        armed = speeds if family.arming.speed else self._accelerations(ids)
+        accel = family.acceleration_units
+        armed = (
+            speeds
+            if family.arming.speed
+            else [accel(self._setups[i].max_accel_steps_s2) for i in ids]
+        )
         write_verified(line, ids, family.arming.register, armed)
         switch_on(line, ids, goals, speeds)
         if family.watchdog_unit_s is not None:
             write_verified(line, ids, "bus_watchdog", [self._watchdog] * len(ids))
         return tuple(goals), outside
-
-    def _accelerations(self, ids: Sequence[int]) -> list[int]:
-        units = self._family.acceleration_units
-        return [units(self._setups[i].max_accel_steps_s2) for i in ids]
 
     def speeds(self, ids: Sequence[int], outside: Collection[int]) -> list[int]:
         """Return speed limits in register units, slow for servos outside their limits."""

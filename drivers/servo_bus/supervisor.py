@@ -190,17 +190,12 @@ class Supervisor(ABC):
 
     # --- marks on answers
 
-    def _mark_rearmed(self) -> None:
-        """Mark the first feedback of servos whose torque was switched on again."""
-        for servo_id in tuple(self._rearmed):
-            slot = self._slot[servo_id]
-            if self._feedback.position(slot) is not None:
-                self._rearmed.discard(servo_id)
-                self._feedback.mark_rearmed(slot)
+    def _mark_feedback(self, now_s: float) -> None:
+        """Mark servos that enter their limits slowly, and once those that got torque again.
 
-    def _mark_entering(self, now_s: float) -> None:
-        """Mark the feedback of servos that enter their limits slowly; restore speed on arrival."""
-        for slot, servo_id in enumerate(self._ids):
+        On arrival a servo gets its full speed.
+        """
+        for slot, servo_id in enumerate(self._ids if self.entering.places else ()):
             if servo_id not in self.entering:
                 continue
             steps = self._feedback.position(slot)
@@ -208,6 +203,11 @@ class Supervisor(ABC):
                 self._feedback.mark_rearmed(slot)
                 if self.entering.arrived(servo_id, steps, now_s) and self._full_speed(servo_id):
                     self.entering.end(servo_id)
+        for servo_id in tuple(self._rearmed):
+            slot = self._slot[servo_id]
+            if self._feedback.position(slot) is not None:
+                self._rearmed.discard(servo_id)
+                self._feedback.mark_rearmed(slot)
 
     def _full_speed(self, servo_id: int) -> bool:
         """Restore a servo's full speed, with its next goal or by a write; return whether it has it.

@@ -4,7 +4,7 @@ A silent or garbling servo affects only itself: servos whose answers were lost w
 immediately read again without it.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -156,21 +156,17 @@ class SyncReader:
             self._prepared_ids, self._prepared = ids, {}
         group = self._prepared.get(id(window))
         if group is None:
-            group = self._prepared[id(window)] = self._prepare(ids, window)
-        return group
-
-    def _prepare(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
-        """Create the exchange for some servos."""
-        key = ids, window.address, window.length
-        group = self._groups.get(key)
-        if group is None:
-            if len(self._groups) >= MOST_GROUPS:
-                self._groups.clear()
-            if self._packets is not None:
-                group = self._packets(ids, window)
-            else:
-                group = SyncRead(self._line.family, ids, window)
-            self._groups[key] = group
+            key = ids, window.address, window.length
+            group = self._groups.get(key)
+            if group is None:
+                if len(self._groups) >= MOST_GROUPS:
+                    self._groups.clear()
+                if self._packets is not None:
+                    group = self._packets(ids, window)
+                else:
+                    group = SyncRead(self._line.family, ids, window)
+                self._groups[key] = group
+            self._prepared[id(window)] = group
         return group
 
     def _save(
@@ -199,30 +195,25 @@ class SyncReader:
             silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
             if not samples and not damaged and self._header in raw:
                 self._line.lateness.record_late_answer(now_s)  # to an earlier request
-            self._record_failures(damaged, silent, now_s, turns)
+            # Later bytes must not be taken for the next answer.
+            line, polled = self._line, self.poll_list
+            if damaged:
+                line.lateness.forget()  # noise looks like a late answer
+            for servo_id in damaged:
+                line.errors["corrupt"] += 1
+                polled.record_damaged(servo_id, now_s)
+            for servo_id in silent:
+                line.errors["timeout"] += 1
+                polled.record_silent(servo_id, now_s)
+            turns.record_trouble(now_s)
+            if not line.quiet and line.drain(line.timeout.seconds):
+                line.timeout.missed()
             done = replies.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
             if not left or self._line.port.now_s() >= self._until_s:
                 return
             group = self._group(left, turns.next())
             raw, at_s = self._line.exchange(group.request, group.reply_length)
-
-    def _record_failures(
-        self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: WindowSchedule
-    ) -> None:
-        """Record the failed servos; later bytes must not be taken for the next answer."""
-        line, polled = self._line, self.poll_list
-        if damaged:
-            line.lateness.forget()  # noise looks like a late answer
-        for servo_id in damaged:
-            line.errors["corrupt"] += 1
-            polled.record_damaged(servo_id, now_s)
-        for servo_id in silent:
-            line.errors["timeout"] += 1
-            polled.record_silent(servo_id, now_s)
-        turns.record_trouble(now_s)
-        if not line.quiet and line.drain(line.timeout.seconds):
-            line.timeout.missed()
 
 
 class SyncRead:

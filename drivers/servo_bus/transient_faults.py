@@ -88,8 +88,16 @@ class TransientFaultSupervisor(Supervisor):
             for bit in [b for b, at_s in seen_s.items() if now_s - at_s >= GONE_S]:
                 del seen_s[bit]
             now = self._bits(servo_id)
-            if now != before:
-                self._name_bits(servo_id, now)
+            health = self._health
+            worse = servo_id in health.faults and servo_id not in health.latches
+            if now != before and not worse:
+                if now:
+                    health.record_fault(servo_id, " and ".join(self._family.name_errors(now)))
+                    health.latches.add(servo_id)
+                    self._line.errors["alert"] += 1
+                else:
+                    health.record_cleared(servo_id)
+                self._name_fault(servo_id)
             if not seen_s:
                 del self._seen_s[servo_id]
         if not self.engaged:
@@ -120,18 +128,6 @@ class TransientFaultSupervisor(Supervisor):
 
     def _bits(self, servo_id: int) -> int:
         return sum(self._seen_s.get(servo_id, ()))
-
-    def _name_bits(self, servo_id: int, bits: int) -> None:
-        health = self._health
-        if servo_id in health.faults and servo_id not in health.latches:
-            return  # a worse fault is recorded
-        if bits:
-            health.record_fault(servo_id, " and ".join(self._family.name_errors(bits)))
-            health.latches.add(servo_id)
-            self._line.errors["alert"] += 1
-        else:
-            health.record_cleared(servo_id)
-        self._name_fault(servo_id)
 
     def _is_armed(self, servo_id: int, sample: Sample) -> bool:
         """Return whether speed and torque limits are as they were written."""
@@ -183,7 +179,5 @@ class TransientFaultSupervisor(Supervisor):
                         self._suspects.add(servo_id)
         if self._suspects and now_s >= self._recover_at_s:
             self._recover(group, now_s)
-        if self.entering.places:
-            self._mark_entering(now_s)
-        if self._rearmed:
-            self._mark_rearmed()
+        if self.entering.places or self._rearmed:
+            self._mark_feedback(now_s)

@@ -119,6 +119,10 @@ def start_cure(message: str) -> str:
 def load_depthai() -> Any:
     """Import depthai and return the module.
 
+    depthai sends usage figures unless DEPTHAI_TELEMETRY is 0, and logs to the standard output,
+    which must contain only the requested output. It reads both settings at its import; the
+    environment variable DEPTHAI_LEVEL enables its log.
+
     Raises:
         CameraError: it is not installed or does not start here.
     """

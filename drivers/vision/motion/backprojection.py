@@ -88,6 +88,10 @@ _STILL_M = 1e-4
 def parallax(depth_m: Plane | None, K: Floats, t_now_before_m: Floats | None) -> Flow | None:
     """Return the displacement of still things in the older image, (h, w, 2), pixels.
 
+    A neck turns about an axis some centimetres behind the lens, so near things move relative to far
+    ones. With the older image turned as predicted, a point that is now at X, in the present axes,
+    was seen at X - t; the effect depends on its depth.
+
     depth_m: (h, w), NaN if unknown: the image's median distance is used there
     t_now_before_m: (3,) earlier position of the lens relative to the present one, in present axes
 

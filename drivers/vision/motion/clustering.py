@@ -203,6 +203,9 @@ _KEPT = 0.5
 def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
     """Return a pixel of the thing, (2,), near its centre.
 
+    Plain background between two people who walk together, or between legs, moves with them in the
+    flow. It is recognised by its appearance: it is as bright as the background around the patch.
+
     grey: (h, w) image
     middle: (2,) centre of the patch
     offset: (2,) offset of the point from its centre in the previous image
