@@ -2,22 +2,14 @@
 
 from collections.abc import Mapping
 from math import degrees
-from pathlib import Path
 
-from mixed_rig import mixed_text
+from mixed_rig import mixed_rig as mixed_rig
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import Rig
 from gazerig.robot.app.run_bus import emulated_lines, place_of
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.in_process_port import InProcessPort
-
-
-def mixed_rig(folder: Path) -> Rig:
-    """Return a rig with eyes on a Maestro, a Dynamixel and a Feetech neck servo."""
-    path = folder / "mixed.yaml"
-    path.write_text(mixed_text(), encoding="utf-8")
-    return load_rig(str(path))
 
 
 class EmulatedRig:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from gazerig.config.schema import Rig, load_rig
+
 MAKER = Path(__file__).parents[1] / "config" / "rigs" / "maker.yaml"
 
 NECK = """
@@ -26,3 +28,15 @@ def mixed_text() -> str:
     text = MAKER.read_text(encoding="utf-8")
     text = text.replace("\njoints:", f"{NECK}\njoints:")
     return text.replace("\nlid_joints:", f"{NECK_JOINTS}\nlid_joints:")
+
+
+def mixed_rig(folder: Path) -> Rig:
+    """Load that rig from a file that is written into a folder."""
+    path = folder / "mixed.yaml"
+    path.write_text(mixed_text(), encoding="utf-8")
+    return load_rig(str(path))
+
+
+def rig_of(name: str, folder: Path) -> Rig:
+    """Load a shipped rig, or the mixed one."""
+    return mixed_rig(folder) if name == "mixed" else load_rig(name)

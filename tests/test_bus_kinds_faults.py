@@ -5,11 +5,10 @@ from functools import cache
 
 import pytest
 from copied import copied
-from mixed_rig import mixed_text
+from mixed_rig import mixed_rig
 from struck_rigs import CASES, RIGS, VOLTS, quick, rig_of
 
 import gazerig.robot.app.run_bus as run_bus
-from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
@@ -110,9 +109,7 @@ ALONE = (
 
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory):
-    file = tmp_path_factory.mktemp("rig") / "mixed.yaml"
-    file.write_text(mixed_text(), encoding="utf-8")
-    rig = load_rig(str(file))
+    rig = mixed_rig(tmp_path_factory.mktemp("rig"))
     # As those of the desk rig: with the gains from the factory it lags far behind.
     neck = replace(rig.joints["neck_yaw"], gains=(4000, 0, 4000))
     return quick(replace(rig, joints={**rig.joints, "neck_yaw": neck}))

@@ -9,6 +9,7 @@ from functools import partial
 import cv2
 import numpy as np
 import pytest
+from fakes.waiting import wait_for
 from present import present
 
 from gazerig.drivers.camera.params import CameraRecoveryParams
@@ -30,15 +31,6 @@ PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))
 forked = pytest.mark.usefixtures("branched_camera")
 LOCATOR = FrameLocator(None, 1.2)
-
-
-def wait_for(what):
-    """Wait until something holds; return it."""
-    end = time.monotonic() + PATIENCE_S
-    while not (found := what()):
-        assert time.monotonic() < end, "the camera process is stuck"
-        time.sleep(0.002)
-    return found
 
 
 @pytest.fixture

@@ -3,9 +3,10 @@
 import threading
 import time
 
-import cv2
 import numpy as np
 import pytest
+from fakes.films import write_film
+from fakes.waiting import wait_for
 from present import present
 
 from gazerig.drivers.camera.params import CameraRecoveryParams
@@ -68,14 +69,6 @@ class EveryOther:
     def find(self, picture) -> tuple[DetectedFace, ...]:
         self.looked += 1
         return (FACE,) if self.looked % 2 == 0 else ()
-
-
-def wait_for(what) -> None:
-    """Wait until something holds."""
-    end = time.monotonic() + PATIENCE_S
-    while not what():
-        assert time.monotonic() < end, "the camera thread is stuck"
-        time.sleep(0.001)
 
 
 @pytest.fixture
@@ -286,17 +279,9 @@ def test_depth_lens_motion_and_the_cameras_own_faces_come_through(source):
     camera.close()
 
 
-def write_film(path, rate_hz: float):
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), rate_hz, (64, 48))
-    for k in range(10):
-        writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
-    writer.release()
-    return path
-
-
 def test_film_runs_at_its_own_pace(tmp_path):
     camera = CameraThread(
-        VideoFile(write_film(tmp_path / "film.avi", 100.0)), EveryOther(), time.monotonic
+        VideoFile(write_film(tmp_path / "film.avi", rate_hz=100.0)), EveryOther(), time.monotonic
     )
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
@@ -322,7 +307,7 @@ def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
             return ()
 
     camera = CameraThread(
-        VideoFile(write_film(tmp_path / "film.avi", 10.0)), Slow(), lambda: clock[0]
+        VideoFile(write_film(tmp_path / "film.avi", rate_hz=10.0)), Slow(), lambda: clock[0]
     )
     camera.open()
     free.release()

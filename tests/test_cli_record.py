@@ -1,8 +1,7 @@
 """What people type to record a camera, and what they read."""
 
-import cv2
-import numpy as np
 import pytest
+from fakes.films import write_film
 from typer.testing import CliRunner
 
 from gazerig.drivers.camera.playback import Recording
@@ -12,11 +11,7 @@ from gazerig.robot.cli.record import app
 @pytest.fixture
 def film(tmp_path):
     path = tmp_path / "film.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
-    for k in range(10):
-        writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
-    writer.release()
-    return path
+    return write_film(path, rate_hz=50.0)
 
 
 def run(*arguments):

@@ -1,49 +1,9 @@
 """Servos that stop, restart or start outside their limits while the driver looks after them."""
 
 import pytest
+from fakes.dynamixels import Rig
 
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
-from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoConfig
-from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_bench import rows
-
-IDS = (1, 2, 3)
-STARTS = (2001, 2002, 2003)
-
-
-class Rig:
-    """Three servos in this process, a driver, and a clock set by hand."""
-
-    def __init__(self, fast=True, starts=STARTS, **params):
-        self.now_s = 100.0
-        specs = [ServoSpec(i, "xl330-m077", at) for i, at in zip(IDS, starts, strict=True)]
-        self.chain = build_dynamixel(specs, lambda: self.now_s)
-        setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
-        self.bus = SmartServoBus(
-            DYNAMIXEL,
-            InProcessPort(self.chain),
-            setups,
-            DynamixelParams(fast_sync_read=fast, **params),
-        )
-        self.bus.open()
-
-    def tick(self, goals=None):
-        self.now_s += 0.005
-        readings = rows(self.bus.read(self.now_s))
-        if goals is not None:
-            self.bus.write(goals)
-        return readings
-
-    def places(self):
-        return [r.position_steps for r in self.tick()]
-
-    def errors(self):
-        return self.bus.health().errors
 
 
 @pytest.fixture(params=[True, False], ids=["fast", "plain"])
@@ -53,11 +13,11 @@ def fast(request):
 
 @pytest.fixture
 def rig(fast):
-    return Rig(fast)
+    return Rig(fast).open()
 
 
 def test_the_watchdog_stops_the_servos_when_the_host_falls_silent():
-    rig = Rig(watchdog_ms=100)
+    rig = Rig(watchdog_ms=100).open()
     rig.bus.enable_torque()
     rig.tick([3000] * 3)
     rig.now_s += 5.0
@@ -90,7 +50,10 @@ def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(rig):
     # Whoever plans goals has not heard of it yet: no goal goes out before a read has told.
     rig.bus.write([2500] * 3)
     rig.now_s += 0.1
-    assert all(abs(x - at) < 1 for x, at in zip(rig.chain.positions_steps(), STARTS, strict=True))
+    assert all(
+        abs(x - at) < 1
+        for x, at in zip(rig.chain.positions_steps(), (2001, 2002, 2003), strict=True)
+    )
     assert [r.rearmed for r in rig.tick([2500] * 3)] == [True] * 3
     assert [r.rearmed for r in rig.tick([2500] * 3)] == [False] * 3
     rig.now_s += 0.19
@@ -111,7 +74,7 @@ def test_a_sleep_that_the_clock_does_not_show_is_found_by_asking(rig):
 
 @pytest.mark.parametrize("indirect", [True, False])
 def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirect):
-    rig = Rig(watchdog_ms=0, indirect_block=indirect)
+    rig = Rig(watchdog_ms=0, indirect_block=indirect).open()
     rig.bus.enable_torque()
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [0] * 3
     rig.now_s += 60.0
@@ -124,7 +87,7 @@ def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirec
 
 
 def test_a_quick_restart_between_two_reads_is_found_by_asking_in_turn(fast):
-    rig = Rig(fast, indirect_block=False)
+    rig = Rig(fast, indirect_block=False).open()
     rig.bus.enable_torque()
     rig.chain[2].restart()
     rig.chain[2]._deaf_until_ms = 0
@@ -135,7 +98,7 @@ def test_a_quick_restart_between_two_reads_is_found_by_asking_in_turn(fast):
 
 
 def test_healing_keeps_to_the_limits():
-    rig = Rig(starts=(900, 2002, 2003))
+    rig = Rig(starts=(900, 2002, 2003)).open()
     rig.bus.enable_torque()
     rig.tick()
     rig.now_s += 1.0
@@ -146,9 +109,9 @@ def test_healing_keeps_to_the_limits():
 
 
 def test_an_alert_whose_name_is_not_told_is_asked_about_seldom(fast):
-    rig = Rig(fast, indirect_block=False)
+    rig = Rig(fast, indirect_block=False).open()
     rig.bus.enable_torque()
-    rig.chain[2].alert = 0x20  # type: ignore[attr-defined]
+    rig.chain[2].alert = 0x20
     for _ in range(50):
         rig.tick()
     before = rig.bus.health().tx_bytes

@@ -4,71 +4,13 @@ import struct
 from typing import Any
 
 import pytest
+from fakes.dynamixels import IDS, Rig
 
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
-from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoConfig
-from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
-from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.smart_servo.physics import ServoSpec
-from gazerig.testing.bus_bench import rows
 
-IDS = (1, 2, 3)
 GROUP_READS = (0x82, 0x8A)
-
-
-class UnkindPort(InProcessPort):
-    """A port whose wire can be spoilt: ``spoil(instruction, answer)`` gives what arrives."""
-
-    def __init__(self, chain, tap=None):
-        super().__init__(chain, tap)
-        self.spoil = None
-        self.gone = False
-
-    def write(self, data):
-        if self.gone:
-            raise BusLost(f"{self.port_name} is gone")
-        before = len(self._waiting)
-        super().write(data)
-        if self.spoil is not None:
-            answer = self.spoil(data[7], self._waiting[before:])
-            self._waiting = self._waiting[:before] + answer
-
-
-class Rig:
-    """Three servos in this process, a driver, and a clock set by hand."""
-
-    def __init__(self, fast=True, **params):
-        self.now_s = 100.0
-        self.sent: list[Any] = []
-        specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in IDS]
-        self.chain = build_dynamixel(specs, lambda: self.now_s)
-        self.port = UnkindPort(self.chain, self.sent.append)
-        setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
-        self.bus = SmartServoBus(
-            DYNAMIXEL, self.port, setups, DynamixelParams(fast_sync_read=fast, **params)
-        )
-
-    def open(self):
-        self.bus.open()
-        return self
-
-    def tick(self, goals=None, dt_s=0.005):
-        self.now_s += dt_s
-        readings = rows(self.bus.read(self.now_s))
-        if goals is not None:
-            self.bus.write(goals)
-        return readings
-
-    def places(self):
-        return [None if r is None else r.position_steps for r in self.tick()]
-
-    def errors(self):
-        return self.bus.health().errors
 
 
 @pytest.fixture(params=[True, False], ids=["fast", "plain"])

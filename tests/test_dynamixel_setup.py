@@ -1,9 +1,8 @@
 """Finding and preparing servos: what is checked, written, asked again and refused."""
 
-from typing import Any
-
 import pytest
 from dynamixel_sdk import PacketHandler
+from fakes.dynamixels import IDS, Rig
 from present import present
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -18,42 +17,6 @@ from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.bus_bench import rows
-
-IDS = (1, 2, 3)
-
-
-class SpoiltPort(InProcessPort):
-    """A port whose answers are what ``spoil(instruction, answer)`` makes of them."""
-
-    spoil = staticmethod(lambda code, raw: raw)
-
-    def write(self, data):
-        super().write(data)
-        self._waiting = self.spoil(data[7], self._waiting)
-
-
-class Rig:
-    """Three servos in this process and a driver that is not yet open."""
-
-    def __init__(self, model="xl330-m077"):
-        self.now_s = 0.0
-        self.sent: list[Any] = []
-        self.chain = build_dynamixel(
-            [ServoSpec(i, model, 2000 + i) for i in IDS], lambda: self.now_s
-        )
-        self.port = SpoiltPort(self.chain, self.sent.append)
-        setups = [ServoConfig(i, model, 1000, 3000, 6000.0) for i in IDS]
-        self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, DynamixelParams())
-
-    def open(self):
-        self.bus.open()
-        return self
-
-    def tick(self, goals):
-        self.now_s += 0.005
-        readings = rows(self.bus.read(self.now_s))
-        self.bus.write(goals)
-        return readings
 
 
 def test_open_prepares_the_servos():

@@ -9,6 +9,7 @@ from math import radians, tan
 
 import numpy as np
 import pytest
+from fakes.cameras import QuietCamera
 from present import present
 from retuned_run import started
 from test_perception import STILL, face_at, picture, standing
@@ -151,22 +152,12 @@ def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:
     assert [thing.mark for thing in present(found.located).things] == [2_000_003]
 
 
-class Frames:
+class Frames(QuietCamera):
     """A source of frames that gives one after another."""
-
-    def __init__(self) -> None:
-        self.number = 0
-
-    def open(self) -> None: ...
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         self.number += 1
         return None if stop.wait(0.001) else shot(self.number)
-
-    def events(self) -> tuple[str, ...]:
-        return ()
-
-    def close(self) -> None: ...
 
 
 def test_a_camera_in_a_thread_takes_another_calibration() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import orjson
 import pytest
 from attention_scene import attention, looking
+from fakes.scenes import EmptyScene
 from stand_in import StandIn
 from test_face_pose import CAMERA, image_of, turned
 
@@ -21,12 +22,12 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import SeenFace
 from gazerig.robot.perception.face_pose import face_pose
-from gazerig.robot.perception.gaze_at_head import looks_at_head
 from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.track import looks_at_head
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.recording.tick_record import percept_as_json, percept_from_json
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 AT_EYES = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
@@ -45,12 +46,8 @@ def standing() -> PoseHistory:
     return poses
 
 
-class Turning:
+class Turning(EmptyScene):
     """A scene of one person whose face is turned off the head by a function of the time."""
-
-    name = "turning"
-    round_s = 1000.0
-    behaviours: tuple[str, ...] = ()
 
     def __init__(self, away_m: float, off_deg: float, aside_m: float = 0.0) -> None:
         self._p, self._off = (away_m, aside_m, 0.05), radians(off_deg)
@@ -59,12 +56,6 @@ class Turning:
         x, y, z = self._p
         way: Angles2 = (atan2(-y, -x) + self._off, atan2(-z, hypot(x, y)))
         return (ScenePerson(self._p, way, None),)
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        return ()
-
-    def events(self) -> tuple[Event, ...]:
-        return ()
 
 
 def found(scene: Turning, seconds: float = 10.0, seed: int = 0) -> list[Face]:

@@ -11,11 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop_deaths import PATIENCE_S, driven
-from mixed_rig import mixed_text
+from mixed_rig import mixed_rig
 from present import present
 from sts_rig import Rig as StsRig
 
-from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.process import child_process
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
@@ -81,9 +80,7 @@ def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
 
 
 def test_all_ports_are_guarded(tmp_path):
-    file = tmp_path / "mixed.yaml"
-    file.write_text(mixed_text(), encoding="utf-8")
-    rig = load_rig(str(file))
+    rig = mixed_rig(tmp_path)
     plans = release_plans(rig, ports_of(rig, None))
     kinds = {name: plan.kind for name, plan in plans.items()}
     assert kinds == {"": "maestro", "neck": "dynamixel", "tilt": "feetech"}

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
+from fakes.cameras import QuietCamera
 from oak_packets import R_CAMERA_IMU, at_rest, readings
 from seeing.moving_room import CLOSE, Board, frames, pan, rotation, shake
 from seeing.row_02_camera_motion import judged
@@ -279,25 +280,13 @@ def test_turn_of_the_gyro_goes_before_that_of_the_joints():
         source(Shot(3 / HZ, 4, image, turn=CameraTurn(2, rows(np.eye(3)))))
 
 
-class Spinning:
+class Spinning(QuietCamera):
     """A camera of a program whose gyro turns while the head stands."""
-
-    def __init__(self) -> None:
-        self.number = 0
-
-    def open(self) -> None:
-        return None
 
     def latest(self, now_s: float) -> Detections:
         number = int(now_s * HZ)
         turn = CameraTurn(1, rows(rotation_by((0.0, number * 0.1, 0.0))))
         return Detections(number / HZ, number, WIDTH, HEIGHT, turn=turn)
-
-    def events(self) -> tuple[str, ...]:
-        return ()
-
-    def close(self) -> None:
-        return None
 
 
 def test_wrong_gyro_is_told_once_in_a_run_which_goes_on():

@@ -12,9 +12,9 @@ from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock
 
-import cv2
 import numpy as np
 import pytest
+from fakes.films import write_film
 from oak_packets import face_archive
 from present import present
 
@@ -47,11 +47,7 @@ def dai():
 @pytest.fixture(scope="module")
 def film(tmp_path_factory):
     path = tmp_path_factory.mktemp("oak") / "film.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 60.0, (320, 240))
-    for k in range(LENGTH):
-        writer.write(np.full((240, 320, 3), 8 * k, np.uint8))
-    writer.release()
-    return path
+    return write_film(path, LENGTH, size=(320, 240), grey=8, fourcc="mp4v")
 
 
 def stamped(message, frame):

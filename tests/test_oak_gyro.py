@@ -8,6 +8,7 @@ from math import nan, radians
 import cv2
 import numpy as np
 import pytest
+from fakes.films import write_film
 from oak_packets import R_CAMERA_IMU, at_rest, calibrated, imu_message, packet, readings
 
 from gazerig.drivers.camera.oak.calibration import imu_to_camera, rotation_of
@@ -224,11 +225,7 @@ def frames_and_readings(film, rates_of, bias_deg_s=BIAS_DEG_S, imu=True, made=re
 @pytest.fixture(scope="module")
 def film(tmp_path_factory):
     path = tmp_path_factory.mktemp("gyro") / "film.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 60.0, (128, 96))
-    for k in range(20):
-        writer.write(np.full((96, 128, 3), 8 * k, np.uint8))
-    writer.release()
-    return path
+    return write_film(path, 20, size=(128, 96), grey=8, fourcc="mp4v")
 
 
 PARAMS = OakParams(width_px=128, height_px=96, rate_hz=60.0, imu_rotation_deg=(0.0, 0.0, 90.0))

@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from fakes.films import write_film
 from present import present
 
 from gazerig.drivers.camera.oak.discovery import load_depthai
@@ -141,11 +142,7 @@ def test_real_network_is_decoded_as_opencv_does(size):
 @pytest.fixture(scope="module")
 def film(tmp_path_factory):
     path = tmp_path_factory.mktemp("yunet") / "film.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 60.0, (640, 400))
-    for k in range(10):
-        writer.write(np.full((400, 640, 3), 20 * k, np.uint8))
-    writer.release()
-    return path
+    return write_film(path, size=(640, 400), fourcc="mp4v")
 
 
 def nodes_of(film, outputs):

@@ -9,6 +9,7 @@ from math import radians
 
 import numpy as np
 import pytest
+from fakes.cameras import QuietCamera
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
@@ -105,26 +106,16 @@ def test_frames_that_are_upright_stay_the_very_same() -> None:
     assert upright(make, AS_DELIVERED) is make
 
 
-class Frames:
+class Frames(QuietCamera):
     """A source of given images."""
 
     def __init__(self, images: Iterator[ImageArray]) -> None:
         self._images, self._number = images, 0
 
-    def open(self) -> None:
-        """Begin."""
-
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Return the next."""
         self._number += 1
         return Shot(0.1 * self._number, self._number, next(self._images))
-
-    def events(self) -> tuple[str, ...]:
-        """Return nothing."""
-        return ()
-
-    def close(self) -> None:
-        """End."""
 
 
 class Spot:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mixed_rig import mixed_text
+from mixed_rig import rig_of
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
@@ -26,14 +26,6 @@ def ran(rig: Rig, seconds: float, seed: int = 0) -> tuple[Assembly, list[Tick], 
     count = run(made.robot, made.clock, made.loop, over, ticks.append)
     assert count.stopped_by == "over"
     return made, ticks, said
-
-
-def rig_of(name: str, tmp_path: Path) -> Rig:
-    if name != "mixed":
-        return load_rig(name)
-    file = tmp_path / "mixed.yaml"
-    file.write_text(mixed_text(), encoding="utf-8")
-    return load_rig(str(file))
 
 
 @pytest.mark.parametrize("name", ["maker", "feetech", "mixed"])
@@ -128,7 +120,7 @@ def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
     """What the emulated shafts do, not what anybody believes of them."""
     rig = rig_of("mixed", tmp_path)
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene="boxing"))
-    from gazerig.robot.app.emulation import place_of
+    from gazerig.robot.app.run_bus import place_of
 
     ports = [share.bus._port for share in made.robot.body.bus._shares]  # type: ignore[attr-defined]
     devices = dict(zip(("", "neck", "tilt"), (port.chain for port in ports), strict=True))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fakes.scenes import EmptyScene
 from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
@@ -33,7 +34,7 @@ from gazerig.sim_mock.cameras.draw_person import (
 from gazerig.sim_mock.cameras.draw_room import draw_room
 from gazerig.sim_mock.cameras.optics import blur_along
 from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams, draw_scene
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 WIDTH, HEIGHT = 640, 400
 LENS = intrinsics_of_view(radians(69.0), WIDTH, HEIGHT)
@@ -53,12 +54,8 @@ class Nobody:
         return ()
 
 
-class Still:
+class Still(EmptyScene):
     """A scene in which nothing moves but by a given function of the time."""
-
-    name = "still"
-    round_s = 10.0
-    behaviours: tuple[str, ...] = ()
 
     def __init__(
         self, *people: Vec3, things: tuple[Thing, ...] = (), v: Vec3 = (0.0, 0.0, 0.0)
@@ -71,9 +68,6 @@ class Still:
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return self._things
-
-    def events(self) -> tuple[Event, ...]:
-        return ()
 
 
 def canvas_at(head_rad: Angles3 = (0.0, 0.0, 0.0), p_m: Vec3 = (0.0, 0.0, 0.0)) -> Canvas:

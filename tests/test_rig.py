@@ -9,7 +9,7 @@ import pytest
 import typer
 from desk import GAZE_JOINTS
 from features_there import skip_without
-from mixed_rig import mixed_text
+from mixed_rig import mixed_rig, mixed_text
 from typer.core import TyperGroup
 
 from gazerig.config.load import ConfigError, shipped, shipped_names
@@ -156,9 +156,7 @@ def test_all_faults_come_in_one_message(tmp_path: Path) -> None:
 
 @pytest.fixture
 def mixed(tmp_path: Path) -> Rig:
-    file = tmp_path / "mixed.yaml"
-    file.write_text(mixed_text(), encoding="utf-8")
-    return load_rig(str(file))
+    return mixed_rig(tmp_path)
 
 
 def faults(tmp_path: Path, text: str) -> str:

@@ -4,22 +4,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fakes.scenes import EmptyScene
 
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class Still:
+class Still(EmptyScene):
     """A scene that shows what it is given, and some of it only later."""
-
-    name = "still"
-    round_s = 10.0
-    behaviours: tuple[str, ...] = ()
 
     def __init__(self, things: tuple[Thing, ...], later: tuple[Thing, ...] = ()) -> None:
         self._things, self._later = things, later
@@ -29,9 +26,6 @@ class Still:
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return self._things if t_s < 0.5 else self._later + self._things
-
-    def events(self) -> tuple[Event, ...]:
-        return ()
 
 
 def camera(scene: Still, **params: Any) -> SceneCamera:

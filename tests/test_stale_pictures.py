@@ -7,6 +7,7 @@ from math import degrees, radians
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.types import Camera, Detections
@@ -16,7 +17,7 @@ from gazerig.robot.app import run_rig
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import ScenePerson
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -25,22 +26,12 @@ LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"
 NECK = slice(GAZE_JOINTS.index("neck_yaw"), GAZE_JOINTS.index("neck_roll") + 1)
 
 
-class Passer:
+class Passer(EmptyScene):
     """A scene: somebody who walks from one side to the other, and on."""
-
-    name = "passer"
-    round_s = 100.0
-    behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         y = 0.8 - 0.25 * t_s
         return (ScenePerson((1.2, y, 0.2), (float(np.arctan2(-y, -1.2)), 0.0), None),)
-
-    def things(self, t_s: float) -> tuple[Thing, ...]:
-        return ()
-
-    def events(self) -> tuple[Event, ...]:
-        return ()
 
 
 class BackAndForth(Passer):

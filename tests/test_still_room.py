@@ -5,38 +5,29 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
+from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app import run_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import Thing
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 SECONDS = 3.0
 
 
-class Room:
+class Room(EmptyScene):
     """A scene: a room, and a ball that flies through it if asked for."""
-
-    name = "room"
-    round_s = 100.0
-    behaviours: tuple[str, ...] = ()
 
     def __init__(self, ball: bool) -> None:
         self._ball = ball
 
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        return ()
-
     def things(self, t_s: float) -> tuple[Thing, ...]:
         place = (1.5, 0.5 * float(np.sin(2.0 * t_s)), 0.25)
         return (Thing(1, "ball", place, 0.1),) if self._ball else ()
-
-    def events(self) -> tuple[Event, ...]:
-        return ()
 
 
 def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]:

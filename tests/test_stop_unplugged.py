@@ -7,10 +7,9 @@ from typing import Any
 
 import pytest
 from bus_kinds import KINDS, in_process
-from mixed_rig import mixed_text
+from mixed_rig import rig_of
 
 import gazerig.robot.app.run_bus as run_bus
-from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import BusLost
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
@@ -122,7 +121,7 @@ class Machine:
 def machine(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Iterator[Machine]:
-    rig = _rig(request.param, tmp_path)
+    rig = rig_of(request.param, tmp_path)
     devices: dict[str, Device] = {}
     build: Callable[..., Device] = run_bus.build
 
@@ -136,14 +135,6 @@ def machine(
     machine = Machine(made, devices)
     yield machine
     made.close()
-
-
-def _rig(name: str, folder: Path) -> Rig:
-    if name != "mixed":
-        return load_rig(name)
-    path = folder / "mixed.yaml"
-    path.write_text(mixed_text(), encoding="utf-8")
-    return load_rig(str(path))
 
 
 @pytest.mark.parametrize("machine", RIGS, indirect=True)

@@ -9,10 +9,10 @@ import pytest
 from board_rig import on_pca9685
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from mixed_rig import mixed_text
+from mixed_rig import rig_of
 from true_shafts import Bench, Judge, restless
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.app.rig_limits import limits
 
@@ -30,10 +30,9 @@ GENTLE = 1.15
 
 @pytest.fixture(scope="module")
 def rigs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rig]:
-    mixed = tmp_path_factory.mktemp("rig") / "mixed.yaml"
-    mixed.write_text(mixed_text(), encoding="utf-8")
-    files = {"mixed": str(mixed), "pca9685": on_pca9685(mixed.parent)}
-    return {name: load_rig(files.get(name, name)) for name in NAMES}
+    folder = tmp_path_factory.mktemp("rig")
+    on_board = {"pca9685": on_pca9685(folder)}
+    return {name: rig_of(on_board.get(name, name), folder) for name in NAMES}
 
 
 def gaps(seed: int, share: float, longest: int) -> Iterator[int]:

@@ -5,7 +5,6 @@ import json
 import logging
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fakes.waiting import wait_for
 from slow_rigs import at_rate
 
 import gazerig
@@ -36,14 +36,6 @@ from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 
 LIMIT_S = 60.0
-
-
-def wait_for(true: Callable[[], object]) -> None:
-    """Wait until something is true, however busy the machine is."""
-    end_s = time.monotonic() + LIMIT_S
-    while not true():
-        assert time.monotonic() < end_s
-        time.sleep(0.002)
 
 
 # --- how a user's function misbehaves; each says in ``begun`` that it was called

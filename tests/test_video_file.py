@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from fakes.films import write_film
 
 from gazerig.drivers.camera.video_file import VideoFile, usable_rate_hz
 from gazerig.drivers.errors import CameraError
@@ -20,18 +21,9 @@ needs_film = pytest.mark.skipif(not FILM_FILE.exists(), reason=f"no {FILM_FILE}"
 LENGTH, RATE_HZ = 20, 10.0
 
 
-def write_film(path: Path, length: int = LENGTH, rate_hz: float = RATE_HZ) -> Path:
-    """Write a film whose picture k (from 0) is grey of 10 k."""
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), rate_hz, (64, 48))
-    for k in range(length):
-        writer.write(np.full((48, 64, 3), 10 * k, np.uint8))
-    writer.release()
-    return path
-
-
 @pytest.fixture(scope="module")
 def film_file(tmp_path_factory) -> Path:
-    return write_film(tmp_path_factory.mktemp("films") / "film.avi")
+    return write_film(tmp_path_factory.mktemp("films") / "film.avi", LENGTH, RATE_HZ, grey=10)
 
 
 @pytest.fixture
@@ -61,7 +53,7 @@ def test_picture_at_is_the_newest_due(film):
 
 
 def test_every_due_time_belongs_to_its_own_picture(tmp_path):
-    video = VideoFile(write_film(tmp_path / "odd.avi", length=3, rate_hz=23.976))
+    video = VideoFile(write_film(tmp_path / "odd.avi", 3, 23.976))
     video.open()
     assert all(video.number_at(video.due_s(number)) == number for number in range(1, 5000))
     assert video.number_at(-0.001) == 0
@@ -189,7 +181,7 @@ def test_reader_is_silent_beside_the_error(tmp_path, film_file):
 
 
 def test_film_without_pictures(tmp_path):
-    assert refusal(write_film(tmp_path / "empty.avi", length=0))
+    assert refusal(write_film(tmp_path / "empty.avi", 0))
 
 
 @pytest.mark.parametrize("part", [0.5, 0.7, 0.85])
@@ -219,7 +211,7 @@ def test_file_without_rights(film_file, tmp_path):
 
 
 def test_film_that_vanishes_is_noticed_at_its_end(tmp_path):
-    file = write_film(tmp_path / "film.avi", length=4)
+    file = write_film(tmp_path / "film.avi", 4, RATE_HZ, grey=10)
     video = VideoFile(file)
     video.open()
     file.unlink()

@@ -17,7 +17,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from board_rig import on_pca9685
-from mixed_rig import mixed_text
+from mixed_rig import rig_of
 from true_shafts import Judge, Late, group_of, looked_at, on_time, run, sometimes_late
 
 from gazerig.config.schema import Rig, load_rig
@@ -42,11 +42,7 @@ def rig_called(name: str, folder: str) -> Rig:
     """Load a shipped rig, or the one of three kinds of bus."""
     if name == "pca9685":
         return load_rig(on_pca9685(folder))
-    if name != "mixed":
-        return load_rig(name)
-    path = Path(folder) / "mixed.yaml"
-    path.write_text(mixed_text(), encoding="utf-8")
-    return load_rig(str(path))
+    return rig_of(name, Path(folder))
 
 
 def all_around(seed: int) -> Callable[[Assembly, float], None]:

@@ -1,0 +1,18 @@
+"""Waiting for another thread or process."""
+
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+PATIENCE_S = 60.0
+
+T = TypeVar("T")
+
+
+def wait_for(what: Callable[[], T], patience_s: float = PATIENCE_S) -> T:
+    """Wait until something is true, however busy the machine is; return it."""
+    end_s = time.monotonic() + patience_s
+    while not (found := what()):
+        assert time.monotonic() < end_s, "it never came"
+        time.sleep(0.002)
+    return found
