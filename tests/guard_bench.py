@@ -10,7 +10,7 @@ from typing import Any
 from desk import GAZE_JOINTS
 
 from gazerig.robot.model.guard_params import GuardParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointState
 
 ROOM = Path(__file__).parents[1] / "robot" / "safety"

@@ -8,7 +8,7 @@ from desk import GAZE_JOINTS
 from guard_bench import ACCEL, DT, HIGH, JOINT, LOW, TOP, Bench
 
 from gazerig.robot.model.guard_params import GuardParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointState
 
 

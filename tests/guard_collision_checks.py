@@ -9,9 +9,8 @@ import pytest
 from desk import GAZE_JOINTS
 from guard_bench import DT, HIGH, LID, LOW, PITCH, YAW, Bench
 
-from gazerig.robot.model.forbidden_range import CollisionParams
-from gazerig.robot.model.guard_params import GuardParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.guard_params import CollisionParams, GuardParams
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointState
 
 

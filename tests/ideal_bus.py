@@ -13,8 +13,7 @@ import pytest
 from gazerig.config.schema import Rig
 from gazerig.robot.app import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import run_bus
-from gazerig.robot.app.run_parts import RunBus
+from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.model.clock import Clock
 
 

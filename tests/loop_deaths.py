@@ -18,7 +18,7 @@ from struck_rigs import rig_of
 from gazerig.config.rig import Rig
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus, rig_setups
-from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.testing.bus_bench import rows
 

@@ -12,7 +12,7 @@ from mixed_rig import mixed_text
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import Host
-from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 

@@ -11,8 +11,7 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.analysis.behaviour_score import BehaviourScore
-from gazerig.robot.analysis.planner_score import PlannerScore
+from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run

@@ -15,7 +15,7 @@ from gazerig.robot.app.rig_description import collision_hints, shape_of
 from gazerig.robot.description.build import describe
 from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.model.forbidden_range import CollisionParams
+from gazerig.robot.model.guard_params import CollisionParams
 
 Ranges = Mapping[str, tuple[float, float]]
 _LITTLE: Ranges = {"neck_pitch": (-10.0, 10.0), "neck_roll": (-5.0, 5.0)}

@@ -22,12 +22,10 @@ from typer.core import TyperGroup
 
 from gazerig import __version__
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.robot.cli.command_group import CommandsByName
 from gazerig.robot.cli.command_list import shipped_commands
 from gazerig.robot.cli.examples import all_examples
-from gazerig.robot.cli.main import app
+from gazerig.robot.cli.main import CommandsByName, app, next_steps
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, tidied_up
-from gazerig.robot.cli.welcome import next_steps
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
@@ -215,9 +213,9 @@ def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(
 
 def test_what_nobody_thought_of_is_one_line_too() -> None:
     code = (
-        "import sys; from gazerig.robot.cli import main, welcome\n"
+        "import sys; from gazerig.robot.cli import main\n"
         "sys.argv = ['gazerig', *sys.argv[1:]]\n"
-        "welcome.next_steps = lambda *a: 1 / 0\nmain.main()"
+        "main.next_steps = lambda *a: 1 / 0\nmain.main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 1 and len(done.stderr.strip().splitlines()) == 1

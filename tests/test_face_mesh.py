@@ -35,7 +35,7 @@ from gazerig.robot.model.types import SeenFace
 from gazerig.robot.perception import mesh_reading
 from gazerig.robot.perception.mesh_reading import EYES_SHUT, MeshReading, read_mesh
 from gazerig.robot.perception.perception import Perception
-from gazerig.robot.perception.speech import NO_SPEECH
+from gazerig.robot.perception.track import NO_SPEECH
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.recording.tick_record import percept_as_json, percept_from_json
 

@@ -13,10 +13,9 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
-from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
-from gazerig.robot.app.key_frame_table import read_table
+from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, read_table, write_gesture
 from gazerig.robot.cli.gestures import app
-from gazerig.robot.model.key_frames import fit_keys, smoothed
+from gazerig.robot.model.gesture_fit import fit_keys, smoothed
 
 DESK = load_rig("desk")
 

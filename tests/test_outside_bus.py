@@ -16,9 +16,8 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import PluginError
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
-from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import run_bus
+from gazerig.robot.app.run_bus import emulated_lines, run_bus
 from gazerig.robot.cli.main import app
 from gazerig.robot.guardian.process import releaser
 from gazerig.robot.guardian.release_plan import decode, encode

@@ -11,8 +11,8 @@ from gazerig.gaze.angles import norm, rotate_back, sub
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.types import Bodies, Percept, Vec3
 from gazerig.robot.app.gaze_models import kinematics_of
-from gazerig.robot.model.capsule import Capsule
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.kinematics import Capsule
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker

@@ -15,8 +15,8 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.rig_description import description_of, shape_of
 from gazerig.robot.description.mesh_params import MeshParams
-from gazerig.robot.description.mesh_reader import read_mesh
 from gazerig.robot.description.mjcf import mjcf
+from gazerig.robot.description.own_meshes import read_mesh
 
 RIG = """name: mine
 profile: robot

@@ -39,13 +39,12 @@ from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_stream import TickBatch, TickStream
 from gazerig.robot.dashboard.feed.camera_overlay import encode
-from gazerig.robot.model import stop_latch
+from gazerig.robot.model import commands
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.model.leader import GestureState, LeadState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.record_router import RecordRouter
 from gazerig.robot.recording.recorder import FramePicker, Recorder
 from gazerig.robot.recording.run_info import (
     RunEnd,
@@ -57,7 +56,7 @@ from gazerig.robot.recording.run_info import (
 )
 from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.viewer_messages import orientation
-from gazerig.robot.recording.writer_process import PIECE_BYTES
+from gazerig.robot.recording.writer_process import PIECE_BYTES, RecordRouter
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -65,7 +64,7 @@ pytestmark = pytest.mark.usefixtures("branched_children")
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stop_latch, "MIN_HOLD_S", 0.1)  # a shorter run
+        patch.setattr(commands, "MIN_HOLD_S", 0.1)  # a shorter run
         return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
 
 

@@ -8,9 +8,8 @@ import pytest
 from desk import GAZE_JOINTS
 
 from gazerig.config.bounds import validate
-from gazerig.robot.model.forbidden_range import CollisionParams
-from gazerig.robot.model.guard_params import GuardParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.guard_params import CollisionParams, GuardParams
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.safety.guard import Guard
 

@@ -8,7 +8,7 @@ import pytest
 from desk import GAZE_JOINTS
 
 from gazerig.robot.model.guard_params import GuardParams, HealthParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.safety.guard import Guard
 

@@ -16,7 +16,7 @@ from six_joints import SIX
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.analysis.lid_opening import UPPER, openings
+from gazerig.robot.analysis.blink_finder import UPPER, openings
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import Tick

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.suggestions import completed, speaking_of
 from gazerig.robot.cli.terminal import _writer

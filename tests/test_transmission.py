@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.transmission import Curve, Straight
+from gazerig.robot.model.joint import Curve, JointParams, Straight
 
 ROD = [[-30.0, 1900.0], [-10.0, 1640.0], [0.0, 1500.0], [15.0, 1350.0], [30.0, 1100.0]]
 MAKER = load_rig("maker")

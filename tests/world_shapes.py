@@ -11,7 +11,7 @@ from gazerig.robot.description.paint import Painted, painted
 from gazerig.robot.description.person_shape import head, torso
 from gazerig.robot.description.texture import textured
 from gazerig.robot.description.world_shapes import WorldPart
-from gazerig.robot.model.quaternion import Quaternion
+from gazerig.robot.model.frames import Quaternion
 
 LEAVES_S = 60.0
 

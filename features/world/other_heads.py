@@ -12,7 +12,7 @@ from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.state_file import StateReader
 from gazerig.gaze.types import Vec3
 from gazerig.robot.description.world_shapes import WorldPart
-from gazerig.robot.model.quaternion import Quaternion
+from gazerig.robot.model.frames import Quaternion
 
 if TYPE_CHECKING:
     from gazerig.features.world.model import WorldModel

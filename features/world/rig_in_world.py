@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from gazerig.robot.model.coupling import Coupling, Unreachable
-from gazerig.robot.model.transmission import Line, Linkage
+from gazerig.robot.model.joint import Line, Linkage
 
 RELINEARISE_RAD = 0.003
 """A coupling is linearised again after a joint has turned this far. The error of the servo's

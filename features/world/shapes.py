@@ -19,7 +19,7 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.description.paint import Painted
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
-from gazerig.robot.model.quaternion import Quaternion, quaternion
+from gazerig.robot.model.frames import Quaternion, quaternion
 
 _SKIN = ("head", "neck", "lips", "left_hand", "right_hand", "left_lid", "right_lid")
 

@@ -1,4 +1,4 @@
-"""Blinks in a trace of lid openings, with their shape.
+"""Openings of a rig's lids, and blinks in a trace of them, with their shape.
 
 A blink shuts both lids by half or more and opens them again; lids that sink with the gaze
 stay down. Closing and opening last for as long as the lid is faster than a twentieth of that
@@ -6,6 +6,7 @@ phase's peak, as blink kinematics are usually measured (VanderWerf et al. 2003).
 """
 
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 _DEEP_SHARE, _BACK_SHARE = 0.5, 0.75
@@ -136,3 +137,22 @@ def _phase(t: list[float], speed: list[float], peak: int) -> tuple[float, float]
 def _between(t_low: float, t_high: float, low: float, high: float, level: float) -> float:
     share = (level - low) / (high - low) if high > low else 0.0
     return t_low + min(1.0, max(0.0, share)) * (t_high - t_low)
+
+
+UPPER = ("left_upper_lid", "right_upper_lid")
+
+
+LOWER = ("left_lower_lid", "right_lower_lid")
+
+
+def openings(
+    left: float, right: float, names: Sequence[str], pair: tuple[str, str]
+) -> tuple[float, float] | None:
+    """Return the openings of two lids, None without any; a single lid counts for both.
+
+    pair: joints of the left and the right one; names: of the rig, all where empty
+    """
+    if not names:
+        return left, right
+    there = [o for name, o in zip(pair, (left, right), strict=True) if name in names]
+    return (there[0], there[-1]) if there else None

@@ -11,8 +11,7 @@ from typing import NamedTuple, TypeVar
 
 from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.types import PARTS, Vec3
-from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
-from gazerig.robot.analysis.lid_opening import UPPER, openings
+from gazerig.robot.analysis.blink_finder import UPPER, BlinkEvent, BlinkFinder, openings
 from gazerig.robot.analysis.saccade_finder import SaccadeFinder
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.tick import Tick

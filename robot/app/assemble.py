@@ -242,6 +242,8 @@ class _Generators(NamedTuple):
     aversion: np.random.Generator
     endpoint: np.random.Generator
     reaction: np.random.Generator
+    head: np.random.Generator
+    sway: np.random.Generator
 
 
 def _components(
@@ -258,7 +260,7 @@ def _components(
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
     tracker = Tracker(rig.tracks)
-    moves = motion_models(rig)
+    moves = motion_models(rig, random.head, random.sway)
     decides = attention_models(rig, random.idle)
     animation = Animation(further(rig.joints), animation_tables(rig))
     return Components(
@@ -290,6 +292,7 @@ def _components(
         pursuit=moves.pursuit,
         head=moves.head,
         breathing=moves.breathing,
+        sway=moves.sway,
         lids=lids,
         animation=animation,
         gestures=GestureChoices(

@@ -1,8 +1,8 @@
 """The buses of a rig: their joints, and one bus that joins them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from gazerig.config.rig import BusConfig, Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.bus.checked_bus import CheckedBus
 from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.bus.servo_models import SERVOS
@@ -159,19 +159,9 @@ def _share(rig: Rig, name: str, port: BusPort) -> BusShare:
     own = [every[joint] for joint in mine]
     places = tuple(rig.names.index(joint) for joint in mine)
     config = rig.bus_named(name)
-    return BusShare(name, _bus(config, port, own), places)
-
-
-def _bus(config: BusConfig, port: BusPort, own: Sequence[ServoConfig]) -> ServoBus:
-    """Return the bus of a kind.
-
-    Raises:
-        PluginError: it is another package's and cannot be created.
-    """
     part = load(BUS, config.kind, BusPlugin)
     if is_ours(BUS, config.kind):
-        ours: ServoBus = part.make(port, tuple(own), config.section)
-        return ours
+        return BusShare(name, part.make(port, tuple(own), config.section), places)
     label = find(BUS, config.kind).label
     try:
         bus: ServoBus = part.make(port, tuple(own), config.section)
@@ -179,4 +169,5 @@ def _bus(config: BusConfig, port: BusPort, own: Sequence[ServoConfig]) -> ServoB
         raise
     except Exception as error:
         raise PluginError(f"{label} cannot be made: {describe_error(error)}") from error
-    return CheckedBus(bus, label, own, getattr(port, "now_s", None) or RealClock().now_s)
+    now_s = getattr(port, "now_s", None) or RealClock().now_s
+    return BusShare(name, CheckedBus(bus, label, own, now_s), places)

@@ -40,7 +40,7 @@ from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, HeadPose, s
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, label_of, require
-from gazerig.robot.app.run_parts import RunBus, Sight, TrueSteps
+from gazerig.robot.app.run_bus import RunBus, Sight, TrueSteps
 from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import pairs_of
@@ -419,25 +419,19 @@ def _film(options: RunOptions) -> "VideoFile | CameraReplay":
         return CameraReplay(options.replay)
     from gazerig.drivers.camera.video_file import VideoFile
 
-    return VideoFile(_path(options))
+    return VideoFile(str(options.video))
 
 
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return a factory of the source of upright frames, for the process that will use it."""
-    return upright(_raw_source(rig, options), orientation_of(rig.camera))
-
-
-def _raw_source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
-    """Return a factory of the source of frames as the camera delivers them."""
+    source: Callable[[], FrameSource]
     if options.replay is not None:
-        return partial(camera_plugins.recording, options.replay)
-    if options.video is not None:
-        return partial(camera_plugins.film, _path(options))
-    if options.oak or options.camera == "oak":
-        return partial(camera_plugins.oak, rig.oak)
-    number = options.camera if isinstance(options.camera, int) else 0
-    return partial(camera_plugins.webcam, number, rig.webcam)
-
-
-def _path(options: RunOptions) -> str:
-    return str(options.video)
+        source = partial(camera_plugins.recording, options.replay)
+    elif options.video is not None:
+        source = partial(camera_plugins.film, str(options.video))
+    elif options.oak or options.camera == "oak":
+        source = partial(camera_plugins.oak, rig.oak)
+    else:
+        number = options.camera if isinstance(options.camera, int) else 0
+        source = partial(camera_plugins.webcam, number, rig.webcam)
+    return upright(source, orientation_of(rig.camera))

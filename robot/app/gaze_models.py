@@ -13,6 +13,7 @@ from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.gesture.breathing import Breathing
+from gazerig.gaze.gesture.sway import Sway
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
@@ -25,12 +26,13 @@ from gazerig.robot.model.kinematics import Kinematics
 
 def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
     """Return a rig's geometry and its oculomotor model, for gaze without a camera."""
-    lid_rng, landing_rng = (
-        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
+    lid_rng, landing_rng, head_rng, sway_rng = (
+        np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
     )
     kinematics = kinematics_of(rig)
     lids = Lids(rig.gaze.lids, lid_rng)
-    return kinematics, oculomotor(rig, kinematics, motion_models(rig), lids, landing_rng)
+    moves = motion_models(rig, head_rng, sway_rng)
+    return kinematics, oculomotor(rig, kinematics, moves, lids, landing_rng)
 
 
 def kinematics_of(rig: Rig) -> Kinematics:
@@ -65,16 +67,20 @@ class MotionModels(NamedTuple):
     pursuit: Pursuit
     head: HeadModel
     breathing: Breathing
+    sway: Sway
 
 
-def motion_models(rig: Rig) -> MotionModels:
+def motion_models(
+    rig: Rig, head_rng: np.random.Generator, sway_rng: np.random.Generator
+) -> MotionModels:
     """Return the models of eye and head movements."""
     gaze = rig.gaze
     return MotionModels(
         SaccadeModel(gaze.saccade),
         Pursuit(gaze.pursuit),
-        HeadModel(gaze.head, *head_limits(rig)),
+        HeadModel(gaze.head, *head_limits(rig), head_rng),
         Breathing(gaze.breathing),
+        Sway(gaze.sway, sway_rng),
     )
 
 
@@ -96,6 +102,7 @@ def oculomotor(
         lids,
         moves.breathing,
         landing_rng,
+        moves.sway,
     )
 
 

@@ -1,6 +1,14 @@
-"""Conversion of joint angles over time to a gesture's YAML file, which the rig's loader reads."""
+"""Conversion of joint angles over time to a gesture's YAML file, which the rig's loader reads.
 
-from collections.abc import Mapping
+Such angles come from recordings, or from CSV tables of animation programs, one row per frame or
+key. Wide: a column of times and one of angles for each joint. Long: columns time, joint, angle, one
+row for each key. Times are in seconds (time, time_s) or numbers of frames (frame), angles in
+degrees. Separators are commas, semicolons or tabs.
+"""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +17,20 @@ from gazerig.config.gestures import gesture_name, load_gesture
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import written
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_input import read_limited
 from gazerig.drivers.files.file_output import write_file
 from gazerig.gaze.gesture.gesture import HEAD_TRACKS, Gesture
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.model.gesture_fit import FittedGesture, GestureFit, GestureRefused, motions
-from gazerig.robot.model.key_frames import GRID_S, fit_keys, smoothed
+from gazerig.robot.model.gesture_fit import (
+    GRID_S,
+    FittedGesture,
+    GestureFit,
+    GestureRefused,
+    fit_keys,
+    motions,
+    smoothed,
+)
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
 
@@ -26,6 +42,7 @@ _LARGEST_S = 60.0
 _STILL_DEG = 0.01
 
 Series = tuple[Floats, Floats]
+"""Times in seconds and angles in degrees of one joint."""
 Keys = dict[str, list[tuple[float, float]]]
 
 
@@ -168,3 +185,110 @@ def _frame(time_s: float, values: Mapping[str, float]) -> list[str]:
         *([f"lids: {{{', '.join(lids)}}}"] if lids else []),
         *([f"joints_deg: {{{', '.join(others)}}}"] if others else []),
     ]
+
+
+_TIMES = ("time", "time_s", "t", "seconds", "frame")
+_JOINTS = ("joint", "bone", "effector", "servo", "motor", "name")
+_ANGLES = ("angle", "angle_deg", "value", "degrees", "deg")
+_LARGEST = 5_000_000
+_MOST_FAULTS = 10
+
+
+def read_table(path: Path, fps: float | None) -> dict[str, Series]:
+    """Return the keys of every joint of a CSV file.
+
+    Args:
+        path: of the file.
+        fps: frames per second, for a column of frame numbers.
+
+    Raises:
+        SetupError: the file cannot be read or has bad rows, each with its line.
+    """
+    try:
+        text = read_limited(path, _LARGEST).decode("utf-8-sig")
+    except OSError as error:
+        raise SetupError(f"{path} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SetupError(f"{path} is not UTF-8 text: export it as CSV") from None
+    separator = max(",;\t", key=text.partition("\n")[0].count)
+    rows = list(csv.reader(text.splitlines(), delimiter=separator))
+    head = [name.strip().lower() for name in rows[0]] if rows else []
+    time = next((i for i, name in enumerate(head) if name in _TIMES), None)
+    if time is None:
+        raise SetupError(
+            f"{path}:1: no column of times: the first row names the columns; one of "
+            f"{', '.join(_TIMES)} must be there"
+        )
+    if head[time] == "frame" and fps is None:
+        raise SetupError(f"{path}:1: times are frame numbers: give --fps, e.g. 24 or 30")
+    table = _Table(path, head, time, 1.0 / fps if head[time] == "frame" and fps else 1.0)
+    found = table.keys(rows)
+    if table.faults:
+        more = len(table.faults) - _MOST_FAULTS
+        shown = table.faults[:_MOST_FAULTS] + ([f"and {more} more"] if more > 0 else [])
+        raise SetupError("\n".join(shown))
+    if not found:
+        raise SetupError(f"{path}: no rows under the names of the columns")
+    return found
+
+
+class _Table:
+    """Rows of one file; faults: the invalid lines with their errors."""
+
+    def __init__(self, path: Path, head: Sequence[str], time: int, unit_s: float) -> None:
+        self.faults: list[str] = []
+        self._path, self._head, self._time, self._unit_s = path, head, time, unit_s
+        self._joint = next((i for i, name in enumerate(head) if name in _JOINTS), None)
+        self._angle = next((i for i, name in enumerate(head) if name in _ANGLES), None)
+
+    def keys(self, rows: Sequence[Sequence[str]]) -> dict[str, Series]:
+        """Return the keys by joint, in the order of their times."""
+        found: dict[str, dict[float, float]] = {}
+        last_s: dict[str, float] = {}
+        for line, row in enumerate(rows[1:], start=2):
+            if not any(cell.strip() for cell in row):
+                continue
+            for joint, time_s, angle in self._cells(line, row):
+                if time_s <= last_s.get(joint, -1.0):
+                    self._blame(line, f"{joint}: {time_s:g} s is not after {last_s[joint]:g} s")
+                last_s[joint] = time_s
+                found.setdefault(joint, {})[time_s] = angle
+        return {
+            name: (np.array(list(keys)), np.array(list(keys.values())))
+            for name, keys in found.items()
+        }
+
+    def _cells(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
+        """Yield the keys of one row; an empty cell of a wide table is no key."""
+        if len(row) != len(self._head):
+            self._blame(line, f"has {len(row)} columns, and the first row names {len(self._head)}")
+            return
+        time = self._number(line, self._head[self._time], row[self._time])
+        if time is None:
+            return
+        if time < 0.0:
+            self._blame(line, f"{self._head[self._time]} {time:g} is before 0")
+            return
+        if self._joint is not None and self._angle is not None:
+            pairs = [(row[self._joint].strip(), row[self._angle])]
+        else:
+            pairs = [
+                (n, row[i]) for i, n in enumerate(self._head) if i != self._time and row[i].strip()
+            ]
+        for joint, cell in pairs:
+            angle = self._number(line, joint, cell)
+            if angle is not None:
+                yield joint, time * self._unit_s, angle
+
+    def _number(self, line: int, what: str, cell: str) -> float | None:
+        try:
+            value = float(cell)
+        except ValueError:
+            value = float("nan")
+        if isfinite(value):
+            return value
+        self._blame(line, f"{what}: {cell.strip()!r:.40} is no number")
+        return None
+
+    def _blame(self, line: int, text: str) -> None:
+        self.faults.append(f"{self._path}:{line}: {text}")

@@ -22,6 +22,7 @@ from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.gesture.breathing import Breathing
+from gazerig.gaze.gesture.sway import Sway
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.head import HeadModel
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
@@ -75,6 +76,7 @@ class Components(NamedTuple):
     pursuit: Pursuit
     head: HeadModel
     breathing: Breathing
+    sway: Sway
     lids: Lids
     animation: Animation
     gestures: GestureChoices
@@ -101,7 +103,7 @@ class _Ready(NamedTuple):
 
 _ALIKE = (
     "field_of_view", "bottom_up", "top_down", "attention", "idle", "aversion", "saccade", "pursuit",
-    "breathing", "lids",
+    "breathing", "sway", "lids",
 )  # fmt: skip
 """Sections of the gaze whose part of the same name needs only its own parameters."""
 
@@ -190,7 +192,9 @@ class LiveParams:
         bends = (new.geometry, new.lid_joints) != (old.geometry, old.lid_joints)
         if bends:
             parts.kinematics.retune(new.geometry, lid_ends(new))
-        said = self._put_joints(old, new)
+        said: tuple[str, ...] = ()
+        if (new.joints, new.guard) != (old.joints, old.guard):
+            said = self._put_joints(old, new)
         if bends or new.ranges != old.ranges:
             parts.guard.go_gently()  # desired angles jump
         if new.loop.rate_hz != old.loop.rate_hz:
@@ -210,8 +214,6 @@ class LiveParams:
 
         Returns the changes that wait for the next setup of the servos.
         """
-        if (new.joints, new.guard) == (old.joints, old.guard):
-            return ()
         parts, joints, before = self.parts, self._keep_servos(new), self._keep_servos(old)
         gentle_deg_s = new.guard.soft_start_speed_deg_s
         others = (joints, gentle_deg_s) != (before, old.guard.soft_start_speed_deg_s)

@@ -78,8 +78,10 @@ def rerun(
         gazerig.config.load.ConfigError: the rig or character is invalid.
         SetupError: the recording cannot be read or contains no tick.
     """
+    if joints not in (None, "recorded", "emulated"):
+        raise SetupError(f"joints {joints}: unknown; choose recorded or emulated")
     changed = rig is not None or character is not None
-    fed = _joints(joints, changed)
+    fed: Joints = "emulated" if joints == "emulated" or (joints is None and changed) else "recorded"
     with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
         with_rig = _rig(recording, rig, character, Path(folder))
         # The scene is not needed: its percepts are in the recording.
@@ -129,10 +131,24 @@ class _Resimulator:
         first = next(moments, None)
         if first is None:
             raise SetupError(f"{recording.path} contains no tick: nothing can be run again")
-        self._see_joints(first.tick.guard_result.joints)
+        names, recorded = self._made.robot.body.names, first.tick.guard_result.joints
+        if names != recorded:
+            apart = (
+                f"the rig has the joints {', '.join(names)}, the recording {', '.join(recorded)}"
+            )
+            if self._body is not None:
+                raise SetupError(f"{apart}: let the servos be emulated")
+            self._notes.append(apart)
         if recording.note:
             self._notes.append(recording.note)
-        began_s = self._start(first)
+        began_s = first.tick.t_s - first.dt_s
+        starts = [one.t_s for one in first.before if isinstance(one, MeasuredJoints)]
+        if not starts:
+            self._notes.append("the start of the run is not in the recording: it begins a little")
+        self._made.clock.sleep_until(starts[0] if starts else began_s)
+        if self._body is not None:
+            self._body.play(first)
+        self._made.robot.start(self._made.clock)
         ended = self._run(chain((first,), moments))
         end = recording.end
         if ended is None and end.ran_s is not None:
@@ -146,32 +162,6 @@ class _Resimulator:
         now = self._made.sent_digest()
         same = now == end.tx_sha256 if end.tx_sha256 else None
         return self._compared.result(self._joints, same, tuple(self._notes))
-
-    def _see_joints(self, recorded: tuple[str, ...]) -> None:
-        """Check that the recorded joints are the rig's own; note differences.
-
-        Raises:
-            SetupError: the rig has other joints, and the recorded ones are required.
-        """
-        names = self._made.robot.body.names
-        if names == recorded:
-            return
-        apart = f"the rig has the joints {', '.join(names)}, the recording {', '.join(recorded)}"
-        if self._body is not None:
-            raise SetupError(f"{apart}: let the servos be emulated")
-        self._notes.append(apart)
-
-    def _start(self, first: TickRecord) -> float:
-        """Start like the recorded run; return the start time."""
-        began_s = first.tick.t_s - first.dt_s
-        starts = [one.t_s for one in first.before if isinstance(one, MeasuredJoints)]
-        if not starts:
-            self._notes.append("the start of the run is not in the recording: it begins a little")
-        self._made.clock.sleep_until(starts[0] if starts else began_s)
-        if self._body is not None:
-            self._body.play(first)
-        self._made.robot.start(self._made.clock)
-        return began_s
 
     def _run(self, moments: Iterator[TickRecord]) -> str | None:
         """Run all ticks; return the reason of an early end."""
@@ -285,16 +275,6 @@ def _short(was: Tick, now: Tick, name: str) -> str:
     return f"{joint} {new:.6f} rad, was {old:.6f}"
 
 
-def _joints(joints: str | None, changed: bool) -> Joints:
-    """Choose the source of the joints' angles."""
-    match joints:
-        case None:
-            return "emulated" if changed else "recorded"
-        case "recorded" | "emulated":
-            return "recorded" if joints == "recorded" else "emulated"
-    raise SetupError(f"joints {joints}: unknown; choose recorded or emulated")
-
-
 def _rig(
     recording: RunRecording, rig: Rig | str | None, character: str | None, folder: Path
 ) -> Rig:
@@ -306,7 +286,9 @@ def _rig(
     base = rig if rig is not None else _read(recording, whole)
     found = base
     if character is not None:
-        found = load(_character(character), Rig, defaults=(whole,))
+        by_path = "/" in character or character.endswith((".yaml", ".yml"))
+        file = Path(character) if by_path else shipped("characters", character)
+        found = load(file, Rig, defaults=(whole,))
     if rig is None and recording.info.gestures_yaml:
         # The files of gestures may have changed since, too.
         kept = _write(recording.info.gestures_yaml, folder / "gestures.yaml")
@@ -338,10 +320,3 @@ def _read(recording: RunRecording, whole: Path) -> Rig:
 def _write(text: str, file: Path) -> Path:
     file.write_text(text, encoding="utf-8")
     return file
-
-
-def _character(name_or_path: str) -> Path:
-    """Find a character like gazerig.config.schema.load_rig."""
-    if "/" in name_or_path or name_or_path.endswith((".yaml", ".yml")):
-        return Path(name_or_path)
-    return shipped("characters", name_or_path)

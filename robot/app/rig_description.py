@@ -9,9 +9,8 @@ from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.description.build import RigShape, describe
 from gazerig.robot.description.clearance import collisions
 from gazerig.robot.description.links import Description
-from gazerig.robot.description.mesh_reader import MeshUnusable, read_mesh
-from gazerig.robot.description.own_meshes import OwnMesh, unknown_links
-from gazerig.robot.model.forbidden_range import CollisionParams
+from gazerig.robot.description.own_meshes import MeshUnusable, OwnMesh, read_mesh, unknown_links
+from gazerig.robot.model.guard_params import CollisionParams
 
 
 def description_of(rig: Rig, *, looks: bool = True) -> Description:

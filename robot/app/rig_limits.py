@@ -8,8 +8,7 @@ from gazerig.gaze.gesture.animation import AnimationTables
 from gazerig.gaze.gesture.level import LevelParams, LevelRange
 from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.gaze.types import Angles2, Vec3
-from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.kinematics import LIDS, NECK, LidEnds
 from gazerig.robot.model.types import JointAngles, further, in_order
 

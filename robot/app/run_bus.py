@@ -1,19 +1,194 @@
-"""The bus of one run: real ports, emulated servos (on a pseudo-terminal or here), or ideal ones."""
+"""The bus of one run: real ports, emulated servos (on a pseudo-terminal or here), or ideal ones.
+
+The emulated servos of a rig are built into its joints by its YAML.
+"""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from math import pi, radians
+from typing import NamedTuple
 
-from gazerig.config.rig import Rig
+from gazerig.config.rig import BusConfig, Rig
+from gazerig.drivers.bus.servo_models import HOBBY_KINDS
+from gazerig.drivers.camera.double_buffer import PoseBuffer
+from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.drivers.serial.list_ports import check_owner, serial_ports
-from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
-from gazerig.robot.app.emulation import emulated_lines, ideal_bus, place_of
+from gazerig.drivers.types import ServoBus
+from gazerig.robot.app.bus_wiring import (
+    bus_names,
+    guarded_rig_bus,
+    joints_on,
+    ports_of,
+    rig_bus,
+    rig_setups,
+)
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_parts import RunBus, TrueSteps
+from gazerig.robot.description.mass import HEAD_LOAD_KG_M2
 from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.coupling_params import pair_setups, pairs_of
+from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.devices import (
+    DynamixelLine,
+    Emulated,
+    FeetechLine,
+    MaestroLine,
+    Pca9685Line,
+    build,
+    plugin_line,
+)
+from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.ideal.bus import IdealBus
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+
+TrueSteps = Callable[[], Mapping[str, float]]
+"""Function that returns the present true positions of the servos in steps, by joint."""
+
+
+class RunBus(NamedTuple):
+    """The bus of the rig.
+
+    true_steps: true positions of the servos, None if unknown in this process
+    digest: returns the SHA-256 of all bytes sent, None if they are not counted
+    close: ends the processes started for it
+    fault: executes a fault command of the emulated servos, None for real or ideal ones
+    """
+
+    bus: ServoBus
+    true_steps: TrueSteps | None = None
+    digest: Callable[[], str | None] = lambda: None
+    close: Callable[[], None] = lambda: None
+    fault: Callable[[str], str] | None = None
+
+
+class Sight(NamedTuple):
+    """Placement of the camera, history of the head's pose, and its further receivers."""
+
+    mount: CameraMount
+    poses: PoseHistory
+    turns: PoseBuffer | None
+
+
+_CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
+"""Start angles of emulated joints, a little crooked, like those of a head moved by hand."""
+
+STOP_BEYOND_DEG = 4.0
+"""Distance of an emulated joint's mechanical stops beyond its configured range."""
+
+
+_NECK_SERVO_NM = 1.0
+"""Torque of a hobby servo of a head: standard size, 10 kg cm; eyes and lids have small ones."""
+
+
+def emulated_lines(rig: Rig) -> dict[str, Emulated]:
+    """Return the emulated device of each bus, by the bus's name; servos in the order of joints."""
+    return {name: _line(rig, name) for name in bus_names(rig)}
+
+
+def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
+    """Return all servos of a rig without bytes, at the start angles of the emulated ones."""
+    measured = [rig.joints[name].facts.measured for name in rig.names]
+    return IdealBus(rig_setups(rig), [_start(rig, name) for name in rig.names], measured, now_s)
+
+
+def emulated_servo(rig: Rig, name: str) -> ServoSpec:
+    """Return the smart servo of one joint."""
+    joint = rig.joints[name]
+    start, (low, high) = _start(rig, name), _stops(rig, name)
+    steps_per_rad = joint.facts.steps_per_turn / (2.0 * pi)
+    load = HEAD_LOAD_KG_M2.get(name, 0.0) * (steps_per_rad / joint.made().steepest) ** 2
+    physics = Physics(load_kg_m2=load, stop_low_steps=low, stop_high_steps=high)
+    return ServoSpec(joint.id, joint.model, start, physics=physics)
+
+
+def place_of(rig: Rig, joint: str) -> int:
+    """Return the index of a joint's servo in the true positions of its emulated device."""
+    bus, servo_id = rig.joints[joint].bus, rig.joints[joint].id
+    # A board lists all its channels, a chain only its servos.
+    return servo_id if rig.bus_of(joint).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
+
+
+def _line(rig: Rig, name: str) -> Emulated:
+    config, joints = rig.bus_named(name), joints_on(rig, name)
+    if config.kind in CHAINS:
+        specs = tuple(emulated_servo(rig, joint) for joint in joints)
+        return CHAINS[config.kind](specs, config.baud)
+    if config.kind in BOARDS:
+        return BOARDS[config.kind](config, tuple(_hobby(rig, one) for one in joints))
+    servos = tuple(
+        EmulatedJoint(
+            rig.joints[name].id, rig.joints[name].model, _start(rig, name), *_stops(rig, name)
+        )
+        for name in joints
+    )
+    return plugin_line(config.kind, config.section, servos)
+
+
+CHAINS: dict[str, type[DynamixelLine] | type[FeetechLine]] = {
+    "dynamixel": DynamixelLine,
+    "feetech": FeetechLine,
+}
+"""Emulated smart servos by the kind of bus."""
+
+BOARDS: dict[str, Callable[[BusConfig, tuple[HobbySpec, ...]], Emulated]] = {
+    "maestro": lambda bus, servos: MaestroLine(
+        bus.maestro.channels, bus.maestro.device, bus.maestro.crc, servos
+    ),
+    "pca9685": lambda bus, servos: Pca9685Line(
+        bus.pca9685.addresses, bus.pca9685.oscillator_hz, servos
+    ),
+}
+"""Emulated boards with their hobby servos by the kind of bus."""
+
+
+def _hobby(rig: Rig, name: str) -> HobbySpec:
+    joint = rig.joints[name]
+    low, high = _stops(rig, name)
+    facts, spec = joint.facts, HobbySpec(joint.id)
+    if joint.servo_speed_deg_s is not None:
+        spec = spec._replace(speed_steps_s=joint.servo_speed_deg_s * facts.steps_per_turn / 360.0)
+    if "neck" in name:
+        spec = spec._replace(stall_torque_nm=_NECK_SERVO_NM)
+    # The board's own range of the channel is as wide as that of such servos.
+    return spec._replace(
+        start_steps=_start(rig, name),
+        stop_low_steps=low,
+        stop_high_steps=high,
+        min_steps=facts.lowest,
+        max_steps=facts.highest,
+    )
+
+
+def crooked_rad(rig: Rig) -> dict[str, float]:
+    """Return the start angles of a rig's emulated joints."""
+    crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
+    for first, second, _ in pairs_of(rig.couplings):
+        # Push rods have no angles far outside the range.
+        for name in (first, second):
+            limit = rig.joints[name].limit()
+            crooked[name] = min(max(crooked[name], limit.low_rad), limit.high_rad)
+    return crooked
+
+
+def _start(rig: Rig, name: str) -> int:
+    crooked = crooked_rad(rig)
+    for first, second, coupling in pairs_of(rig.couplings):
+        crooked[first], crooked[second] = coupling.servo_rad((crooked[first], crooked[second]))
+    return round(rig.joints[name].steps(crooked[name]))
+
+
+def _stops(rig: Rig, name: str) -> tuple[float, float]:
+    """Return the first and last step of the servo that its mechanics allow."""
+    joint = rig.joints[name]
+    for pair in pairs_of(rig.couplings):
+        if name in pair[:2]:
+            own = pair_setups(pair, rig.joints, {})[name]
+            beyond = joint.made().steepest * radians(STOP_BEYOND_DEG)
+            return own.min_steps - beyond, own.max_steps + beyond
+    ends = (joint.min_deg - STOP_BEYOND_DEG, joint.max_deg + STOP_BEYOND_DEG)
+    low, high = sorted(joint.steps(radians(end)) for end in ends)
+    return low, high
 
 
 def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:

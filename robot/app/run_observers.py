@@ -81,7 +81,7 @@ class RunObservers:
         steer: SteeringButtons | None = None,
         browse: Callable[[str], object] | None = None,
     ) -> None:
-        self._steer, self._browse, self._lent = steer, browse, False
+        self._steer, self._lent = steer, False
         self._made, self._fast, self._say = made, options.fast, say
         self._timing = LoopTiming(made.loop.rate_hz)
         self._emulated = options.mock and steer is None
@@ -109,7 +109,12 @@ class RunObservers:
         self._page = self._made_page(address) if address is not None else None
         # Simulated time runs faster than a page or a line can show.
         live = not options.fast
-        self._publisher = self._made_publisher(self._page) if live and self._page else None
+        self._publisher = None
+        if live and self._page:
+            feed = ParamFeed(self._page.send, tuning) if tuning is not None else None
+            self._publisher = Publisher(
+                self._page, self._live_rig, self._run_state, feed, say, browse
+            )
         health = made.robot.body.bus.health
         self._status = (
             StatusLine(status, health, self._timing.figures)
@@ -140,11 +145,6 @@ class RunObservers:
         on_picture = camera.take if isinstance(camera, BorrowedCamera) else None
         return PageProcess(*address, page_requests, on_picture)
 
-    def _made_publisher(self, page: PageProcess) -> Publisher:
-        tuning = self._tuning
-        feed = ParamFeed(page.send, tuning) if tuning is not None else None
-        return Publisher(page, self._live_rig, self._run_state, feed, self._say, self._browse)
-
     def _live_rig(self) -> LiveRig:
         made = self._made
         picture = ScenePicture(made.scene) if made.scene is not None else None
@@ -160,8 +160,15 @@ class RunObservers:
         start_s = scene_start_s(robot.camera)
         if not start_s and self._made.room is not None:
             start_s = self._made.room.start_s()
+        in_force: tuple[str, str, str]
+        if self._steer is not None:
+            in_force = self._steer.shown(), "", ""
+        else:
+            menus = robot.menus()
+            character = self._tuning.character_name if self._tuning is not None else ""
+            in_force = menus["behaviour"][0], menus["conversation"][0], character
         return RunState(
-            errors, *self._in_force(), robot.perception.residual(), start_s,
+            errors, *in_force, robot.perception.residual(), start_s,
             [other.seen() for other in self._made.others],
         )  # fmt: skip
 
@@ -273,14 +280,6 @@ class RunObservers:
         with self._spared("the recording"):
             if self._recorder is not None:
                 self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
-
-    def _in_force(self) -> tuple[str, str, str]:
-        """Return the present behaviour, mode of conversation and character."""
-        if self._steer is not None:
-            return self._steer.shown(), "", ""
-        menus = self._made.robot.menus()
-        character = self._tuning.character_name if self._tuning is not None else ""
-        return menus["behaviour"][0], menus["conversation"][0], character
 
     def _show_depth(self, on: bool) -> None:
         if self._publisher is not None:

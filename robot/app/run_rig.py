@@ -114,6 +114,9 @@ def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
 
 def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:
     """Return the header of a run's recording."""
+    eyes = options.looks_through or f"scene {options.scene}"
+    if options.looks_through is None and options.world is not None:
+        eyes = f"world {options.world_name}{', no pictures' if options.no_pictures else ''}"
     return RunInfo(
         rig=options.rig,
         profile=rig.profile,
@@ -125,7 +128,7 @@ def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> R
         rate_hz=rig.loop.rate_hz,
         started_utc=datetime.now(UTC).isoformat(),
         scene=options.scene or options.world_name,
-        eyes=options.looks_through or _surroundings(options),
+        eyes=eyes,
         mock=options.mock,
         fast=options.fast,
         bus=options.bus or "emulated",
@@ -133,9 +136,3 @@ def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> R
         versions=versions(),
         stands=stands,
     )
-
-
-def _surroundings(options: RunOptions) -> str:
-    if options.world is None:
-        return f"scene {options.scene}"
-    return f"world {options.world_name}{', no pictures' if options.no_pictures else ''}"

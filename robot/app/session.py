@@ -1,4 +1,4 @@
-"""Execution of one run of the command line, from start to torque off."""
+"""Execution of one run of the command line, from start to torque off, and its figures."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -9,6 +9,7 @@ import numpy as np
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process.bounded_call import OverdueReport
+from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import (
@@ -19,7 +20,6 @@ from gazerig.robot.app.assemble import (
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.app.run_figures import SceneScore, run_figures
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.run_rig import run_info, run_rig
 from gazerig.robot.app.surroundings import RunRoom
@@ -31,9 +31,63 @@ from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.control.real_time import SWITCH_INTERVAL
 from gazerig.robot.model.clock import RealClock
+from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
+
+
+class SceneScore(NamedTuple):
+    """Score of the responses to a scene's events, by the gaze and by the action planner."""
+
+    behaviours: BehaviourScore
+    planner: PlannerScore
+
+    @classmethod
+    def of(cls, scene: Scene) -> "SceneScore":
+        """Return the score of a scene before its first tick."""
+        events = scene.events()
+        return cls(BehaviourScore(events, scene.round_s), PlannerScore(events, scene.round_s))
+
+
+def run_figures(
+    made: Assembly,
+    summary: Summary | None,
+    score: SceneScore | None,
+    count: LoopCount,
+    wall_s: float,
+    faults: JointFaults,
+) -> dict[str, object]:
+    """Join the figures of the ticks (if summarised), the loop, the frames and the bus."""
+    robot = made.robot
+    health = robot.body.bus.health()
+    bus: dict[str, object] = {
+        "tx_bytes": health.tx_bytes,
+        "rx_bytes": health.rx_bytes,
+        "errors": {kind: n for kind, n in sorted(health.errors.items()) if n},
+    }
+    digest = made.sent_digest()
+    if digest is not None:
+        bus["tx_sha256"] = digest
+    ticks = summary.figures() if summary is not None else {}
+    if score is not None and (behaviours := score.behaviours.figures()):
+        ticks["behaviours"] = behaviours
+    if score is not None and (planner := score.planner.figures()):
+        ticks["planner"] = planner
+    seconds = {"seconds": ticks.pop("seconds")} if ticks else {}
+    return {
+        **seconds,
+        "wall_seconds": round(wall_s, 3),
+        "ticks": count.ticks,
+        "overruns": count.overruns,
+        "faces_seen": robot.perception.frames_with_face,
+        "pictures": robot.perception.frames,
+        "head_turn_residual": robot.perception.residual()._asdict(),
+        **ticks,
+        "joint_faults": faults.figures(),
+        "bus": bus,
+        "stopped_by": count.stopped_by,
+    }
 
 
 SECONDS = "seconds"
@@ -253,14 +307,21 @@ class Session:
 
     def _unwritten_heatmap(self) -> Path | None:
         """Write the heat map if requested; return its file if that failed."""
-        out = self._options.heatmap
-        if self._face_gaze is None or out is None:
+        options, face_gaze = self._options, self._face_gaze
+        if face_gaze is None or (out := options.heatmap) is None:
             return None
+        if not face_gaze.points_face_m:
+            self._say(f"no heat map in {out}: no face was looked at")
+            return None
+        from gazerig.robot.analysis.heatmap import heatmap  # with a face detector
+
+        points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
         try:
-            _draw_heatmap(self._face_gaze, self._options, out, self._say)
+            heatmap(points, seconds, out, options.heatmap_face, options.force)
         except SetupError as error:  # the figures of the run are still available
             self._say(str(error))
             return out
+        self._say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
         return None
 
 
@@ -269,20 +330,6 @@ def _longest_s(made: Assembly, options: RunOptions) -> float | None:
     if options.seconds is None and options.fast and made.scene is not None:
         return made.scene.round_s + 1.0  # and the end of the round
     return options.seconds
-
-
-def _draw_heatmap(
-    face_gaze: GazeOnFace, options: RunOptions, out: Path, say: Callable[[str], None]
-) -> None:
-    """Write the heat map, or report why there is none."""
-    if not face_gaze.points_face_m:
-        say(f"no heat map in {out}: no face was looked at")
-        return
-    from gazerig.robot.analysis.heatmap import heatmap  # with a face detector
-
-    points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
-    heatmap(points, seconds, out, options.heatmap_face, options.force)
-    say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")
 
 
 def shut_down(

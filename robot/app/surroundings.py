@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from gazerig.drivers.types import Camera
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.app.program_parts import ProgramParts
-    from gazerig.robot.app.run_parts import RunBus, Sight
+    from gazerig.robot.app.run_bus import RunBus, Sight
     from gazerig.robot.control.tick import Tick
     from gazerig.robot.description.world_shapes import WorldShapes
     from gazerig.robot.model.clock import Clock

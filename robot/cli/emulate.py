@@ -4,15 +4,13 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import NamedTuple
 
 import typer
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli import emulate_options as options
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import clear_errors
@@ -74,55 +72,33 @@ def emulate(
         if servos is not None:
             devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, options.DEFAULT_BAUD)}
         elif maestro is not None:
-            devices = {"": _board(maestro, device, crc)}
+            if maestro not in CHANNELS:
+                sizes = ", ".join(map(str, CHANNELS))
+                raise SetupError(f"--maestro {maestro}: a board has {sizes} channels")
+            number = options.DEFAULT_DEVICE if device is None else device
+            devices = {"": MaestroLine(maestro, number, crc)}
         elif pca9685 is not None:
             devices = {"": _boards(pca9685)}
         else:
             devices = _of_rig(rig or "", firmware)
-        line = LineOptions(baud, any_baud, wire_time, turnaround_us, link)
-        served = ServerSettings(_chosen(_buses(devices, line), case or []), until_eof)
+        several = len(devices) > 1
+        if baud is not None and several:
+            raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
+        buses = [
+            BusSettings(
+                _at(device, baud, any_baud),
+                name if several else None,
+                wire_time,
+                turnaround_us,
+                None if link is None else f"{link}-{name}" if name else str(link),
+            )
+            for name, device in devices.items()
+        ]
+        served = ServerSettings(_chosen(buses, case or []), until_eof)
         try:
             run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
         except ValueError as error:
             raise SetupError(str(error)) from None
-
-
-class LineOptions(NamedTuple):
-    """The given options for opening a line and for its behaviour."""
-
-    baud: int | None
-    any_baud: bool
-    wire_time: bool
-    turnaround_us: float
-    link: Path | None
-
-
-def _buses(devices: Mapping[str, Emulated], line: LineOptions) -> list[BusSettings]:
-    """Return every bus with its terminal's settings.
-
-    Raises:
-        SetupError: one baud rate is given for several buses, or the servos do not support it.
-    """
-    several = len(devices) > 1
-    if line.baud is not None and several:
-        raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
-    return [
-        BusSettings(
-            _at(device, line.baud, line.any_baud),
-            name if several else None,
-            line.wire_time,
-            line.turnaround_us,
-            _link(line.link, name),
-        )
-        for name, device in devices.items()
-    ]
-
-
-def _board(channels: int, device: int | None, crc: bool) -> MaestroLine:
-    if channels not in CHANNELS:
-        sizes = ", ".join(map(str, CHANNELS))
-        raise SetupError(f"--maestro {channels}: a board has {sizes} channels")
-    return MaestroLine(channels, options.DEFAULT_DEVICE if device is None else device, crc)
 
 
 def _boards(text: str) -> Pca9685Line:
@@ -136,15 +112,12 @@ def _boards(text: str) -> Pca9685Line:
 
 def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
     """Return what is on every bus of a rig by the bus's name, "" for the only one."""
-    lines = {bus: _aged(one, firmware) for bus, one in emulated_lines(load_rig(name)).items()}
+    lines = emulated_lines(load_rig(name))
+    for bus, line in lines.items():
+        if firmware is not None and not isinstance(line, MaestroLine | Pca9685Line | PluginLine):
+            servos = tuple(servo._replace(firmware=firmware) for servo in line.servos)
+            lines[bus] = replace(line, servos=servos)
     return lines if len(lines) > 1 else dict(zip(("",), lines.values(), strict=True))
-
-
-def _aged(line: Emulated, firmware: int | None) -> Emulated:
-    """Return all servos of a line one firmware; None: that which they have."""
-    if firmware is None or isinstance(line, MaestroLine | Pca9685Line | PluginLine):
-        return line
-    return replace(line, servos=tuple(s._replace(firmware=firmware) for s in line.servos))
 
 
 def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
@@ -162,13 +135,6 @@ def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
     if baud is None and not any_baud:
         return device
     return replace(device, baud=None if any_baud else baud)
-
-
-def _link(link: Path | None, bus: str) -> str | None:
-    """Return the link to a bus, with its name if a rig has several."""
-    if link is None:
-        return None
-    return f"{link}-{bus}" if bus else str(link)
 
 
 def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:

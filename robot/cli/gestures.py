@@ -31,8 +31,7 @@ def import_gesture(
 ) -> None:
     """Make a gesture of key frames from an animation program, as YAML that rigs take."""
     with clear_errors(rig):
-        from gazerig.robot.app.gesture_file import gesture_text, write_gesture
-        from gazerig.robot.app.key_frame_table import read_table
+        from gazerig.robot.app.gesture_file import gesture_text, read_table, write_gesture
 
         loaded = load_rig(rig)
         text = gesture_text(loaded, read_table(table, fps), f"from {table.name}")

@@ -1,15 +1,95 @@
-"""The command ``gazerig``: what people type, and what they read on the terminal."""
+"""The command ``gazerig``: what people type, and what they read on the terminal.
+
+Only the module of the typed command is imported. Without arguments, next steps are shown.
+"""
 
 import logging
 import sys
+from collections import UserDict
+from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 import gazerig
-from gazerig.robot.cli.command_group import CommandGroup
-from gazerig.robot.cli.terminal import DEBUG_LOGGER, run_app
+from gazerig.drivers.plugins import COMMAND, SHIPPED, find
+from gazerig.robot.cli.command_list import (
+    CommandEntry,
+    in_order,
+    package_commands,
+    shipped_commands,
+)
+from gazerig.robot.cli.examples import EXAMPLES, add_examples
+from gazerig.robot.cli.terminal import DEBUG_LOGGER, clear_errors, run_app
+
+if TYPE_CHECKING:
+    from gazerig.drivers.serial.list_ports import SerialPort
+
+
+class CommandsByName(UserDict[str, Any]):
+    """Commands by name, each imported when it is taken out.
+
+    data: those imported until now; the others have a name, summary and panel only
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._imported: set[str] = set()
+        self.entries: dict[str, CommandEntry] = {}
+        self._add(shipped_commands())
+
+    def add_packages(self) -> None:
+        """Add the commands of installed packages; names that are taken stay as they are."""
+        self._add(package_commands())
+
+    def _add(self, entries: Mapping[str, CommandEntry]) -> None:
+        self.entries = {**entries, **self.entries}
+        for name, entry in entries.items():
+            listed = TyperCommand(name, help=entry.summary, rich_help_panel=entry.panel)
+            self.data.setdefault(name, listed)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a whole command; raise KeyError if there is none of this name."""
+        if name in self.data and name not in self._imported:
+            app = typer.Typer()
+            app.add_typer(import_module(self.entries[name].module).app)
+            add_examples(app, {**EXAMPLES, **self.entries[name].examples})
+            command: Any = typer.main.get_group(app).commands[name]
+            command.rich_help_panel = self.entries[name].panel
+            self.data[name] = command
+            self._imported.add(name)
+        return self.data[name]
+
+
+class CommandGroup(TyperGroup):
+    """Lists the commands panel by panel, and imports one to run it or show its help."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = self._every = CommandsByName()
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands, in the order of the help."""
+        self._every.add_packages()
+        return in_order(self._every.entries)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command as far as a list of all needs it, None if there is none of this name."""
+        if cmd_name not in self._every.data:
+            self._every.add_packages()
+        if cmd_name not in self._every.data and cmd_name in SHIPPED[COMMAND]:
+            with clear_errors():
+                find(COMMAND, cmd_name).load()  # its feature is missing: one line
+        return self._every.data.get(cmd_name)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name and the whole command that the arguments begin with, and the rest."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, self._every[name] if name is not None else command, rest
+
 
 app = typer.Typer(
     cls=CommandGroup,
@@ -40,7 +120,7 @@ def begin(
     """Makes an animatronic head look at people the way people look at each other."""
     if context.invoked_subcommand is None:
         from gazerig.drivers.serial.list_ports import serial_ports
-        from gazerig.robot.cli.welcome import next_steps
+        from gazerig.robot.cli.main import next_steps
         from gazerig.robot.remote.client import running
 
         print(next_steps(serial_ports(), rig_files(), bool(running())))
@@ -67,3 +147,61 @@ def _looks_like_a_rig(path: Path) -> bool:
         return b"joints:" in read_limited(path, 1_000_000)
     except OSError:
         return False
+
+
+_BEGIN = (
+    ("gazerig run --mock", "see a head look at a visitor in your browser; no hardware needed"),
+    ("gazerig report --scene face-to-face", "how human that gaze is, as one HTML file"),
+    ("gazerig new my.yaml", "a rig file of your own, from four questions"),
+)
+
+
+def next_steps(ports: "Iterable[SerialPort]", rigs: Iterable[Path], running: bool) -> str:
+    """Return what makes sense now, as lines.
+
+    ports: serial ports of this computer; rigs: rig files in this folder
+    running: a rig runs on this computer already
+    """
+    usb = [port for port in ports if port.usb]
+    own = next(iter(sorted(rigs)), None)
+    lines = ["gazerig makes an animatronic head look at people. What next?", ""]
+    if running:
+        lines += _block(
+            "A rig is running here:",
+            (
+                ("gazerig ctl get", "every parameter, and what is not saved yet"),
+                ("gazerig ctl set gaze.blink... VALUE", "change one; gazerig ctl save keeps it"),
+                ("gazerig stop", "torque off at once"),
+            ),
+        )
+    lines += _block("Without hardware:", _BEGIN)
+    if usb and own is None:
+        lines += _block(
+            f"A servo adapter is there ({usb[0].by_id or usb[0].device}):",
+            (
+                (f"gazerig scan --port {usb[0].device}", "which servos answer; changes nothing"),
+                ("gazerig new my.yaml", "a rig file of your own, from four questions"),
+            ),
+        )
+    elif own is not None:
+        lines += _block(
+            f"With your rig {own}:",
+            (
+                (f"gazerig check {own}", "is the file good?"),
+                (
+                    f"gazerig doctor {own}",
+                    "are port and servos as it says? every fault with a cure",
+                ),
+                (f"gazerig run {own} --oak", "go"),
+            ),
+        )
+    else:
+        lines += ["No USB serial adapter is plugged in; docs/start.md tells which fit.", ""]
+    lines.append("All commands: gazerig --help    one of them, with examples: gazerig run --help")
+    return "\n".join(lines)
+
+
+def _block(title: str, commands: Iterable[tuple[str, str]]) -> list[str]:
+    rows = tuple(commands)
+    width = max(len(command) for command, _ in rows)
+    return [title, *(f"  {command:{width}}  {what}" for command, what in rows), ""]

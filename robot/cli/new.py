@@ -74,7 +74,14 @@ def new(
         rig = NewRig(
             file.stem, chosen, joints_of(wanted), seen, distance, port or _plugged_in(chosen)
         )
-        _write(rig, file, force)
+        from gazerig.robot.cli.rig_check import checked_line
+
+        write_file(file, params_text(rig), force)
+        try:
+            say(checked_line(str(file)))
+        except ConfigError:  # a faulty one is not left there
+            file.unlink()
+            raise
         for line in next_steps(rig, str(file)):
             print(line)
 
@@ -163,18 +170,6 @@ def next_steps(rig: NewRig, file: str) -> Iterable[str]:
     yield from (f"  {command:{wide}}  {what}" for command, what in steps)
     if rig.camera == "oak" and find_spec("depthai") is None:
         yield "an OAK-D needs one more package: pip install 'gazerig[oak]'"
-
-
-def _write(rig: NewRig, file: Path, force: bool) -> None:
-    """Write a rig's file and check it as ``gazerig check`` does; a faulty one is not left there."""
-    from gazerig.robot.cli.rig_check import checked_line
-
-    write_file(file, params_text(rig), force)
-    try:
-        say(checked_line(str(file)))
-    except ConfigError:
-        file.unlink()
-        raise
 
 
 def _plugged_in(board: str) -> str:

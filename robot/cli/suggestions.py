@@ -52,21 +52,15 @@ def completed(text: str, given: Mapping[str, object] | None = None) -> str:
     known = given
 
     def whole(found: re.Match[str]) -> str:
-        named = (f" {shlex.quote(str(known['rig']))}", " --port ")
-        if text[found.end() :].startswith(named):
+        if text[found.end() :].startswith((f" {shlex.quote(str(known['rig']))}", " --port ")):
             return found[0]  # its message is complete
         if found["command"] == "reboot" and not found["words"]:
             return found[0]  # a description, not a command
-        return _command(found["command"], found["words"], known)
+        port, mock = known.get("port"), known.get("mock") is True
+        more = f" --port {shlex.quote(str(port))}" if isinstance(port, str) else ""
+        more += " --mock" if mock else ""
+        scans = found["command"] == "scan" and not mock
+        named = "" if scans else f" {shlex.quote(str(known['rig']))}"
+        return f"gazerig {found['command']}{named}{found['words']}{more}"
 
     return _SUGGESTED.sub(whole, text)
-
-
-def _command(command: str, text: str, given: Mapping[str, object]) -> str:
-    rig, port, mock = (given.get(name) for name in ("rig", "port", "mock"))
-    named = shlex.quote(str(rig))
-    more = f" --port {shlex.quote(str(port))}" if isinstance(port, str) else ""
-    more += " --mock" if mock is True else ""
-    if command == "scan" and mock is not True:
-        return f"gazerig scan{text}{more}"
-    return f"gazerig {command} {named}{text}{more}"

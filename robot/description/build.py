@@ -8,7 +8,7 @@ with their signs (robot/model/kinematics.py).
 
 from collections.abc import Mapping
 from itertools import combinations, product
-from math import copysign, radians
+from math import copysign, pi, radians
 from typing import NamedTuple
 
 from gazerig.gaze.angles import rotation
@@ -24,12 +24,33 @@ from gazerig.robot.description.links import (
     LinkJoint,
 )
 from gazerig.robot.description.own_meshes import OwnMesh, with_own_meshes
-from gazerig.robot.description.servo_limits import joint_torques_nm
-from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.coupling_params import CouplingParams, pairs_of
 from gazerig.robot.model.frames import OPTICAL, CameraParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
 from gazerig.robot.model.types import further
+
+
+def joint_torques_nm(
+    joints: Mapping[str, JointParams], couplings: Mapping[str, CouplingParams]
+) -> dict[str, float]:
+    """Return the highest torque at every joint, standing still, at its servos' rated voltage.
+
+    Of a pair that two servos move together each joint gets what both do for it alone.
+    """
+    own = {}
+    for name, joint in joints.items():
+        shaft_nm = joint.facts.stall_torque_nm * (joint.torque_limit or 1.0)
+        # Where the turns of the servo for one of the joint are the most.
+        own[name] = shaft_nm * (joint.made().steepest * 2.0 * pi / joint.facts.steps_per_turn)
+    found = dict(own)
+    for first, second, coupling in pairs_of(couplings):
+        if first in joints and second in joints:
+            rates = coupling.rates((0.0, 0.0))
+            for j, name in enumerate((first, second)):
+                found[name] = abs(rates[0][j]) * own[first] + abs(rates[1][j]) * own[second]
+    return found
+
 
 BASE, HEAD = "base_link", "head"
 CAMERA, OPTICAL_FRAME = "camera_link", "camera_optical_frame"
@@ -154,6 +175,12 @@ class _Builder:
         ahead, _, above = self._eyes_m
         rest = mass.joined(_in_head(carried))
         whole = max(mass.head_mass_kg(self._measures.interocular_m), 2.0 * rest.mass_kg)
+        # With this centre of its own mass the whole is centred on the pivot.
+        share = rest.mass_kg / (whole - rest.mass_kg)
+        cx, cy, cz = (
+            place + share * (place - off)
+            for place, off in zip(self._measures.pivot_m, rest.com_m, strict=True)
+        )
         still = [
             (side, self._meet_rad(side))
             for side in SIDES
@@ -164,7 +191,7 @@ class _Builder:
             neck,
             (x + ahead, y, z + above),
             self._measures,
-            (whole - rest.mass_kg, _counter(rest, whole, self._measures.pivot_m)),
+            (whole - rest.mass_kg, (cx, cy, cz)),
             further(self._rig.joints),
             still,
             self._looks,
@@ -180,7 +207,9 @@ class _Builder:
             elif both not in joints:
                 continue
             elif any(link.joint and link.joint.name == both for link in self._links):
-                name = self._free(f"{side}_eyes_{turn}")
+                name = f"{side}_eyes_{turn}"
+                while name in joints:
+                    name += "_"
                 joint = self._joint(name, _AXES[turn], both, Follows(both))
             else:
                 joint = self._joint(both, _AXES[turn])
@@ -189,12 +218,6 @@ class _Builder:
             self._links.append(Link(name, parent, place, joint=joint, inertia=ring))
             parent, place = name, (0.0, 0.0, 0.0)
         self._links.append(parts.eye(f"{side}_eye", parent, place, self._measures))
-
-    def _free(self, name: str) -> str:
-        """Return a name that no joint of the rig has."""
-        while name in self._rig.joints:
-            name += "_"
-        return name
 
     def _add_lid(self, name: str) -> None:
         """Add a lid whose edge meets the other lid's at the rig's shut angle."""
@@ -257,10 +280,3 @@ def _in_head(links: list[Link]) -> list[Inertia]:
             com = (x + px + cx, y + py + cy, z + pz + cz)
             found.append(link.inertia._replace(com_m=com))
     return found
-
-
-def _counter(rest: Inertia, whole_kg: float, at_m: Vec3) -> Vec3:
-    """Return the centre of the rest of a mass with which the whole is centred on a point."""
-    share = rest.mass_kg / (whole_kg - rest.mass_kg)
-    x, y, z = (place + share * (place - off) for place, off in zip(at_m, rest.com_m, strict=True))
-    return x, y, z

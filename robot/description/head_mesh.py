@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.cut import cut
 from gazerig.robot.description.face_features import brow as bow
 from gazerig.robot.description.face_features import lips
 from gazerig.robot.description.head_shape import HEAD, JAW_BOUNDS, JAW_HALF, MOUTH, eye_rim, surface
@@ -23,6 +22,7 @@ from gazerig.robot.description.paint import (
     spot,
     step,
 )
+from gazerig.robot.description.solid import cut
 
 SKIN: Colour = (247, 206, 178)
 LID: Colour = (243, 198, 170)

@@ -1,12 +1,17 @@
-"""A painted mesh as files that every program reads: Wavefront OBJ, its material and a PNG."""
+"""A painted mesh as files that every program reads: Wavefront OBJ, its material and a PNG.
 
+Numbers and angles are written as text files have them.
+"""
+
+from collections.abc import Iterable
 from functools import lru_cache
+from math import atan2, cos, hypot, sin
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
-from gazerig.gaze.types import Floats
+from gazerig.gaze.types import Floats, Mat3
 from gazerig.robot.description.mesh import Mesh
 from gazerig.robot.description.paint import Painted
 from gazerig.robot.description.texture import textured
@@ -100,3 +105,22 @@ def _once(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
 def _rows(line: str, values: np.ndarray) -> str:
     """Return a line for each row; all at once, which takes a third of the time of one by one."""
     return (line * len(values)) % tuple(values.ravel().tolist())
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return numbers with spaces between, as exact as a float is, none longer than needed."""
+    return " ".join(_number(float(value)) for value in values)
+
+
+def _number(value: float) -> str:
+    text = repr(value + 0.0)  # no -0.0
+    return text.removesuffix(".0")
+
+
+def roll_pitch_yaw(R: Mat3) -> tuple[float, float, float]:
+    """Return the angles of a rotation about fixed x, y and z axes, in this order (as URDF)."""
+    (a, b, c), (d, e, f), (g, _, _) = R
+    yaw, pitch = atan2(d, a), atan2(-g, hypot(a, d))
+    # From what is left once yaw is undone, so that it holds where pitch is a right angle too.
+    s, k = sin(yaw), cos(yaw)
+    return atan2(s * c - k * f, k * e - s * b), pitch, yaw

@@ -17,9 +17,8 @@ from gazerig.robot.description.links import (
     Visual,
     turn_about,
 )
-from gazerig.robot.description.mesh_files import mesh_files
-from gazerig.robot.description.numbers import numbers
-from gazerig.robot.model.quaternion import quaternion
+from gazerig.robot.description.mesh_files import mesh_files, numbers
+from gazerig.robot.model.frames import quaternion
 
 _LAYERS = {"body": "1", "lid": "2"}
 _MATERIALS = {

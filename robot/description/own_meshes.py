@@ -1,12 +1,20 @@
-"""Meshes of the user's own in place of what the program makes for a link."""
+"""Meshes of the user's own in place of what the program makes for a link.
+
+A file is STL, OBJ, PLY, OFF, GLB or glTF.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from math import radians
+from math import cos, radians
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from gazerig.gaze.angles import rotation
 from gazerig.robot.description.links import Description, Visual
+from gazerig.robot.description.mesh import Mesh
 from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.description.paint import Painted
 
@@ -54,3 +62,77 @@ def unknown_links(description: Description, named: Iterable[str]) -> dict[str, s
             guess = f"did you mean {near[0]}? " if near else ""
             found[name] = f"no link of that name; {guess}there is {', '.join(known)}"
     return found
+
+
+FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
+_Y_UP = (".glb", ".gltf")
+_MOST_BYTES, _MOST_FACES = 100_000_000, 150_000
+_EDGE_RAD = radians(35.0)
+"""A corner whose faces turn farther from each other's mean is sharp; others are smooth."""
+
+
+class MeshUnusable(ValueError):
+    """A file that cannot be shown; the message has the reason and a remedy."""
+
+
+def read_mesh(params: MeshParams) -> Painted:
+    """Return a mesh with its colours, in metres, z up.
+
+    Raises:
+        MeshUnusable: there is no such file, or it holds no mesh.
+    """
+    path = Path(params.file).expanduser()
+    if path.suffix.lower() not in FORMATS:
+        raise MeshUnusable(f"{path.name}: no {', '.join(FORMATS)} file; export it as one of these")
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise MeshUnusable(f"{path}: {error.strerror or error}; correct the path") from None
+    if size > _MOST_BYTES:
+        raise MeshUnusable(
+            f"{path}: {size / 1e6:.0f} MB, more than {_MOST_BYTES / 1e6:.0f}; reduce its triangles"
+        )
+    mesh = _loaded(path)
+    if not 0 < len(mesh.faces) <= _MOST_FACES:
+        cure = f"reduce them to {_MOST_FACES}" if len(mesh.faces) else "it needs a closed surface"
+        raise MeshUnusable(f"{path}: {len(mesh.faces)} triangles; {cure}")
+    if not np.isfinite(mesh.vertices).all():
+        raise MeshUnusable(f"{path}: points that are no numbers; export it again")
+    y_up = path.suffix.lower() in _Y_UP
+    # Every corner of every triangle becomes a point of its own, as edges need it.
+    look: Any = mesh.visual
+    if look.kind == "texture":
+        look = look.to_color()
+    faces = np.asarray(mesh.faces)
+    vertices = np.asarray(mesh.vertices, float)[faces] * params.metres_per_unit
+    smooth = np.asarray(mesh.vertex_normals, float)[faces]
+    flat = np.repeat(np.asarray(mesh.face_normals, float)[:, None], 3, axis=1)
+    near = (smooth * flat).sum(axis=2, keepdims=True) > cos(_EDGE_RAD)
+    normals = np.where(near, smooth, flat)
+    if look.kind is None:
+        colours = np.broadcast_to(np.array(params.colour, float), vertices.shape)
+    else:
+        colours = np.asarray(look.vertex_colors, float)[:, :3][faces]
+    if y_up:
+        turn = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
+        vertices, normals = vertices @ turn, normals @ turn
+    corners = np.arange(3 * len(faces), dtype=np.uint32).reshape(-1, 3)
+    return Painted(
+        Mesh(vertices.reshape(-1, 3), corners), colours.reshape(-1, 3), normals.reshape(-1, 3)
+    )
+
+
+def _loaded(path: Path) -> Any:
+    """Return all of a file as one mesh of trimesh.
+
+    Raises:
+        MeshUnusable: it cannot be read.
+    """
+    import trimesh  # takes a while to import, and few rigs need it
+
+    try:
+        scene: Any = trimesh.load_scene(path)
+        return scene.to_mesh()
+    except Exception as error:  # the readers of many formats raise what they like
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise MeshUnusable(f"{path}: cannot be read ({reason[:120]}); export it again") from None

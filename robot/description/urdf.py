@@ -15,12 +15,10 @@ from gazerig.robot.description.links import (
     ORIGIN,
     CollisionShape,
     Description,
-    Inertia,
     Link,
 )
 from gazerig.robot.description.mesh import ellipsoid
-from gazerig.robot.description.mesh_files import mesh_files, plain_obj
-from gazerig.robot.description.numbers import numbers, roll_pitch_yaw
+from gazerig.robot.description.mesh_files import mesh_files, numbers, plain_obj, roll_pitch_yaw
 
 _BALL = "ball_of_radius_1.obj"
 
@@ -51,7 +49,12 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
     for link in description.links if looks else description.without_looks().links:
         element = ET.SubElement(root, "link", name=link.name)
         if link.inertia is not None:
-            _add_inertia(element, link.inertia)
+            inertial = ET.SubElement(element, "inertial")
+            _place(inertial, link.inertia.com_m, IDENTITY)
+            ET.SubElement(inertial, "mass", value=numbers((link.inertia.mass_kg,)))
+            (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.inertia.tensor_kg_m2
+            moments = {"ixx": xx, "ixy": xy, "ixz": xz, "iyy": yy, "iyz": yz, "izz": zz}
+            ET.SubElement(inertial, "inertia", {key: numbers((m,)) for key, m in moments.items()})
         for visual in link.visuals:
             part = ET.SubElement(element, "visual", name=visual.name)
             _place(part, visual.p_m, visual.R)
@@ -77,15 +80,6 @@ def urdf(description: Description, folder: str = "meshes", *, looks: bool = True
 def _place(element: ET.Element, p_m: Vec3, R: Mat3) -> None:
     if p_m != ORIGIN or R != IDENTITY:
         ET.SubElement(element, "origin", xyz=numbers(p_m), rpy=numbers(roll_pitch_yaw(R)))
-
-
-def _add_inertia(link: ET.Element, inertia: Inertia) -> None:
-    element = ET.SubElement(link, "inertial")
-    _place(element, inertia.com_m, IDENTITY)
-    ET.SubElement(element, "mass", value=numbers((inertia.mass_kg,)))
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor_kg_m2
-    moments = {"ixx": xx, "ixy": xy, "ixz": xz, "iyy": yy, "iyz": yz, "izz": zz}
-    ET.SubElement(element, "inertia", {key: numbers((m,)) for key, m in moments.items()})
 
 
 def _pieces(shape: CollisionShape) -> Iterator[tuple[str, dict[str, str], Vec3]]:

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, Protocol
 from gazerig.gaze.types import Vec3
 from gazerig.robot.description.paint import Painted
 from gazerig.robot.description.texture import TexturedMesh
-from gazerig.robot.model.quaternion import Quaternion
+from gazerig.robot.model.frames import Quaternion
 
 WorldFinish = Literal["skin", "plastic", "cloth", "flat"]
 """How a surface answers light; what is flat is shown in its own colours."""

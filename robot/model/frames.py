@@ -2,13 +2,15 @@
 
 A frame shows the moment of its exposure. If the head's present pose were used to locate it,
 targets would be off by the head's motion since then. Therefore past poses are stored.
+
+Viewers and files get rotations as unit quaternions.
 """
 
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import degrees, inf, radians
+from math import copysign, degrees, inf, radians, sqrt
 from typing import Annotated, Literal
 
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
@@ -221,3 +223,28 @@ def fixed_mount(params: CameraParams, geometry: HeadGeometry) -> CameraParams:
     _, (x, y, z) = geometry.head_pose((0.0, 0.0, 0.0))
     dx, dy, dz = params.position_mm
     return replace(params, mount="base", position_mm=(x * 1e3 + dx, y * 1e3 + dy, z * 1e3 + dz))
+
+
+Quaternion = tuple[float, float, float, float]
+"""w, x, y, z."""
+
+
+def quaternion(R: Mat3) -> Quaternion:
+    """Return a rotation matrix as a unit quaternion with w >= 0."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    w, x, y, z = (
+        0.5 * sqrt(max(0.0, 1.0 + trace)) for trace in (a + e + i, a - e - i, e - a - i, i - a - e)
+    )
+    # The largest is exact; the others follow from sums and differences with it.
+    largest = max(w, x, y, z)
+    if largest == w:
+        found = (w, (h - f) / (4 * w), (c - g) / (4 * w), (d - b) / (4 * w))
+    elif largest == x:
+        found = ((h - f) / (4 * x), x, (b + d) / (4 * x), (c + g) / (4 * x))
+    elif largest == y:
+        found = ((c - g) / (4 * y), (b + d) / (4 * y), y, (f + h) / (4 * y))
+    else:
+        found = ((d - b) / (4 * z), (c + g) / (4 * z), (f + h) / (4 * z), z)
+    sign = copysign(1.0, found[0])
+    w, x, y, z = (sign * value for value in found)
+    return w, x, y, z

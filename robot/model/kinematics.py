@@ -9,15 +9,47 @@ yaw axis.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import asin, atan2, hypot, pi
+from math import asin, atan2, hypot, pi, sqrt
 from operator import itemgetter
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
-from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub
+from gazerig.gaze.angles import add, compose, dot, norm, rotate, rotate_back, rotation, scale, sub
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
-from gazerig.robot.model.capsule import Capsule
 from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_order
+
+
+class Capsule(NamedTuple):
+    """All points within ``radius_m`` of the line from ``start_m`` to ``end_m``, in one frame."""
+
+    start_m: Vec3
+    end_m: Vec3
+    radius_m: float
+
+    def holds(self, p_m: Vec3) -> bool:
+        """Return whether a point is inside."""
+        axis = sub(self.end_m, self.start_m)
+        along = dot(sub(p_m, self.start_m), axis) / max(dot(axis, axis), 1e-12)
+        nearest = add(self.start_m, scale(axis, min(1.0, max(0.0, along))))
+        return norm(sub(p_m, nearest)) < self.radius_m
+
+    def hit_m(self, p_m: Vec3, direction: Vec3) -> float | None:
+        """Return the distance from an outside point along a unit vector, None without a hit.
+
+        The distance is that to the sphere about the point of the line nearest to the ray.
+        """
+        axis, off = sub(self.end_m, self.start_m), sub(self.start_m, p_m)
+        aa, ad = dot(axis, axis), dot(axis, direction)
+        denominator = aa - ad * ad
+        share = 0.0
+        if denominator > 1e-12:
+            share = (ad * dot(off, direction) - dot(off, axis)) / denominator
+        middle = add(off, scale(axis, min(1.0, max(0.0, share))))
+        along = dot(middle, direction)
+        off2 = dot(middle, middle) - along * along
+        if along <= 0.0 or off2 >= self.radius_m**2:
+            return None
+        return along - sqrt(self.radius_m**2 - off2)
 
 
 @dataclass(frozen=True)

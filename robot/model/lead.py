@@ -155,13 +155,23 @@ class Lead:
 
     def chosen(self, percept: Percept | None, t_s: float) -> Target | None:
         """Return the client's target, None without one."""
-        if self.person is not None:
-            return self._person(percept)
-        if self.point is None:
+        if self.person is None:
+            if self.point is None:
+                return None
+            return Target(
+                self.point, (0.0, 0.0, 0.0), t_s, ORDERED, -1, 1.0, True, None,
+                self._shifts, "a user chose this point",
+            )  # fmt: skip
+        if percept is not None:
+            for face in percept.faces:
+                if face.id == self.person:
+                    self._face, self._seen_s = face, percept.captured_s
+        known = self._face  # at the last observed position
+        if known is None:
             return None
         return Target(
-            self.point, (0.0, 0.0, 0.0), t_s, ORDERED, -1, 1.0, True, None,
-            self._shifts, "a user chose this point",
+            known.p_world_m, known.v_world_m_s, self._seen_s, "face", known.id, 1.0, True, None,
+            self._shifts, f"face {known.id}: a user chose it",
         )  # fmt: skip
 
     def measure(
@@ -187,20 +197,6 @@ class Lead:
         arrived = self.state.arrived or error <= ARRIVED_RAD
         self.state = self.state._replace(arrived=arrived, error_rad=error)
         return self.state
-
-    def _person(self, percept: Percept | None) -> Target | None:
-        """Return the followed person at the last observed position."""
-        if percept is not None:
-            for face in percept.faces:
-                if face.id == self.person:
-                    self._face, self._seen_s = face, percept.captured_s
-        known = self._face
-        if known is None:
-            return None
-        return Target(
-            known.p_world_m, known.v_world_m_s, self._seen_s, "face", known.id, 1.0, True, None,
-            self._shifts, f"face {known.id}: a user chose it",
-        )  # fmt: skip
 
     def _start(self, command: Leading, t_s: float) -> None:
         self._who, self._stay, self._renewed_s = command.who, command.stay, t_s

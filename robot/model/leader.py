@@ -152,14 +152,9 @@ def sentence(leader: Leader, t_s: float) -> str:
             return "it moves to its parking pose, then the torque goes off"
         case "recording":
             return "a recording is shown: nothing here moves a rig"
-    return said + _for(leader.since_s, t_s)
-
-
-def _for(since_s: float | None, t_s: float) -> str:
-    """Return the duration as text, "" if it is short or unknown."""
-    lasted_s = t_s - since_s if since_s is not None else 0.0
+    lasted_s = t_s - leader.since_s if leader.since_s is not None else 0.0
     if lasted_s < _WORTH_TELLING_S:
-        return ""
+        return said
     if lasted_s < 2.0 * _MINUTE_S:
-        return f", for {lasted_s:.0f} s"
-    return f", for {lasted_s / _MINUTE_S:.0f} min"
+        return f"{said}, for {lasted_s:.0f} s"
+    return f"{said}, for {lasted_s / _MINUTE_S:.0f} min"

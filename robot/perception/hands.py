@@ -168,7 +168,18 @@ class Hands:
         found = [self._label(thing, faces, p_camera, t_s, free) for thing in things]
         for palm in free:
             self._hold(palm, found, p_camera, t_s)
-        return [*found, *self._at_rest(found, p_camera, t_s)] if self._resting else found
+        if not self._resting:
+            return found
+        # Hands at rest that show no motion; the detector would recognise its own hands again.
+        marks = {thing.mark for thing in found}
+        moving = [thing for thing in found if thing.mark in self._moving]
+        self._resting = {
+            mark: one
+            for mark, one in self._resting.items()
+            if mark in marks
+            or (t_s <= one.until_s and not _moves_again(one.hand, moving, p_camera))
+        }
+        return found + [one.hand for mark, one in self._resting.items() if mark not in marks]
 
     @property
     def has_resting(self) -> bool:
@@ -214,21 +225,6 @@ class Hands:
             mark = self._palm_mark
         hand = replace(palm, mark=mark, v_world_m_s=(0.0, 0.0, 0.0))
         self._resting[mark] = _RestingHand(hand, t_s + _PALM_S)
-
-    def _at_rest(
-        self, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
-    ) -> list[LocalisedDetection]:
-        """Return the hands at rest that show no motion."""
-        marks = {thing.mark for thing in found}
-        # The detector would recognise its own hands again.
-        moving = [thing for thing in found if thing.mark in self._moving]
-        self._resting = {
-            mark: one
-            for mark, one in self._resting.items()
-            if mark in marks
-            or (t_s <= one.until_s and not _moves_again(one.hand, moving, p_camera))
-        }
-        return [one.hand for mark, one in self._resting.items() if mark not in marks]
 
     def _label(
         self,

@@ -12,7 +12,7 @@ from math import cos, hypot, radians, sqrt
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, LocatedFrame
+from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
 from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -26,18 +26,24 @@ from gazerig.robot.perception.egomotion_residual import (
     turning_rad_s,
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
-from gazerig.robot.perception.gaze_at_head import (
-    SeenEyes,
-    angle_off_head_rad,
-    looks_at_head,
-)
 from gazerig.robot.perception.gyro_fusion import GyroFusion
-from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
-from gazerig.robot.perception.hands import Hands, Known
+from gazerig.robot.perception.hand_ownership import (
+    OwnParts,
+    known_faces,
+    label_own_body,
+    without_own_motion,
+)
+from gazerig.robot.perception.hands import Hands
 from gazerig.robot.perception.kalman import Variances
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
-from gazerig.robot.perception.own_body import OwnParts, label_own_body
-from gazerig.robot.perception.track import UNNAMED, LocalisedDetection, Track, place_in_world
+from gazerig.robot.perception.track import (
+    UNNAMED,
+    SeenEyes,
+    Track,
+    angle_off_head_rad,
+    looks_at_head,
+    place_in_world,
+)
 from gazerig.robot.perception.tracker import Tracker
 
 # The head's turn at a capture is taken over this time before and after it.
@@ -119,7 +125,11 @@ class Perception:
             self._tracker.forget()
             self._tracks, self._hands = (), Hands()
             self._cuts += 1
-        located = self._located(detections)
+        # The camera's process has located them. A camera of another package need not do so, and a
+        # frame in transit during a change of the lens was located by the former lens.
+        intrinsics, located = self._locator.intrinsics(detections), detections.located
+        if located is None or located.intrinsics != intrinsics:
+            located = self._locator.locate(detections, intrinsics)
         faces = [place_in_world(face, R, p) for face in located.faces]
         things = [place_in_world(thing, R, p) for thing in located.things]
         palms = (
@@ -128,10 +138,20 @@ class Perception:
         if things or palms or self._hands.has_resting:
             if self._own_parts is not None:
                 things = label_own_body(things, self._own_parts(R_head, self._p_head), p)
-            known = self._known(t_s)
+            known = [
+                (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
+                for t in self._tracks
+                if t.is_person
+            ]
             things = self._hands.label(things, known_faces(faces, known), p, t_s, palms)
             faces, things = without_own_motion(faces, things, known, p)
-            things = [_at_head(thing) for thing in things]
+            # A patch that may be a walking person is at the position of the head, not at the feet.
+            things = [
+                thing
+                if thing.kind != UNNAMED or thing.upper_m is None
+                else replace(thing, p_world_m=thing.upper_m)
+                for thing in things
+            ]
         tracked = self._tracker.step([*faces, *things], p, t_s)
         size_px = detections.width_px, detections.height_px
         self._tracks = tracks = tuple(
@@ -156,20 +176,6 @@ class Perception:
         """Return the apparent speed of stationary things while the head turns, and its cause."""
         return self._residual.figures()
 
-    def _located(self, found: Detections) -> LocatedFrame:
-        """Return a frame's contents in the camera's axes.
-
-        The camera's process has located them. A camera of another package need not do so, and a
-        frame in transit during a change of the lens was located by the former lens.
-        """
-        intrinsics = self._locator.intrinsics(found)
-        located = found.located
-        if located is not None and (
-            located.intrinsics is intrinsics or located.intrinsics == intrinsics
-        ):
-            return located
-        return self._locator.locate(found, intrinsics)
-
     def _is_cut(self, scene: int, axis: Vec3) -> bool:
         """Return whether a frame shows another scene although the camera was hardly turned.
 
@@ -184,14 +190,6 @@ class Perception:
             return False
         restarted = scene // SCENES_OF_A_PROCESS != before[0] // SCENES_OF_A_PROCESS
         return restarted or dot(before[1], axis) > _COS_SAME_VIEW
-
-    def _known(self, t_s: float) -> list[Known]:
-        """Return the expected positions of the last frame's faces."""
-        return [
-            (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
-            for t in self._tracks
-            if t.is_person
-        ]
 
     def _note_residual(self, t_s: float, poses: PoseHistory) -> None:
         """Record the apparent positions of things; they are evaluated while the head turns."""
@@ -221,12 +219,18 @@ class Perception:
         # The filter covers errors that change; the unknown size of this person's face is constant.
         across_sd, along_sd = sqrt(across), hypot(sqrt(along), unknown_size)
         found = track.detection
-        eyes = _eyes(track)
+        signs, t_s, eyes = found.signs, track.at_s, None
+        if signs is not None:
+            if track.seen_s == t_s:
+                track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
+                if signs.eye_opening is not None:
+                    track.eyes = SeenEyes(found.gaze_world, signs.eye_opening, t_s)
+            eyes = None if track.eyes is None else track.eyes.at(t_s)
         gaze = found.gaze_world if eyes is None else eyes.gaze_world
         off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))
         # A blink does not end a look.
         blinks = eyes is not None and eyes.opening < EYES_SHUT
-        if track.seen_s == track.at_s and not blinks:
+        if track.seen_s == t_s and not blinks:
             track.looks_at_head = looks_at_head(
                 self._tracker.params,
                 off_rad,
@@ -248,8 +252,8 @@ class Perception:
             track.looks_at_head,
             gaze,
             None if eyes is None else eyes.opening,
-            None if found.signs is None else found.signs.mouth_opening_m,
-            None if found.signs is None else track.speech.speaks(track.at_s),
+            None if signs is None else signs.mouth_opening_m,
+            None if signs is None else track.speech.speaks(t_s),
         )
 
     def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:
@@ -281,25 +285,6 @@ def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) ->
         return False
     x, y = project([p_camera_m], lens)[0].tolist()
     return bool(0.0 <= x < size_px[0] and 0.0 <= y < size_px[1])
-
-
-def _at_head(thing: LocalisedDetection) -> LocalisedDetection:
-    """Return a patch that may be a walking person at the position of the head, not at the feet."""
-    if thing.kind != UNNAMED or thing.upper_m is None:
-        return thing
-    return replace(thing, p_world_m=thing.upper_m)
-
-
-def _eyes(track: Track) -> SeenEyes | None:
-    """Update mouth and eyes of a face; return the eyes, None if unknown."""
-    signs, t_s = track.detection.signs, track.at_s
-    if signs is None:
-        return None
-    if track.seen_s == t_s:
-        track.speech = track.speech.advance(signs.mouth_opening_m, t_s)
-        if signs.eye_opening is not None:
-            track.eyes = SeenEyes(track.detection.gaze_world, signs.eye_opening, t_s)
-    return None if track.eyes is None else track.eyes.at(t_s)
 
 
 def _bodies(tracks: tuple[Track, ...]) -> Bodies:

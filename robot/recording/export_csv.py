@@ -55,9 +55,20 @@ def write_csv(
     """
     paths = csv_files(stem)
     refuse_existing(*paths, force=force)
+    events = (
+        [
+            number(stretch.onset_s, 6),
+            number(stretch.duration_s, 6),
+            stretch.event,
+            number(stretch.amplitude_deg, 3),
+            number(stretch.peak_deg_s, 1),
+            *stretch.looked_at,
+        ]
+        for stretch in stretches
+    )
     tables: tuple[tuple[Sequence[str], Iterable[Sequence[str]]], ...] = (
         (columns(trace.joints), _sample_rows(trace, labels)),
-        (EVENTS, map(_event_row, stretches)),
+        (EVENTS, events),
         (FIXATIONS, _fixation_rows(stretches)),
     )
     for path, (names, rows) in zip(paths[:3], tables, strict=True):
@@ -124,17 +135,6 @@ def _sample_rows(trace: GazeAngles, labels: Labels) -> Iterator[list[str]]:
             *(number(value, 3) for value in lids),
             event, MOVEMENTS[movement], name.target, name.part,
         ]  # fmt: skip
-
-
-def _event_row(stretch: LabelledInterval) -> list[str]:
-    return [
-        number(stretch.onset_s, 6),
-        number(stretch.duration_s, 6),
-        stretch.event,
-        number(stretch.amplitude_deg, 3),
-        number(stretch.peak_deg_s, 1),
-        *stretch.looked_at,
-    ]
 
 
 def _fixation_rows(stretches: Sequence[LabelledInterval]) -> Iterator[list[str]]:

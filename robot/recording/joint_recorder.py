@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.control.body import Body
-from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit, JointParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.recording.tick_record import (
     BodyRecord,

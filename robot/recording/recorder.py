@@ -115,7 +115,15 @@ class Recorder:
         if self._over and self._path.is_file():
             beside = f".{self._target.name[:80]}-{secrets.token_hex(4)}"
             self._temporary = self._target.with_name(beside)
-        file_fd = _create(self._temporary or self._path, self._over)
+        path, over = self._temporary or self._path, self._over
+        refuse_existing(path, force=over)
+        try:
+            flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if over else os.O_EXCL)
+            file_fd = os.open(path, flags, 0o644)
+        except OSError as error:
+            raise SetupError(
+                f"cannot write {path} ({error.strerror}): choose a folder you may write to"
+            ) from None
         self._opened = True
         try:
             self._link.open(file_fd)
@@ -250,19 +258,3 @@ class Recorder:
     def unwritten(self) -> Path | None:
         """Return the incomplete file, None if the recording is complete."""
         return self._path if self._opened and self._link.failed else None
-
-
-def _create(path: Path, over: bool) -> int:
-    """Create the file and return its descriptor.
-
-    Raises:
-        SetupError: The file exists or cannot be created.
-    """
-    refuse_existing(path, force=over)
-    flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if over else os.O_EXCL)
-    try:
-        return os.open(path, flags, 0o644)
-    except OSError as error:
-        raise SetupError(
-            f"cannot write {path} ({error.strerror}): choose a folder you may write to"
-        ) from None

@@ -10,7 +10,7 @@ from typing import Any
 
 from gazerig.gaze.angles import add, compose, norm, rotate, rotation, sub
 from gazerig.gaze.types import GazeState, Mat3, Vec3
-from gazerig.robot.model.quaternion import quaternion
+from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.run_format import UNUSED
 

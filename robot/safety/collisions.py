@@ -9,8 +9,8 @@ the forbidden box, however long a tick is.
 from collections.abc import Sequence
 from math import isfinite
 
-from gazerig.robot.model.forbidden_range import CollisionParams, ForbiddenRange, forbidden_pairs
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.guard_params import CollisionParams, ForbiddenRange, forbidden_pairs
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.safety.motion_limiter import MotionLimiter
 

@@ -11,14 +11,12 @@ from math import inf, isfinite, radians
 from typing import Literal, NamedTuple
 
 from gazerig.robot.model.guard_params import GuardParams
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.collisions import Collisions
-from gazerig.robot.safety.health import JointHealth
+from gazerig.robot.safety.health import JointHealth, StallDetector
 from gazerig.robot.safety.late_ticks import LateTicks
-from gazerig.robot.safety.limit_change import LimitChange
-from gazerig.robot.safety.motion_limiter import MotionLimiter
-from gazerig.robot.safety.stall_detector import StallDetector
+from gazerig.robot.safety.motion_limiter import LimitChange, MotionLimiter
 
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9

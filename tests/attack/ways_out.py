@@ -39,8 +39,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from board_rig import on_pca9685
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.rig_limits import park_rad
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 
 ROOT = Path(__file__).parents[2]

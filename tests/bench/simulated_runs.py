@@ -9,8 +9,8 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.control.loop import run
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort

@@ -37,8 +37,8 @@ from gazerig.features.world.run.run_world import rig_in_world
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app import run_bus
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build

@@ -26,8 +26,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.robot_group import RobotGroup
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import Resume, Stop
-from gazerig.robot.model.stop_latch import MIN_HOLD_S, MIN_RESUME_GAP_S
+from gazerig.robot.model.commands import MIN_HOLD_S, MIN_RESUME_GAP_S, Resume, Stop
 
 pytestmark = [pytest.mark.pty, pytest.mark.slow, pytest.mark.own_timeouts]
 

@@ -19,7 +19,7 @@ from gazerig.features.world.figure import Figures  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
 from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
-from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
+from gazerig.robot.app.run_bus import emulated_lines  # noqa: E402
 
 
 def test_buses_of_three_kinds_share_one_world(tmp_path: Path) -> None:

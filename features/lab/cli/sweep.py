@@ -11,7 +11,7 @@ import typer
 from gazerig.config.export import suggestion
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.options import BUSES, DEFAULT_SCENE, RunOptions
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.progress_bar import progress_bar

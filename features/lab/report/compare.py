@@ -36,7 +36,7 @@ from gazerig.features.lab.report.statistics import (
     judge,
     unbiased_interval,
 )
-from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.control.tick import Tick
 
 LEVEL = 0.05

@@ -16,7 +16,7 @@ from gazerig.features.lab.report.page import (
     with_unit,
 )
 from gazerig.features.lab.report.statistics import MeasureResult, number
-from gazerig.robot.analysis.norm_bands import GROUPS
+from gazerig.robot.analysis.human_norms import GROUPS
 
 Word = Literal["more than chance", "may be chance", "too few events"]
 

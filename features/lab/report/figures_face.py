@@ -22,8 +22,8 @@ from gazerig.features.lab.report.plotting import (
 from gazerig.features.lab.report.reference_walk import published_walk
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
-from gazerig.robot.analysis.norm_bands import FACE
+from gazerig.robot.analysis.heatmap import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.analysis.human_norms import FACE
 
 _NAMES = [PART_NAMES[part] for part in PARTS]
 _NONE = "no fixation on a face part"

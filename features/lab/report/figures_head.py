@@ -17,7 +17,7 @@ from gazerig.features.lab.report.plotting import (
     nothing,
 )
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.norm_bands import FOLLOWING, HEAD
+from gazerig.robot.analysis.human_norms import FOLLOWING, HEAD
 
 
 def _contribution(figure: Figure, runs: Sequence[Shown]) -> None:

@@ -19,7 +19,7 @@ from gazerig.features.lab.report.plotting import (
     nothing,
 )
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.norm_bands import LIDS, SOCIAL
+from gazerig.robot.analysis.human_norms import LIDS, SOCIAL
 
 _SHOWN_S = np.arange(-0.1, 0.5, 0.005)
 _PHASES = (("closing", 60.0, 100.0), ("shut", 20.0, 60.0), ("opening", 130.0, 250.0))

@@ -17,7 +17,7 @@ from gazerig.features.lab.report.plotting import (
     nothing,
 )
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.norm_bands import SACCADES
+from gazerig.robot.analysis.human_norms import SACCADES
 
 _OVERVIEW_S = 12.0
 _NO_SACCADES = "no saccade of 1 deg or more"

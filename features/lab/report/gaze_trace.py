@@ -15,7 +15,7 @@ from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
-from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.analysis.blink_finder import LOWER, UPPER, BlinkEvent, openings
 from gazerig.robot.analysis.event_detector import (
     NEAR_FACE_M,
     EventDetector,
@@ -24,7 +24,6 @@ from gazerig.robot.analysis.event_detector import (
     beside_m,
 )
 from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.analysis.lid_opening import LOWER, UPPER, openings
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick

@@ -16,7 +16,7 @@ from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.plotting import Drawing
 from gazerig.features.lab.report.reference_walk import ReferenceWalk
 from gazerig.features.lab.report.statistics import MeasureResult, number
-from gazerig.robot.analysis.norm_bands import BANDS, GROUPS, NormBand
+from gazerig.robot.analysis.human_norms import BANDS, GROUPS, NormBand
 from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
 
 
@@ -116,7 +116,23 @@ def report_page(
         for group in GROUPS
     )
     counts = Counter(finding.verdict for finding in findings)
-    facts = (*about.facts, *_facts(run))
+    total = sum(run.kinds.values()) or 1.0
+    shares = sorted(run.kinds.items(), key=lambda item: -item[1])
+    facts = (
+        *about.facts,
+        *(
+            (
+                ("length", f"{run.seconds:.1f} s, {len(run.rows)} ticks at {run.rate_hz:.0f} Hz"),
+                (
+                    "events",
+                    f"{len(run.saccades)} saccades, {len(run.fixations)} fixations, "
+                    f"{len(run.blinks)} blinks",
+                ),
+                ("looked at", ", ".join(f"{kind} {100 * s / total:.0f} %" for kind, s in shares)),
+                ("conversation", run.mode),
+            )
+        ),
+    )
     return render(
         "report.html", about=about, facts=facts, sections=sections, counts=counts,
         outside=[f.band.title for f in findings if f.verdict == "outside"],
@@ -205,16 +221,3 @@ def band_text(band: NormBand) -> str:
 def with_unit(value: float, unit: str) -> str:
     """Return a number with its unit; shares have none."""
     return number(value) if unit in ("", "share") else f"{number(value)} {unit}"
-
-
-def _facts(run: GazeTrace) -> tuple[tuple[str, str], ...]:
-    """Return the facts of the run from its ticks."""
-    total = sum(run.kinds.values()) or 1.0
-    shares = sorted(run.kinds.items(), key=lambda item: -item[1])
-    return (
-        ("length", f"{run.seconds:.1f} s, {len(run.rows)} ticks at {run.rate_hz:.0f} Hz"),
-        ("events", f"{len(run.saccades)} saccades, {len(run.fixations)} fixations, "
-                   f"{len(run.blinks)} blinks"),
-        ("looked at", ", ".join(f"{kind} {100 * s / total:.0f} %" for kind, s in shares)),
-        ("conversation", run.mode),
-    )  # fmt: skip

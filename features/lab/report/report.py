@@ -26,7 +26,7 @@ from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.page import Figure, RunHeader, report_page
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, basis_text, png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
-from gazerig.robot.analysis.norm_bands import BY_KEY, applies
+from gazerig.robot.analysis.human_norms import BY_KEY, applies
 from gazerig.robot.control.tick import Tick
 
 Progress = Callable[[str, float], None]

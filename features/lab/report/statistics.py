@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.norm_bands import NormBand
+from gazerig.robot.analysis.human_norms import NormBand
 
 VerdictWord = Literal["pass", "uncertain", "outside", "too few events"]
 """uncertain: the figure is outside, but its interval reaches into the band"""
@@ -86,7 +86,13 @@ def interval(measured: MeasuredValue) -> tuple[float, float]:
     if of is longest:
         return nan, nan
     if of is mean and rows.ndim == 1 and np.isin(rows, (0.0, 1.0)).all():
-        return _wilson(float(rows.mean()), len(rows))
+        share = float(rows.mean())
+        n = len(rows)
+        z2 = _Z95 * _Z95
+        middle = (share + 0.5 * z2 / n) / (1.0 + z2 / n)
+        half = _Z95 * sqrt(share * (1.0 - share) / n + 0.25 * z2 / n**2) / (1.0 + z2 / n)
+        # Rounding must not exclude the share itself.
+        return min(share, middle - half), max(share, middle + half)
     return unbiased_interval(bootstrap(measured, np.random.default_rng(_SEED)), figure(of, rows))
 
 
@@ -97,14 +103,6 @@ def unbiased_interval(spread: Floats, value: float) -> tuple[float, float]:
     """
     low, high = np.percentile(spread, (2.5, 97.5)) - (spread.mean() - value)
     return float(low), float(high)
-
-
-def _wilson(share: float, n: int) -> tuple[float, float]:
-    z2 = _Z95 * _Z95
-    middle = (share + 0.5 * z2 / n) / (1.0 + z2 / n)
-    half = _Z95 * sqrt(share * (1.0 - share) / n + 0.25 * z2 / n**2) / (1.0 + z2 / n)
-    # Rounding must not exclude the share itself.
-    return min(share, middle - half), max(share, middle + half)
 
 
 def judge_without_interval(measured: MeasuredValue, band: NormBand) -> MeasureResult:

@@ -18,7 +18,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.sweep.axes import Axis, Point, latin_shares, point_at
 from gazerig.features.lab.sweep.outcome import REPORT, VERDICT, Outcome, grade
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
+from gazerig.robot.analysis.human_norms import BANDS, BY_KEY
 from gazerig.robot.app.options import RunOptions
 
 Scores = Callable[[Sequence[Point]], Sequence[float]]

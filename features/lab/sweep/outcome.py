@@ -14,7 +14,7 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.report import measure_run
 from gazerig.features.lab.report.statistics import MeasureResult, judge_without_interval
 from gazerig.features.lab.sweep.axes import Point
-from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
+from gazerig.robot.analysis.human_norms import BANDS, BY_KEY
 
 Column = float | int | str | bool | None
 Figures = Mapping[str, Column]
@@ -136,17 +136,14 @@ def write_tables(folder: Path, outcomes: Sequence[Outcome]) -> tuple[Path, ...]:
     write_file(folder / CSV, text.getvalue(), force=True)
     if importlib.util.find_spec("pyarrow") is None:
         return (folder / CSV,)
-    _write_parquet(folder / PARQUET, columns, rows)
-    return folder / CSV, folder / PARQUET
-
-
-def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    path = folder / PARQUET
     import pyarrow
     import pyarrow.parquet
 
     arrays = [_column([row[i] for row in rows]) for i in range(len(columns))]
     with output_file(path, force=True) as file:
         pyarrow.parquet.write_table(pyarrow.table(dict(zip(columns, arrays, strict=True))), file)
+    return folder / CSV, folder / PARQUET
 
 
 def _column(values: list[Any]) -> list[Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from gazerig.features.lab.sweep.axes import Axis
 from gazerig.features.lab.sweep.outcome import OUTSIDE, REPORT, Outcome
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY, NormBand
+from gazerig.robot.analysis.human_norms import BANDS, BY_KEY, NormBand
 
 _BINS = 5
 _WEAK = 0.05

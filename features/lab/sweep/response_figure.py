@@ -25,7 +25,7 @@ from gazerig.features.lab.sweep.response import (
     positions,
 )
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.norm_bands import NormBand
+from gazerig.robot.analysis.human_norms import NormBand
 
 PICTURE = "response.png"
 

@@ -18,12 +18,10 @@ from gazerig.features.world.shapes import shapes_of
 from gazerig.features.world.world_spec import state_file
 from gazerig.robot.app.bus_wiring import guarded_rig_bus
 from gazerig.robot.app.camera_factory import locator_of
-from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.app.run_bus import in_process, without_wires
-from gazerig.robot.app.run_parts import RunBus, Sight
+from gazerig.robot.app.run_bus import RunBus, Sight, emulated_lines, in_process, without_wires
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraParams

@@ -14,7 +14,7 @@ from gazerig.features.world.rig_in_world import (
     Transmission,
 )
 from gazerig.robot.app.bus_wiring import rig_setups
-from gazerig.robot.app.emulation import STOP_BEYOND_DEG, crooked_rad
+from gazerig.robot.app.run_bus import STOP_BEYOND_DEG, crooked_rad
 from gazerig.robot.model.coupling_params import pairs_of
 
 if TYPE_CHECKING:
@@ -38,9 +38,9 @@ from gazerig.features.world.script_faults import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.robot.app.bus_wiring import bus_names
-from gazerig.robot.app.emulation import BOARDS, CHAINS
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
+from gazerig.robot.app.run_bus import BOARDS, CHAINS
 from gazerig.robot.app.run_rig import refuse_unruled
 from gazerig.sim_mock.scenes.scene import Scene
 

@@ -20,9 +20,9 @@ from gazerig.features.world.world_spec import state_file
 from gazerig.gaze.angles import add, rotate, rotation
 from gazerig.gaze.types import Vec3
 from gazerig.robot.analysis.mutual_gaze import HeadPlace
-from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.description.head_shape import HeadMeasures
 from gazerig.robot.model.clock import RealClock
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
