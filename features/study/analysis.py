@@ -99,7 +99,9 @@ class StudyAnalysis:
             row
             for one in self.counted
             for row in one.counted
-            if isinstance(row.value, str) and row.value.strip() and self._is_text(row)
+            if isinstance(row.value, str)
+            and row.value.strip()
+            and self.questionnaires[row.questionnaire].items[row.item].kind == "text"
         )
 
     def label(self, name: str) -> str:
@@ -107,9 +109,6 @@ class StudyAnalysis:
         if name in self.design.conditions:
             return self.design.conditions[name].label or name
         return name.replace("=", " = ")
-
-    def _is_text(self, row: AnswerRow) -> bool:
-        return self.questionnaires[row.questionnaire].items[row.item].kind == "text"
 
 
 def analyse_study(
@@ -168,10 +167,6 @@ def _summarise_measure(
     alpha = None
     if measure.kind == "scale":
         alpha = cronbachs_alpha(item_answers(measure, people, questionnaires))
-    return MeasureSummary(measure, found, _summarise_conditions(found), counts, alpha)
-
-
-def _summarise_conditions(found: Scores) -> tuple[ConditionSummary, ...]:
     halves = within_participant_half_widths(found.means)
     out = []
     for k, condition in enumerate(found.conditions):
@@ -184,7 +179,7 @@ def _summarise_conditions(found: Scores) -> tuple[ConditionSummary, ...]:
         out.append(
             ConditionSummary(condition, len(known), mean, mean - half, mean + half, sd, median)
         )
-    return tuple(out)
+    return MeasureSummary(measure, found, tuple(out), counts, alpha)
 
 
 def within_participant_half_widths(means: Floats) -> Floats:

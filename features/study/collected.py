@@ -15,7 +15,7 @@ from gazerig.features.study.data_folder import StudyData
 from gazerig.features.study.design import Condition, StudyDesign
 from gazerig.features.study.participation import Participation, check_records, participation
 from gazerig.features.study.questionnaire import Questionnaire
-from gazerig.features.study.records import Opened, Record
+from gazerig.features.study.records import Opened
 
 _MOST_BYTES = 10_000_000
 
@@ -59,7 +59,15 @@ def collect_study(folder: Path) -> CollectedStudy:
     for number in data.numbers():
         each = data.participant(number)
         records = journal.read(each)
-        _require_design(records, sha256, each, path)
+        for one in records:
+            if isinstance(one, Opened) and one.participant != each.name:
+                raise SetupError(f"{each} has the journal of {one.participant}: move it back")
+            if isinstance(one, Opened) and one.design_sha256 != sha256:
+                raise SetupError(
+                    f"{each} was recorded with another design ({one.design_sha256[:12]}) than "
+                    f"{path} ({sha256[:12]}): data of two designs are two studies; move it to the "
+                    "folder of its own"
+                )
         if records:  # else it has no data
             check_records(records, design, questionnaires, each)
             people.append(participation(records, design, questionnaires))
@@ -113,22 +121,3 @@ def _in_order(asked: Mapping[str, Any]) -> dict[str, Any]:
     """Return a questionnaire with its items in the order of presentation."""
     rest = {key: value for key, value in asked.items() if key != "order"}
     return {**rest, "items": {key: asked["items"][key] for key in asked["order"]}}
-
-
-def _require_design(
-    records: tuple[Record, ...], sha256: str, participant: Path, path: Path
-) -> None:
-    """Refuse data from a session of another design.
-
-    Raises:
-        SetupError: the data are such data.
-    """
-    for one in records:
-        if isinstance(one, Opened) and one.participant != participant.name:
-            raise SetupError(f"{participant} has the journal of {one.participant}: move it back")
-        if isinstance(one, Opened) and one.design_sha256 != sha256:
-            raise SetupError(
-                f"{participant} was recorded with another design ({one.design_sha256[:12]}) than "
-                f"{path} ({sha256[:12]}): data of two designs are two studies; move it to the "
-                "folder of its own"
-            )

@@ -80,17 +80,16 @@ def decisions(
         if one.test is not None and isfinite(one.test.deciding_p)
     }
     many = correct_p_values(chances, design.plan.correction)
-    out = [replace(one, corrected_p=many.get(str(k), nan)) for k, one in enumerate(found)]
-    return tuple(replace(one, verdict=_verdict(one, design.plan.alpha)) for one in out)
-
-
-def _verdict(one: Decision, alpha: float) -> Verdict:
-    if one.test is None or one.too_few or not isfinite(one.corrected_p):
-        return "too few"
-    if one.corrected_p > alpha:
-        return "not supported"
-    # The difference of means may have another sign than the ranks that the test compares.
-    return "supported" if one.test.effect.value > 0.0 else "against"
+    decided = []
+    for k, one in enumerate(found):
+        p, verdict = many.get(str(k), nan), one.verdict
+        if one.test is None or one.too_few or not isfinite(p):
+            verdict = "too few"
+        elif p <= design.plan.alpha:
+            # The difference of means may have another sign than the ranks that the test compares.
+            verdict = "supported" if one.test.effect.value > 0.0 else "against"
+        decided.append(replace(one, corrected_p=p, verdict=verdict))
+    return tuple(decided)
 
 
 def _decide_rating(
@@ -112,10 +111,14 @@ def _decide_rating(
         nothing = (nan, nan)
         return Decision(one, measure, None, (), nan, "too few", n, nothing, nothing, None, (), why)
     tests = [_run(key, one, sides, measure) for key in (one.test, *one.also)]
+    checks = difference_checks(better - than, sides.better_first)
+    if measure.kind in ("item", "scale"):
+        answers = [found.answers(*sides.than), found.answers(*sides.better)]
+        checks.append(range_check(np.concatenate(answers), measure.points))
     return Decision(
         one, measure, tests[0], tuple(tests[1:]), nan, "not supported", n,
         (float(np.median(better)), float(np.median(than))), (float(better.mean()),
-        float(than.mean())), cohens_dz(better - than), _checks(measure, sides),
+        float(than.mean())), cohens_dz(better - than), tuple(checks),
         _too_few_reason(tests[0], design.plan.alpha),
     )  # fmt: skip
 
@@ -161,15 +164,6 @@ def _run(key: Test, one: Hypothesis, sides: _Sides, measure: Measure) -> Statist
         rows = [counts_of(found.answers(*c), measure.points) for c in (sides.better, sides.than)]
         return chi_square(rows, paired=True)
     raise ValueError(f"{key} cannot decide on a rating")
-
-
-def _checks(measure: Measure, sides: _Sides) -> tuple[AssumptionCheck, ...]:
-    better, than = sides.means
-    checks = difference_checks(better - than, sides.better_first)
-    answers: list[Floats] = [sides.found.answers(*side) for side in (sides.than, sides.better)]
-    if measure.kind in ("item", "scale"):
-        checks.append(range_check(np.concatenate(answers), measure.points))
-    return tuple(checks)
 
 
 def _decide_choice(

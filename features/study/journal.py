@@ -64,12 +64,22 @@ class Journal:
             data = path.read_bytes() if path.exists() else b""
             whole = data.rfind(b"\n") + 1
             self.records = decode_records(data[:whole], path)
-            self.torn = self._move_aside(data[whole:]) if whole < len(data) else None
+            self.torn: Path | None = None
+            if whole < len(data):  # an incomplete last line is moved to its own file
+                number = 1
+                while (torn := folder / f"journal-torn-{number}.txt").exists():
+                    number += 1
+                torn.write_bytes(data[whole:])
+                self.torn = torn
             self._fd = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
             os.ftruncate(self._fd, whole)
             self._size = os.lseek(self._fd, whole, os.SEEK_SET)
             os.fsync(self._fd)
-            _sync_folder(folder)
+            names = os.open(folder, os.O_RDONLY)  # of new files, to disk as well
+            try:
+                os.fsync(names)
+            finally:
+                os.close(names)
         except OSError as error:
             os.close(self._lock)
             raise SetupError(f"{folder}: {error.strerror}") from error
@@ -117,14 +127,6 @@ class Journal:
         os.close(self._fd)
         os.close(self._lock)
 
-    def _move_aside(self, torn: bytes) -> Path:
-        """Move an incomplete last line to its own file; return its path."""
-        number = 1
-        while (path := self._folder / f"journal-torn-{number}.txt").exists():
-            number += 1
-        path.write_bytes(torn)
-        return path
-
 
 def read(folder: Path) -> tuple[Record, ...]:
     """Return all records of a participant, without an incomplete last line.
@@ -155,10 +157,15 @@ def decode_records(data: bytes, path: Path) -> tuple[Record, ...]:
     records: list[Record] = []
     for number, line in enumerate(data.splitlines(), start=1):
         try:
-            records += [
-                _decode_record(said)
-                for said in msgspec.json.decode(line, type=list[dict[str, Any]])
-            ]
+            for said in msgspec.json.decode(line, type=list[dict[str, Any]]):
+                kind = _KINDS[said.pop("kind")]
+                numbers = {field.name for field in fields(kind) if field.type is float}
+                for name in numbers & said.keys():
+                    said[name] = nan if said[name] is None else said[name]
+                if kind is Measured:
+                    values = said["values"].items()
+                    said["values"] = {key: nan if one is None else one for key, one in values}
+                records.append(msgspec.convert(said, kind))
         except (msgspec.MsgspecError, LookupError, TypeError, AttributeError, ValueError,
                 RecursionError) as error:  # fmt: skip
             raise SetupError(
@@ -182,16 +189,6 @@ def session_lock(folder: Path) -> Iterator[None]:
         os.close(lock)
 
 
-def _decode_record(said: dict[str, Any]) -> Record:
-    kind = _KINDS[said.pop("kind")]
-    numbers = {field.name for field in fields(kind) if field.type is float}
-    for name in numbers & said.keys():
-        said[name] = nan if said[name] is None else said[name]
-    if kind is Measured:
-        said["values"] = {key: nan if one is None else one for key, one in said["values"].items()}
-    return msgspec.convert(said, kind)
-
-
 def _acquire_lock(folder: Path) -> int:
     """Return the open lock of a folder; it is held until it is closed or the process ends.
 
@@ -208,12 +205,3 @@ def _acquire_lock(folder: Path) -> int:
             "another participant"
         ) from None
     return lock
-
-
-def _sync_folder(folder: Path) -> None:
-    """Write the names of new files to disk as well."""
-    fd = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)

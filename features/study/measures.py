@@ -47,25 +47,19 @@ def measures(
     """
     found: dict[str, Measure] = {}
     for key in (*design.questionnaires, *design.after):
-        if key in questionnaires:
-            once = key not in design.questionnaires
-            found |= _of_questionnaire(key, questionnaires[key], once)
-    return found | {name: Measure(name, "objective") for name in design.objective}
-
-
-def _of_questionnaire(key: str, asked: Questionnaire, once: bool) -> dict[str, Measure]:
-    """Return items and scales of one questionnaire."""
-    found: dict[str, Measure] = {}
-    scales: dict[str, list[str]] = {}
-    for name, item in asked.items.items():
-        if item.kind == "choice":
-            found[f"{key}.{name}"] = Measure(f"{key}.{name}", "choice", key, (name,), 0, once)
-        if item.kind == "rating":
+        if key not in questionnaires:
+            continue
+        items, once = questionnaires[key].items, key not in design.questionnaires
+        scales: dict[str, list[str]] = {}
+        for name, item in items.items():
             at = f"{key}.{name}"
-            found[at] = Measure(at, "item", key, (name,), item.points, once)
-            if item.scale:
-                scales.setdefault(item.scale, []).append(name)
-    for scale, items in scales.items():
-        at, points = f"{key}.{scale}", asked.items[items[0]].points
-        found[at] = Measure(at, "scale", key, tuple(items), points, once)
-    return found
+            if item.kind == "choice":
+                found[at] = Measure(at, "choice", key, (name,), 0, once)
+            if item.kind == "rating":
+                found[at] = Measure(at, "item", key, (name,), item.points, once)
+                if item.scale:
+                    scales.setdefault(item.scale, []).append(name)
+        for scale, names in scales.items():
+            at, points = f"{key}.{scale}", items[names[0]].points
+            found[at] = Measure(at, "scale", key, tuple(names), points, once)
+    return found | {name: Measure(name, "objective") for name in design.objective}

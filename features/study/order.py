@@ -66,8 +66,16 @@ def orders(design: StudyDesign, participant: int) -> tuple[str, ...]:
     if participant < 1:
         raise ValueError(f"participant {participant}: participants are counted from 1")
     repetitions = design.trials.repetitions
-    if design.trials.order == "random":
-        return _random(design, participant, repetitions)
+    if design.trials.order == "random":  # consecutive trials differ if there are two
+        rng = np.random.default_rng((design.trials.seed, participant, _ORDERS))
+        there, out = block_trials(design), list[str]()
+        for _ in range(repetitions):
+            block = [there[i] for i in rng.permutation(len(there))]
+            if out and len(block) > 1 and _show_same(block[0], out[-1]):
+                at = int(rng.integers(1, len(block)))
+                block[0], block[at] = block[at], block[0]
+            out += [_orient_pair(one, bool(rng.integers(2))) for one in block]
+        return tuple(out)
     table = _table(design)
     step = _step(table)
     chosen = (table[(participant - 1 + k * step) % len(table)] for k in range(repetitions))
@@ -82,19 +90,6 @@ def practice(design: StudyDesign, participant: int) -> tuple[str, ...]:
         _orient_pair(block_trials(design)[drawn[i % len(drawn)]], bool(rng.integers(2)))
         for i in range(design.trials.practice)
     )
-
-
-def _random(design: StudyDesign, participant: int, repetitions: int) -> tuple[str, ...]:
-    """Return blocks in random order; consecutive trials differ if there are two."""
-    rng = np.random.default_rng((design.trials.seed, participant, _ORDERS))
-    there, out = block_trials(design), list[str]()
-    for _ in range(repetitions):
-        block = [there[i] for i in rng.permutation(len(there))]
-        if out and len(block) > 1 and _show_same(block[0], out[-1]):
-            at = int(rng.integers(1, len(block)))
-            block[0], block[at] = block[at], block[0]
-        out += [_orient_pair(one, bool(rng.integers(2))) for one in block]
-    return tuple(out)
 
 
 def _table(design: StudyDesign) -> tuple[tuple[str, ...], ...]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.answers import WrongAnswer, check_answer
-from gazerig.features.study.design import Exclusion, StudyDesign
+from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.journal import FILE
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.questionnaire import Questionnaire
@@ -115,9 +115,41 @@ def participation(
     if not records or not isinstance(records[0], Opened):
         raise ValueError("a journal begins with what opened it")
     opened = records[0]
-    trials = _trials(records)
-    rows = [_mark_exclusion(row, trials) for row in _rows(opened.participant, records)]
-    rows = _exclude_hasty_pages(rows, design.exclusion)
+    found: dict[tuple[int, int], TrialRow] = {}
+    answers: dict[tuple[int | None, str, str], AnswerRow] = {}  # the last one to each item
+    for one in records:
+        if isinstance(one, ItemAnswered):
+            answers[one.trial, one.questionnaire, one.item] = AnswerRow(
+                opened.participant, one.trial, one.condition, one.questionnaire, one.item,
+                one.value, one.ms, one.utc,
+            )  # fmt: skip
+        elif isinstance(one, TrialBegan):
+            attempts = found[one.trial, one.side].attempts if (one.trial, one.side) in found else 0
+            found[one.trial, one.side] = TrialRow(
+                one.trial, one.side, one.condition, attempts + 1, "interrupted", nan,
+                one.utc, "", "did not end", {},
+            )  # fmt: skip
+        elif isinstance(one, TrialEnded) and (one.trial, one.side) in found:
+            found[one.trial, one.side] = replace(
+                found[one.trial, one.side], outcome=one.outcome, seconds=one.seconds,
+                recording=one.recording, reason=one.reason, from_s=one.from_s, to_s=one.to_s,
+            )  # fmt: skip
+        elif isinstance(one, Measured) and (one.trial, one.side) in found:
+            before = found[one.trial, one.side]
+            found[one.trial, one.side] = replace(before, measured=dict(one.values))
+    trials = tuple(found.values())
+    rows = [_mark_exclusion(row, trials) for row in answers.values()]
+    slowest: dict[tuple[int | None, str], float] = {}
+    for row in rows:
+        page = row.trial, row.questionnaire
+        # A browser without a measured time was not too fast.
+        slowest[page] = max(slowest.get(page, 0.0), inf if isnan(row.ms) else row.ms)
+    rows = [
+        replace(row, left_out=row.left_out or "answered too fast")
+        if slowest[row.trial, row.questionnaire] < design.exclusion.fastest_answer_ms
+        else row
+        for row in rows
+    ]
     closed = [r for r in records if isinstance(r, Closed)]
     how = closed[-1].how if closed else "unfinished"
     whole = Participation(
@@ -184,38 +216,6 @@ def _misfit(
     return f"there is no condition {unknown[0]!r}" if unknown else ""
 
 
-def _rows(participant: str, records: Iterable[Record]) -> list[AnswerRow]:
-    """Return the answers, the last one for an item that was answered again."""
-    found: dict[tuple[int | None, str, str], AnswerRow] = {}
-    for one in records:
-        if isinstance(one, ItemAnswered):
-            found[one.trial, one.questionnaire, one.item] = AnswerRow(
-                participant, one.trial, one.condition, one.questionnaire, one.item, one.value,
-                one.ms, one.utc,
-            )  # fmt: skip
-    return list(found.values())
-
-
-def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
-    found: dict[tuple[int, int], TrialRow] = {}
-    for one in records:
-        if isinstance(one, TrialBegan):
-            attempts = found[one.trial, one.side].attempts if (one.trial, one.side) in found else 0
-            found[one.trial, one.side] = TrialRow(
-                one.trial, one.side, one.condition, attempts + 1, "interrupted", nan,
-                one.utc, "", "did not end", {},
-            )  # fmt: skip
-        elif isinstance(one, TrialEnded) and (one.trial, one.side) in found:
-            found[one.trial, one.side] = replace(
-                found[one.trial, one.side], outcome=one.outcome, seconds=one.seconds,
-                recording=one.recording, reason=one.reason, from_s=one.from_s, to_s=one.to_s,
-            )  # fmt: skip
-        elif isinstance(one, Measured) and (one.trial, one.side) in found:
-            before = found[one.trial, one.side]
-            found[one.trial, one.side] = replace(before, measured=dict(one.values))
-    return tuple(found.values())
-
-
 def _mark_exclusion(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
     """Exclude practice, incomplete presentations, and missing answers."""
     if row.trial is not None and row.trial < 0:
@@ -224,22 +224,6 @@ def _mark_exclusion(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
     if broken := next((outcome for outcome in ends if outcome != "complete"), ""):
         return replace(row, left_out=f"presentation {broken.replace('_', ' ')}")
     return replace(row, left_out="not answered") if row.value is None else row
-
-
-def _exclude_hasty_pages(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRow]:
-    """Exclude pages that were answered faster than a person can read."""
-    rows = list(rows)
-    slowest: dict[tuple[int | None, str], float] = {}
-    for row in rows:
-        page = row.trial, row.questionnaire
-        # A browser without a measured time was not too fast.
-        slowest[page] = max(slowest.get(page, 0.0), inf if isnan(row.ms) else row.ms)
-    return [
-        replace(row, left_out=row.left_out or "answered too fast")
-        if slowest[row.trial, row.questionnaire] < rules.fastest_answer_ms
-        else row
-        for row in rows
-    ]
 
 
 def _exclusion_reason(
@@ -258,12 +242,6 @@ def _exclusion_reason(
         return f"{words}: {last}" if last else words
     if one.how == "unfinished" and design.exclusion.incomplete == "exclude":
         return "did not finish"
-    if design.exclusion.same_answers and _has_equal_answers(one, questionnaires):
-        return "gave one answer to every item of all trials"
-    return ""
-
-
-def _has_equal_answers(one: Participation, questionnaires: Mapping[str, Questionnaire]) -> bool:
     ratings = [
         row.value
         for row in one.answers
@@ -272,4 +250,6 @@ def _has_equal_answers(one: Participation, questionnaires: Mapping[str, Question
         and row.value is not None
         and questionnaires[row.questionnaire].items[row.item].kind == "rating"
     ]
-    return len(ratings) >= LEAST_SAME and len(set(ratings)) == 1
+    if design.exclusion.same_answers and len(ratings) >= LEAST_SAME and len(set(ratings)) == 1:
+        return "gave one answer to every item of all trials"
+    return ""

@@ -87,22 +87,22 @@ def power_claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -
         hypothesis: one of its hypotheses.
         measure: the hypothesis' measure.
     """
-    asked = _question(design, hypothesis, measure)
+    many = len(design.hypotheses) if design.plan.correction != "none" else 1
+    repetitions = design.trials.repetitions
+    sides = (*design.side(hypothesis.better), *design.side(hypothesis.than))
+    whole = measure.kind == "item" and repetitions == 1 and len(sides) == 2
+    asked = PowerQuestion(
+        hypothesis.test,
+        design.plan.effect,
+        design.plan.alpha / many,
+        hypothesis.two_sided,
+        measure.points if whole else 0,
+        repetitions,
+    )
     n, wanted = design.plan.participants, design.plan.power
     return PowerClaim(
         asked, n, power_of(asked, n), sample_size_by_formula(asked, wanted),
         sample_size(asked, wanted, balanced_group_size(design)),
-    )  # fmt: skip
-
-
-def _question(design: StudyDesign, one: Hypothesis, measure: Measure) -> PowerQuestion:
-    many = len(design.hypotheses) if design.plan.correction != "none" else 1
-    repetitions = design.trials.repetitions
-    sides = (*design.side(one.better), *design.side(one.than))
-    whole = measure.kind == "item" and repetitions == 1 and len(sides) == 2
-    return PowerQuestion(
-        one.test, design.plan.effect, design.plan.alpha / many, one.two_sided,
-        measure.points if whole else 0, repetitions,
     )  # fmt: skip
 
 
@@ -192,17 +192,6 @@ def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> floa
         d = rng.normal(asked.effect, 1.0, (_STUDIES, n))
         sign = np.take_along_axis(d, np.argsort(np.abs(d), axis=1), axis=1) > 0.0
         up, down = sign.astype(np.int64), (~sign).astype(np.int64)
-    return float(_significant_studies(up, down, asked).mean())
-
-
-def _significant_studies(up: Counts, down: Counts, asked: PowerQuestion) -> NDArray[np.bool_]:
-    """Return which studies are significant in the signed-rank test.
-
-    Args:
-        up: (studies, sizes) differences above zero, by ascending size.
-        down: (studies, sizes) differences below zero.
-        asked: for its alpha and its sides.
-    """
     size = up + down
     doubled = 2 * np.cumsum(size, axis=1) - size + 1  # twice the midrank of each size
     above, below = (np.sum(doubled * one, axis=1) for one in (up, down))
@@ -218,7 +207,7 @@ def _significant_studies(up: Counts, down: Counts, asked: PowerQuestion) -> NDAr
         patterns, which = np.unique(size[few], axis=0, return_inverse=True)
         least = np.array([_critical(tuple(row), alpha) for row in patterns.tolist()])
         found[few] = np.maximum(above, below)[few] >= least[which.ravel()]
-    return found if asked.two_sided else found & (above > below)
+    return float((found if asked.two_sided else found & (above > below)).mean())
 
 
 @lru_cache(maxsize=200_000)
@@ -233,17 +222,10 @@ def _critical(size: tuple[int, ...], alpha: float) -> int:
             continue
         step = 2 * before + many + 1
         spaced = np.zeros(many * step + 1)
-        spaced[::step] = _coin_probabilities(many)
+        spaced[::step] = stats.binom.pmf(np.arange(many + 1), many, 0.5)
         chances, before = np.convolve(chances, spaced), before + many
     tail = np.cumsum(chances[::-1])[::-1]
     return int(np.searchsorted(-tail, -alpha * (1.0 + 1e-9)))
-
-
-@lru_cache(maxsize=_EXACT + 1)
-def _coin_probabilities(n: int) -> Floats:
-    """Return the probabilities of 0..n heads of n coins."""
-    found: Floats = stats.binom.pmf(np.arange(n + 1), n, 0.5)
-    return found
 
 
 def _rank_sum(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:

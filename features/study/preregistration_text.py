@@ -22,6 +22,7 @@ TESTS: Mapping[Test, str] = {
 }
 """Description of each test."""
 _QUESTION_S, _SHOWN_ROWS = 6.0, 12
+_FILES = ("rig", "profile", "character", "scanpath", "behaviour", "recording", "film")
 
 
 def text(
@@ -57,7 +58,8 @@ def text(
     made = environment.get_template("preregistration.md.jinja").render(
         design=design, program=program, sha256=sha256, hypotheses=hypotheses,
         conditions=list(_conditions(design, changes)), shown=_presentation(design),
-        trials=_trials(design), repeated=_times(trials.repetitions),
+        trials=_trials(design),
+        repeated=f", {trials.repetitions} times" if trials.repetitions > 1 else "",
         course=" ".join(filter(None, (_order(design), _practice(design), _rests(design)))),
         minutes=minutes(design, questionnaires),
         rows=list(_rows(design)), questionnaires=list(_asked(design, questionnaires)),
@@ -125,16 +127,8 @@ def _conditions(
 ) -> Iterator[dict[str, str]]:
     for key, one in design.conditions.items():
         said = [
-            f"{name} {_file(getattr(one, name))}"
-            for name in (
-                "rig",
-                "profile",
-                "character",
-                "scanpath",
-                "behaviour",
-                "recording",
-                "film",
-            )
+            f"{name} {Path(getattr(one, name)).name}"
+            for name in _FILES
             if getattr(one, name) is not None
         ]
         said += [f"{name} = {value}" for name, value in one.params.items()]
@@ -144,14 +138,12 @@ def _conditions(
         yield {"key": key, "label": _cell(one.label), "differs": _cell("; ".join([*said, values]))}
 
 
-def _file(name: str) -> str:
-    return Path(name).name
-
-
 def _presentation(design: StudyDesign) -> str:
     shown_by = design.presentation
     before = shown_by.world or shown_by.scene
-    who = f"an emulated head before {_file(before)!r}" if before else "the head before its camera"
+    who = (
+        f"an emulated head before {Path(before).name!r}" if before else "the head before its camera"
+    )
     if shown_by.on == "head":
         return f"They sit before the head itself; seed {shown_by.seed} for all conditions."
     return (
@@ -166,10 +158,6 @@ def _trials(design: StudyDesign) -> str:
     if len(block_trials(design)) == 1:
         return "the pair of conditions, one after the other"
     return f"each of the {len(block_trials(design))} pairs of conditions, one after the other"
-
-
-def _times(repetitions: int) -> str:
-    return f", {repetitions} times" if repetitions > 1 else ""
 
 
 def _order(design: StudyDesign) -> str:

@@ -4,6 +4,7 @@ A session that was interrupted resumes at the same place; only a presentation th
 starts again.
 """
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
@@ -61,7 +62,7 @@ class StudyProgress:
         self.closed: Closed | None = None
         self._sides = 2 if design.task == "pairwise" else 1
         self._attempts: dict[tuple[int, int], int] = {}
-        self._lost: dict[int, int] = {}
+        self._lost: Counter[int] = Counter()
         self._seen: set[tuple[int, int]] = set()
         self._answered: set[tuple[int | None, str]] = set()
         self._passed: set[StudyPlace] = set()
@@ -75,8 +76,13 @@ class StudyProgress:
                 case TrialBegan():
                     self.began = one
                     self._attempts[one.trial, one.side] = one.attempt
+                case TrialEnded(outcome="complete"):
+                    self.began = None
+                    self._seen.add((one.trial, one.side))
                 case TrialEnded():
-                    self._add_end(one)
+                    self.began = None
+                    self._attempts[one.trial, one.side] = one.attempt + 1
+                    self._lost[one.trial] += one.outcome == "head_lost"
                 case ItemAnswered():
                     self._answered.add((one.trial, one.questionnaire))
                 case Closed():
@@ -103,23 +109,10 @@ class StudyProgress:
                 return StudyPlace("questions", questionnaire=key)
         return StudyPlace("end")
 
-    def _add_end(self, one: TrialEnded) -> None:
-        self.began = None
-        if one.outcome == "complete":
-            self._seen.add((one.trial, one.side))
-            return
-        self._attempts[one.trial, one.side] = one.attempt + 1
-        if one.outcome == "head_lost":
-            self._lost[one.trial] = self._lost.get(one.trial, 0) + 1
-
-    def _is_given_up(self, trial: int) -> bool:
-        """Return whether the head was lost too often in a trial, by the design's rule."""
-        rule = self._design.exclusion
-        return self._lost.get(trial, 0) > (rule.repeats if rule.lost_head == "repeat" else 0)
-
     def _place_in_trial(self, trial: int) -> StudyPlace | None:
         """Return the participant's place in a trial, None after its end."""
-        if self._is_given_up(trial):
+        rule = self._design.exclusion
+        if self._lost[trial] > (rule.repeats if rule.lost_head == "repeat" else 0):
             return None
         every = self._design.trials.rest_every
         untouched = all((trial, side) not in self._attempts for side in range(self._sides))

@@ -3,8 +3,7 @@
 Each rule yields (dotted key, broken rule), like the rules between the sections of a rig.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from itertools import chain
+from collections.abc import Collection, Iterator, Mapping
 
 from gazerig.features.study.design import DECIDING, Hypothesis, StudyDesign, Test
 from gazerig.features.study.measures import GAZE_MEASURES, Measure, measures
@@ -29,14 +28,6 @@ def design_rules(design: StudyDesign) -> Found:
     for key in design.conditions:
         if not JOINT_NAME.fullmatch(key):
             yield f"conditions.{key}", f"no name of a condition: {_NAME}"
-    yield from _translation_rules(design)
-    yield from chain(
-        _shown_rules(design), _factor_rules(design), _number_rules(design), _objective_rules(design)
-    )
-
-
-def _translation_rules(design: StudyDesign) -> Found:
-    """Yield translations that no page uses, and incomplete ones."""
     for language, texts in design.translations.items():
         at = f"translations.{language}"
         if language not in LANGUAGES:
@@ -44,6 +35,26 @@ def _translation_rules(design: StudyDesign) -> Found:
         for name in ("welcome", "debriefing"):
             if getattr(design, name) and not getattr(texts, name):
                 yield f"{at}.{name}", "is missing, and the study has one; translate it as well"
+    yield from _shown_rules(design)
+    yield from _factor_rules(design)
+    if _LEAST <= count <= _MOST:
+        wanted, every = design.plan.participants, balanced_group_size(design)
+        if wanted % every:
+            below, above = wanted // every * every, (wanted // every + 1) * every
+            near = f"{below} or {above}" if below else f"{above} or {above + every}"
+            few = "too few for" if not below else "no multiple of"
+            yield (
+                "plan.participants",
+                f"{wanted} is {few} the {every} orders of Williams' squares: take {near}, "
+                "or trials.order: random",
+            )
+    for i, name in enumerate(design.objective):
+        if name in design.objective[:i]:
+            yield f"objective.{i}", "stands twice"
+        if design.presentation.on == "film":
+            yield f"objective.{i}", "is measured by the head in the room: presentation.on: head"
+        elif name in GAZE_MEASURES and not design.privacy.gaze:
+            yield f"objective.{i}", "needs privacy.gaze: true"
 
 
 def _shown_rules(design: StudyDesign) -> Found:
@@ -83,33 +94,6 @@ def _factor_rules(design: StudyDesign) -> Found:
         levels = {one.factors.get(name) for one in design.conditions.values()}
         if len(levels) == 1:
             yield f"conditions.{next(iter(design.conditions))}.factors.{name}", "has one level only"
-
-
-def _number_rules(design: StudyDesign) -> Found:
-    """Yield numbers of participants that do not balance the orders."""
-    if not _LEAST <= len(design.conditions) <= _MOST:
-        return
-    wanted, every = design.plan.participants, balanced_group_size(design)
-    if wanted % every:
-        below, above = wanted // every * every, (wanted // every + 1) * every
-        near = f"{below} or {above}" if below else f"{above} or {above + every}"
-        few = "too few for" if not below else "no multiple of"
-        yield (
-            "plan.participants",
-            f"{wanted} is {few} the {every} orders of Williams' squares: take {near}, "
-            "or trials.order: random",
-        )
-
-
-def _objective_rules(design: StudyDesign) -> Found:
-    """Yield objective measures that cannot be measured."""
-    for i, name in enumerate(design.objective):
-        if name in design.objective[:i]:
-            yield f"objective.{i}", "stands twice"
-        if design.presentation.on == "film":
-            yield f"objective.{i}", "is measured by the head in the room: presentation.on: head"
-        elif name in GAZE_MEASURES and not design.privacy.gaze:
-            yield f"objective.{i}", "needs privacy.gaze: true"
 
 
 def objective_rules(design: StudyDesign, known: Collection[str]) -> Found:
@@ -171,7 +155,8 @@ def consistency_rules(design: StudyDesign, questionnaires: Mapping[str, Question
     """
     every = (*design.questionnaires, *design.after)
     for i, key in enumerate(every):
-        place = _place(design, i)
+        n = len(design.questionnaires)  # those after each trial are counted first
+        place = f"questionnaires.{i}" if i < n else f"after.{i - n}"
         if key in every[:i]:
             yield place, f"{key!r} is asked already; once is enough"
         kinds = (
@@ -195,12 +180,6 @@ def consistency_rules(design: StudyDesign, questionnaires: Mapping[str, Question
             yield f"hypotheses.{i}.{key}", rule
 
 
-def _place(design: StudyDesign, i: int) -> str:
-    """Return the key of a questionnaire; those after each trial are counted first."""
-    n = len(design.questionnaires)
-    return f"questionnaires.{i}" if i < n else f"after.{i - n}"
-
-
 def _hypothesis_rules(
     design: StudyDesign, one: Hypothesis, known: Mapping[str, Measure], complete: bool
 ) -> Found:
@@ -209,7 +188,9 @@ def _hypothesis_rules(
     measure = known.get(one.measure)
     if measure is None:
         if complete:
-            yield "measure", f"nothing asks or measures {one.measure!r}; there is {_listed(known)}"
+            names, more = list(known)[:12], len(known) - 12
+            there = ", ".join(names) + f" and {more} more" * (more > 0)
+            yield "measure", f"nothing asks or measures {one.measure!r}; there is {there}"
     elif measure.once:
         yield "measure", "is asked once at the end, of no condition; ask it after each trial"
     for i, test in enumerate((one.test, *one.also)):
@@ -231,7 +212,9 @@ def _side_rules(design: StudyDesign, one: Hypothesis) -> Found:
     sides = {key: design.side(getattr(one, key)) for key in ("better", "than")}
     for key, side in sides.items():
         if not side:
-            there = ", ".join((*design.conditions, *_factor_levels(design)))
+            pairs = [pair for c in design.conditions.values() for pair in c.factors.items()]
+            levels = [f"{factor}={level}" for factor, level in dict.fromkeys(pairs)]
+            there = ", ".join((*design.conditions, *levels))
             yield key, f"no condition {getattr(one, key)!r}, and no level; there is {there}"
     if one.better == one.than:
         yield "than", "is the condition itself; name another"
@@ -248,12 +231,6 @@ def _side_rules(design: StudyDesign, one: Hypothesis) -> Found:
                 f"{one.better!r} and {one.than!r} do not stand beside the same levels of the other "
                 "factors, so the difference would be theirs as well; compare single conditions",
             )
-
-
-def _factor_levels(design: StudyDesign) -> list[str]:
-    """Return the levels of all factors in the form of hypotheses."""
-    pairs = [pair for one in design.conditions.values() for pair in one.factors.items()]
-    return [f"{factor}={level}" for factor, level in dict.fromkeys(pairs)]
 
 
 _EXPLORATORY: Mapping[Test, str] = {
@@ -282,9 +259,3 @@ _KINDS = {
     "choice": "a choice between two",
     "objective": "an objective measure",
 }
-
-
-def _listed(known: Iterable[str]) -> str:
-    """Return names for a message; of a long list the first twelve."""
-    names = list(known)
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

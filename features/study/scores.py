@@ -80,7 +80,7 @@ def scores(
         single += [(len(kept), column, value) for column, value in values]
         kept.append(one)
         means.append([_mean([v for at, v in values if at == k]) for k in range(len(conditions))])
-        places.append([_place(one.order, key) for key in conditions])
+        places.append([one.order.index(key) if key in one.order else nan for key in conditions])
     shape = (len(kept), len(conditions))
     return Scores(
         measure, tuple(one.participant for one in kept), conditions,
@@ -162,10 +162,6 @@ def choice_differences(
     each = (wins(measure, [one], (better, than)) for one in people)
     found = [int(table[0, 1]) - int(table[1, 0]) for table in each if table.any()]
     return np.array(found, float)
-
-
-def _place(order: Sequence[str], condition: str) -> float:
-    return next((float(k) for k, key in enumerate(order) if key == condition), nan)
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -112,7 +112,11 @@ def effect_of(shift: float, points: int, items: int = 1, repetitions: int = 1) -
     mean_at: list[Floats] = []
     variance = np.zeros(len(_NODES))
     for side in (0.5, -0.5):
-        mean, square = _moments(own + trial + side * shift, points)
+        latent = own + trial + side * shift
+        # The rating is 1 plus the number of thresholds below the value.
+        above = special.ndtr((latent[..., None] - np.array(thresholds(points))) / ITEM_SD)
+        mean = 1.0 + above.sum(axis=-1)
+        square = 1.0 + (above * (2.0 * np.arange(2, points + 1) - 1.0)).sum(axis=-1)
         seen = mean @ _WEIGHTS
         between = (mean**2) @ _WEIGHTS - seen**2
         within = (square - mean**2) @ _WEIGHTS / items
@@ -122,15 +126,6 @@ def effect_of(shift: float, points: int, items: int = 1, repetitions: int = 1) -
     middle = float(difference @ _WEIGHTS)
     spread = float(variance @ _WEIGHTS + (difference - middle) ** 2 @ _WEIGHTS)
     return middle / sqrt(spread)
-
-
-def _moments(latent: Floats, points: int) -> tuple[Floats, Floats]:
-    """Return mean and mean square of the rating for latent values without the item's noise."""
-    # The rating is 1 plus the number of thresholds below the value.
-    above = special.ndtr((latent[..., None] - np.array(thresholds(points))) / ITEM_SD)
-    mean: Floats = 1.0 + above.sum(axis=-1)
-    square: Floats = 1.0 + (above * (2.0 * np.arange(2, points + 1) - 1.0)).sum(axis=-1)
-    return mean, square
 
 
 def choice_probability(effect: float) -> float:
@@ -197,7 +192,8 @@ class SimulatedParticipant:
         if asked.kind == "text":
             return "", ms
         if asked.kind == "choice":
-            return self._choice(condition, questionnaire, rng), ms
+            chosen_first = self.careless or rng.random() < self._chance(condition, questionnaire)
+            return "first" if chosen_first else "second", ms
         return self._rating(trial, condition, questionnaire, item, asked, rng), ms
 
     def measured(self, trial: int, condition: str) -> dict[str, float]:
@@ -223,16 +219,13 @@ class SimulatedParticipant:
             found += half * one.contrast_sd * self._rng(f"contrast {construct}").normal()
         return found
 
-    def _choice(self, pair: str, questionnaire: str, rng: np.random.Generator) -> str:
-        if self.careless:
-            return "first"
+    def _chance(self, pair: str, questionnaire: str) -> float:
+        """Return the probability that the first of a pair is chosen (Bradley & Terry 1952)."""
         first, second = pair.split(PAIR)
         apart = self._levels[first] - self._levels[second]
         own = self._preference(first, questionnaire) - self._preference(second, questionnaire)
-        chance = special.expit(
-            apart * special.logit(choice_probability(self._population.effect)) + own
-        )
-        return "first" if rng.random() < chance else "second"
+        by_level = apart * special.logit(choice_probability(self._population.effect))
+        return float(special.expit(by_level + own))
 
     def _rating(
         self,

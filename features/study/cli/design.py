@@ -13,7 +13,6 @@ from gazerig.robot.cli.examples import complete_shipped
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
 if TYPE_CHECKING:
-    from gazerig.features.study.questionnaire import Questionnaire, Texts
     from gazerig.features.study.run.study_file import LoadedStudy
 
 DEFAULT, PREREGISTRATION = "study.yaml", "preregistration.md"
@@ -192,11 +191,7 @@ def notes(study: "LoadedStudy") -> list[str]:
     if design.privacy.pictures:
         found.append("pictures of participants are kept; the consent page asks them for it")
     for key, one in study.questionnaires.items():
-        if any(design.language not in texts for texts in _texts(one)):
+        items = [texts for item in one.items.values() for texts in (item.text, item.low, item.high)]
+        if any(texts and design.language not in texts for texts in (one.instruction, *items)):
             found.append(f"{key} is not all in {design.language!r}; English stands where it is not")
     return found
-
-
-def _texts(one: "Questionnaire") -> list["Texts"]:
-    items = [texts for item in one.items.values() for texts in (item.text, item.low, item.high)]
-    return [texts for texts in (one.instruction, *items) if texts]

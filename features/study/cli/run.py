@@ -63,7 +63,16 @@ def run(
         found = checked_study(study)
         folder = StudyData(data_folder(found, data))
         if participant is None:
-            _simulate(found, folder, simulate, effect, seed)
+            from gazerig.features.study.run.simulated_session import simulate_study
+            from gazerig.features.study.simulation import Population
+
+            drawn = Population(effect=effect, seed=seed)
+            with progress_bar() as steps:
+                simulate_study(
+                    found, folder, simulate, drawn, lambda share: steps("participants", share)
+                )
+            said = f"{simulate} simulated participants, d_z = {effect:g}, seed {seed}"
+            print(f"{folder.folder}: {said}")
             print(f"next: gazerig study analyse {folder.folder}")
             return
         state(study, found, folder.folder)
@@ -113,20 +122,6 @@ def delete(
             raise typer.Exit(1)
         count = StudyData(data).delete(participant)
         print(f"{code}: {count} files deleted; make the report again: gazerig study analyse {data}")
-
-
-def _simulate(
-    study: "LoadedStudy", data: "StudyData", count: int, effect: float, seed: int
-) -> None:
-    from gazerig.features.study.run.simulated_session import simulate_study
-    from gazerig.features.study.simulation import Population
-
-    with progress_bar() as steps:
-        simulate_study(
-            study, data, count, Population(effect=effect, seed=seed),
-            lambda share: steps("participants", share),
-        )  # fmt: skip
-    print(f"{data.folder}: {count} simulated participants, d_z = {effect:g}, seed {seed}")
 
 
 def _head(study: "LoadedStudy", asked: RunOptions) -> RunOptions | None:

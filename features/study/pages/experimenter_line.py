@@ -100,7 +100,9 @@ class ExperimenterLine:
 
     def _state(self, elapsed_s: float) -> dict[str, object]:
         """Return the state for the stop button and the page's script."""
-        head = self._head.report()
+        head, now = self._head.report(), self._run.state()
+        shown = now.shown
+        condition = self._design.conditions[shown.condition] if shown else None
         return {
             "stopped": head.says if head.state == "stopped" else "",
             "silent": head.state == "late",
@@ -109,28 +111,22 @@ class ExperimenterLine:
             "trouble": self.trouble,
             "head": head.state,
             "head_says": head.says,
-            "session": self._session(elapsed_s),
-        }
-
-    def _session(self, elapsed_s: float) -> dict[str, object]:
-        now = self._run.state()
-        shown = now.shown
-        condition = self._design.conditions[shown.condition] if shown else None
-        return {
-            "participant": now.participant,
-            "doing": _DOING[type(now.screen)],
-            "how": now.screen.how if isinstance(now.screen, EndScreen) else "",
-            "trial": None if now.trial is None else now.trial + 1,
-            "of": now.trials,
-            "condition": shown.condition if shown else "",
-            "label": condition.label if condition else "",
-            "attempt": shown.attempt if shown else 0,
-            "showing": now.presenting,
-            "showing_s": now.elapsed_s,
-            "answers": now.answers,
-            "elapsed_s": elapsed_s,
-            "fault": now.fault,
-            "paused": now.paused,
+            "session": {
+                "participant": now.participant,
+                "doing": _DOING[type(now.screen)],
+                "how": now.screen.how if isinstance(now.screen, EndScreen) else "",
+                "trial": None if now.trial is None else now.trial + 1,
+                "of": now.trials,
+                "condition": shown.condition if shown else "",
+                "label": condition.label if condition else "",
+                "attempt": shown.attempt if shown else 0,
+                "showing": now.presenting,
+                "showing_s": now.elapsed_s,
+                "answers": now.answers,
+                "elapsed_s": elapsed_s,
+                "fault": now.fault,
+                "paused": now.paused,
+            },
         }
 
     async def _receive(self, line: web.WebSocketResponse) -> None:

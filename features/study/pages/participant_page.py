@@ -31,7 +31,16 @@ def page_json(screen: Screen, design: StudyDesign, code: str) -> Json:
     """
     match screen:
         case ConsentScreen():
-            return _consent(screen, design, code)
+            uses = {"gaze": screen.gaze, "pictures": screen.pictures}
+            return {
+                "kind": "consent",
+                "code": code,
+                "welcome": design.texts.welcome,
+                "uses": [use for use, asked in uses.items() if asked],
+                "camera": design.presentation.on == "head",
+                "days": design.privacy.deleted_after_days,
+                "contact": design.privacy.contact,
+            }
         case InstructionsScreen():
             return {
                 "kind": "instructions",
@@ -55,45 +64,35 @@ def page_json(screen: Screen, design: StudyDesign, code: str) -> Json:
             more: Json = {"on": design.presentation.on, "seconds": screen.seconds, "again": True}
             return {"kind": "presentation", **_place(screen), **more, "film": film}
         case QuestionsScreen():
-            return _questions(screen, design)
+            language = design.language
+            return {
+                "kind": "questions",
+                **_place(screen),
+                "after": screen.once,
+                "may_skip": design.may_skip,
+                "instruction": _in(screen.instruction, language),
+                "instruction_language": language if language in screen.instruction else "en",
+                "items": [_item(str(one.number), one.item, language) for one in screen.questions],
+            }
         case RestScreen():
             return {"kind": "rest", "seconds": screen.seconds}
         case PausedScreen():
             return {"kind": "paused"}
         case EndScreen():
-            return _end(screen, design, code)
-
-
-def _consent(screen: ConsentScreen, design: StudyDesign, code: str) -> Json:
-    uses = {"gaze": screen.gaze, "pictures": screen.pictures}
-    return {
-        "kind": "consent",
-        "code": code,
-        "welcome": design.texts.welcome,
-        "uses": [use for use, asked in uses.items() if asked],
-        "camera": design.presentation.on == "head",
-        "days": design.privacy.deleted_after_days,
-        "contact": design.privacy.contact,
-    }
+            told: Mapping[str, object] = {"text": design.texts.debriefing, "code": code}
+            return {
+                "kind": "end",
+                "how": screen.how,
+                "contact": design.privacy.contact,
+                "code": "" if screen.how == "declined" else code,
+                **(told if screen.how == CONDITIONS_ARE_TOLD else {"text": ()}),
+            }
 
 
 def _place(screen: ReadyScreen | PresentationScreen | QuestionsScreen) -> Json:
     step = {"n": screen.number, "of": screen.of, "practice": screen.practice}
     side = None if isinstance(screen, QuestionsScreen) or not screen.pair else screen.side
     return {"step": step if screen.of else None, "side": side}
-
-
-def _questions(screen: QuestionsScreen, design: StudyDesign) -> Json:
-    language = design.language
-    return {
-        "kind": "questions",
-        **_place(screen),
-        "after": screen.once,
-        "may_skip": design.may_skip,
-        "instruction": _in(screen.instruction, language),
-        "instruction_language": language if language in screen.instruction else "en",
-        "items": [_item(str(one.number), one.item, language) for one in screen.questions],
-    }
 
 
 def _item(number: str, item: Item, language: str) -> Json:
@@ -113,15 +112,3 @@ def _item(number: str, item: Item, language: str) -> Json:
 
 def _in(texts: Texts, language: str) -> str:
     return texts.get(language, texts.get("en", ""))
-
-
-def _end(screen: EndScreen, design: StudyDesign, code: str) -> Json:
-    """Return the last page; a participant who left may still request deletion of the data."""
-    told: Mapping[str, object] = {"text": design.texts.debriefing, "code": code}
-    return {
-        "kind": "end",
-        "how": screen.how,
-        "contact": design.privacy.contact,
-        "code": "" if screen.how == "declined" else code,
-        **(told if screen.how == CONDITIONS_ARE_TOLD else {"text": ()}),
-    }

@@ -48,6 +48,8 @@ _FILMS_FAIL = (
     "current Firefox, Chrome or Edge, on an iPhone or iPad with iOS 17.4 or later"
 )
 _EXPERIMENTERS_PATHS = ("/experimenter", "/rig/")
+_OF_BOTH = (".css", ".js", ".svg", ".json")
+"""Endings of files below /study/ that both pages need."""
 
 
 class StudyServer:
@@ -137,9 +139,16 @@ class StudyServer:
         self._loop.close()
 
     async def _serve(self) -> None:
-        runner = web.AppRunner(
-            self._app(), access_log=None, shutdown_timeout=0.5, lingering_time=0.0
-        )
+        app = web.Application(middlewares=[self._access_middleware()], client_max_size=SENT_BYTES)
+        app.router.add_get("/study/page", self._page)
+        app.router.add_get("/study/news", self._stream_news)
+        app.router.add_post("/study/done", self._handle_event)
+        app.router.add_get("/study/film/{token}", self._film)
+        app.router.add_post("/study/film_failed", self._film_failed)
+        StudyFiles(self._design.language).add_to(app.router)
+        self._experimenter.add_to(app.router)
+        app.router.add_get("/{path:.*}", _nothing)
+        runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.5, lingering_time=0.0)
         await runner.setup()
         assert runner.server is not None
         self._connections = Connections(runner.server)
@@ -157,18 +166,6 @@ class StudyServer:
         listener.close()
         await runner.cleanup()
 
-    def _app(self) -> web.Application:
-        app = web.Application(middlewares=[self._access_middleware()], client_max_size=SENT_BYTES)
-        app.router.add_get("/study/page", self._page)
-        app.router.add_get("/study/news", self._stream_news)
-        app.router.add_post("/study/done", self._handle_event)
-        app.router.add_get("/study/film/{token}", self._film)
-        app.router.add_post("/study/film_failed", self._film_failed)
-        StudyFiles(self._design.language).add_to(app.router)
-        self._experimenter.add_to(app.router)
-        app.router.add_get("/{path:.*}", _nothing)
-        return app
-
     def _access_middleware(self) -> Middleware:
         """Accept a request, redirect it to an address without token, or refuse it in one line."""
 
@@ -178,7 +175,8 @@ class StudyServer:
                 theirs = request.path.startswith(_EXPERIMENTERS_PATHS)
                 admission = self._admissions[_EXPERIMENTER if theirs else _PARTICIPANT]
                 why_not = admission.refusal(request)
-                if why_not is not None and _is_shared(request.path):
+                of_study = request.path.startswith("/study/")
+                if why_not is not None and of_study and request.path.endswith(_OF_BOTH):
                     why_not = self._admissions[_EXPERIMENTER].refusal(request)
                 if why_not is not None:
                     return web.Response(status=403, text=f"{why_not}\n", headers=HEADERS)
@@ -301,11 +299,6 @@ class StudyServer:
     def _wake(self) -> None:
         for news in self._news:
             news.set()
-
-
-def _is_shared(path: str) -> bool:
-    """Return whether both pages need this file."""
-    return path.startswith("/study/") and path.endswith((".css", ".js", ".svg", ".json"))
 
 
 async def _nothing(request: web.Request) -> web.Response:

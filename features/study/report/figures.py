@@ -18,7 +18,6 @@ from gazerig.features.lab.report.plotting import (
 )
 from gazerig.features.study.analysis import MeasureSummary, StudyAnalysis
 from gazerig.features.study.decisions import Decision
-from gazerig.features.study.statistics.results import EffectSize
 
 _LOW, _HIGH = ((179, 88, 6), (254, 224, 182)), ((216, 218, 235), (84, 39, 136))
 """Colours from the lowest point to the middle and on to the highest, RGB of 0 to 255:
@@ -155,17 +154,13 @@ def _forest(figure: Figure, found: tuple[Decision, ...], names: list[str]) -> No
     ):
         for row, size in enumerate(which):
             if size is not None and isfinite(size.value):
-                _whisker(axes, row, size)
+                if isfinite(size.low95):
+                    axes.plot([size.low95, size.high95], [row, row], color=_ACCENT, lw=2.2)
+                axes.plot(size.value, row, "s", color=_ACCENT, ms=7)
+                axes.annotate(f"{size.symbol} = {size.value:.2f}", (size.value, row), (0, 7),
+                              textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
         axes.axvline(0.0, color=INK, lw=0.8)
         axes.set_yticks(range(len(names)), names)
         axes.set_ylim(len(names) - 0.5, -0.5)
         label(axes, title, "")
     bounded.set_xlim(-1.05, 1.05)
-
-
-def _whisker(axes: Axes, row: int, size: EffectSize) -> None:
-    if isfinite(size.low95):
-        axes.plot([size.low95, size.high95], [row, row], color=_ACCENT, lw=2.2)
-    axes.plot(size.value, row, "s", color=_ACCENT, ms=7)
-    axes.annotate(f"{size.symbol} = {size.value:.2f}", (size.value, row), (0, 7),
-                  textcoords="offset points", ha="center", fontsize=8)  # fmt: skip

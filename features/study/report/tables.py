@@ -9,7 +9,6 @@ from math import isfinite
 from typing import Any
 
 from gazerig.features.study.analysis import StudyAnalysis
-from gazerig.features.study.decisions import Decision
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.participation import AnswerRow, Participation
 from gazerig.features.study.statistics.results import StatisticalTest
@@ -96,25 +95,24 @@ def results_json(study: StudyAnalysis) -> str:
             "left_out": {one.participant: one.left_out for one in study.people if one.left_out},
         },
         "interim_looks": [look._asdict() for look in study.looks],
-        "hypotheses": [_decision_json(one) for one in study.decisions],
+        "hypotheses": [
+            {
+                **asdict(one.hypothesis),
+                "verdict": one.verdict,
+                "n": one.n,
+                "corrected_p": one.corrected_p,
+                "too_few": one.too_few,
+                "means": one.means,
+                "medians": one.medians,
+                "standardised": one.standardised._asdict() if one.standardised else None,
+                "planned_test": _test(one.test) if one.test else None,
+                "also": [_test(test) for test in one.also],
+                "assumptions": [check._asdict() for check in one.checks],
+            }
+            for one in study.decisions
+        ],
     }
     return json.dumps(_json_value(said), indent=1, ensure_ascii=False) + "\n"
-
-
-def _decision_json(one: Decision) -> dict[str, object]:
-    return {
-        **asdict(one.hypothesis),
-        "verdict": one.verdict,
-        "n": one.n,
-        "corrected_p": one.corrected_p,
-        "too_few": one.too_few,
-        "means": one.means,
-        "medians": one.medians,
-        "standardised": one.standardised._asdict() if one.standardised else None,
-        "planned_test": _test(one.test) if one.test else None,
-        "also": [_test(test) for test in one.also],
-        "assumptions": [check._asdict() for check in one.checks],
-    }
 
 
 def _test(test: StatisticalTest) -> dict[str, object]:

@@ -21,7 +21,7 @@ from gazerig.drivers.files.film_writer import film_writer
 from gazerig.drivers.types import ImageArray
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.run.study_file import LoadedStudy
-from gazerig.gaze.types import Floats, Vec3
+from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
@@ -75,8 +75,14 @@ class HeadPictures:
         shape = rig.geometry
         up_mm = shape.pitch_axis_height_mm + shape.eyes_above_mm
         middle = np.array([0.001 * shape.eyes_ahead_mm, 0.0, 0.001 * up_mm - _BELOW_EYES_M])
+        # Optical axes of a camera that looks at the middle of the face.
         self._p_m = np.array(p_viewer_m)
-        self._R, away_m = _camera_looking_at(self._p_m, middle)
+        ahead = middle - self._p_m
+        away_m = float(np.linalg.norm(ahead))
+        ahead /= away_m
+        right = np.cross(ahead, (0.0, 0.0, 1.0))
+        right /= np.linalg.norm(right)
+        self._R = np.column_stack((right, np.cross(ahead, right), ahead))
         focal_px = _HEAD_SHARE * SIZE_PX * away_m / _HEAD_M
         self._lens = Intrinsics(focal_px, focal_px, 0.5 * (SIZE_PX - 1), 0.5 * (SIZE_PX - 1))
 
@@ -90,16 +96,6 @@ class HeadPictures:
     def close(self) -> None:
         """Free the renderer."""
         self._renderer.close()
-
-
-def _camera_looking_at(p_m: Floats, at_m: Floats) -> tuple[Floats, float]:
-    """Return the rotation of a camera that looks at a point, optical axes, and its distance."""
-    ahead = at_m - p_m
-    away_m = float(np.linalg.norm(ahead))
-    ahead = ahead / away_m
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    right = right / np.linalg.norm(right)
-    return np.column_stack((right, np.cross(ahead, right), ahead)), away_m
 
 
 def films(study: LoadedStudy, folder: Path, progress: Callable[[str], Progress]) -> dict[str, Path]:
@@ -117,7 +113,8 @@ def films(study: LoadedStudy, folder: Path, progress: Callable[[str], Progress])
     """
     make_folder(folder)
     index = folder / "index.txt"
-    found = dict(line.split() for line in _lines(index))
+    known = index.read_text(encoding="utf-8") if index.exists() else ""
+    found = dict(line.split() for line in known.splitlines())
     for key, condition in study.design.conditions.items():
         if condition.film is not None:
             continue
@@ -131,10 +128,6 @@ def films(study: LoadedStudy, folder: Path, progress: Callable[[str], Progress])
     return {key: Path(film) if film else folder / found[key] for key, film in own.items()}
 
 
-def _lines(path: Path) -> list[str]:
-    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-
-
 def render(study: LoadedStudy, key: str, path: Path, progress: Progress) -> None:
     """Write the film of a condition; an existing file is overwritten.
 
@@ -144,7 +137,13 @@ def render(study: LoadedStudy, key: str, path: Path, progress: Progress) -> None
     seconds = study.design.trials.seconds
     rig = study.rigs[key]
     names = in_order(rig.joints)
-    pictures = HeadPictures(rig, _viewer_m(study, rig))
+    seen = assemble(rig, _options(study, 1.0))
+    try:
+        people = () if seen.scene is None else seen.scene.people(0.0)
+    finally:
+        seen.close()
+    # At the nose of the person the head looks at.
+    pictures = HeadPictures(rig, people[0].p_world_face_m if people else VIEWER_M)
     made = path.with_name(f".{path.name}")
     try:
         with film_writer(made, (SIZE_PX, SIZE_PX), RATE_HZ) as write:
@@ -190,13 +189,3 @@ def _options(study: LoadedStudy, seconds: float) -> RunOptions:
         mock=True, fast=True, seed=shown.seed, scene=shown.scene, world=shown.world,
         no_pictures=shown.world is not None, seconds=seconds, no_page=True,
     ).checked()  # fmt: skip
-
-
-def _viewer_m(study: LoadedStudy, rig: Rig) -> Vec3:
-    """Return the position of the nose of the person the head looks at."""
-    made = assemble(rig, _options(study, 1.0))
-    try:
-        people = () if made.scene is None else made.scene.people(0.0)
-    finally:
-        made.close()
-    return people[0].p_world_face_m if people else VIEWER_M

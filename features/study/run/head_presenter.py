@@ -6,7 +6,7 @@ to these.
 """
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -66,8 +66,12 @@ class HeadPresenter:
             HeadLost: it cannot be shown.
         """
         head = self._head_for(shown.condition)
+        before, changes = self._condition, dict[str, Value]()
         try:
-            changes = self._changes(shown.condition)
+            if not self._rig:
+                changes = self._study.changes(before, shown.condition)
+            elif before is None:
+                changes = self._study.changes_of_own_rig(shown.condition)
             if changes:
                 head.client.set_many(changes)
         except DriverError as error:
@@ -159,13 +163,6 @@ class HeadPresenter:
         self._rig = rig
         return self.head
 
-    def _changes(self, condition: str) -> Mapping[str, Value]:
-        """Return the changes from the running head to a condition, by dotted key."""
-        before = self._condition
-        if self._rig:
-            return self._study.changes_of_own_rig(condition) if before is None else {}
-        return self._study.changes(before, condition)
-
     def _watch(self) -> None:
         """Keep the report up to date; the target of the watching thread."""
         judge = _HealthMonitor(self._clock)
@@ -202,12 +199,9 @@ class _HealthMonitor:
         if state.stopped:
             return HeadReport("stopped", state.stopped)
         if now_s - self._free_s > _HELD_S:
-            return HeadReport("fault", f"the joints are held: {_listed(state.reasons)}")
+            more = len(state.reasons) - _MOST_REASONS
+            held = "; ".join(state.reasons[:_MOST_REASONS]) + f" and {more} more" * (more > 0)
+            return HeadReport("fault", f"the joints are held: {held}")
         if now_s - self._seen_s > _LATE_S:
             return HeadReport("late", "the head's control loop is not running")
         return HeadReport("alive")
-
-
-def _listed(reasons: Sequence[str]) -> str:
-    more = len(reasons) - _MOST_REASONS
-    return "; ".join(reasons[:_MOST_REASONS]) + (f" and {more} more" if more > 0 else "")

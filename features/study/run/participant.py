@@ -108,17 +108,31 @@ def run_session(
         if session.closed:
             raise SetupError(f"{code} has ended the session already: take another participant")
         journal.write((session.opened(code, sha256, gazerig.__version__, utc_now()),))
-        head = _head(plan, session, folder, clock)
+        head = None
+        if plan.head is not None:
+            head = HeadPresenter(study, plan.head, folder, session.agreed, clock)
         run = StudyRun(code, session, journal, head or FilmPresenter(), clock.now_s, utc_now)
         finished: list[str] = []
-        tokens = _tokens(data.secret(), plan.number)
+
+        def token(who: str) -> str:  # the same after a resumption, so that open pages continue
+            text = f"the page of the {who} of session {plan.number}".encode()
+            return hmac.new(data.secret(), text, hashlib.sha256).hexdigest()[:_TOKEN_DIGITS]
+
         server = StudyServer(
-            run, study.design, plan.address, tokens, plan.films,
+            run, study.design, plan.address, (token("participant"), token("experimenter")),
+            plan.films,
             lambda: finished.append("ended by the experimenter"), head,
         )  # fmt: skip
         try:
             over = _end_action(head, study, journal, folder, say)
-            _open(server, plan)
+            try:
+                server.open()
+            except OSError as error:
+                host, port = plan.address
+                raise SetupError(
+                    f"the pages cannot be served at {host}:{port} ({error.strerror or error}): "
+                    "name another address with --page HOST:PORT"
+                ) from error
             say(f"participant: {server.participant_url}")
             say(f"experimenter: {server.experimenter_url}")
             if browse is not None:
@@ -132,15 +146,6 @@ def run_session(
                 head.close()
         over()
     return "the session is over" if session.closed else f"{why}; the same command goes on with it"
-
-
-def _head(
-    plan: SessionPlan, session: StudySession, folder: Path, clock: Clock
-) -> HeadPresenter | None:
-    """Return the presenter of conditions on the head, None with films."""
-    if plan.head is None:
-        return None
-    return HeadPresenter(plan.study, plan.head, folder, session.agreed, clock)
 
 
 def _end_action(
@@ -164,30 +169,6 @@ def _end_action(
         journal.write(measure_presentations(study, journal.records, folder, say))
 
     return over
-
-
-def _tokens(secret: bytes, number: int) -> tuple[str, str]:
-    """Return the tokens of the participant's and the experimenter's page.
-
-    A resumed session has the same tokens, so that open pages continue.
-    """
-
-    def token(who: str) -> str:
-        text = f"the page of the {who} of session {number}"
-        return hmac.new(secret, text.encode(), hashlib.sha256).hexdigest()[:_TOKEN_DIGITS]
-
-    return token("participant"), token("experimenter")
-
-
-def _open(server: StudyServer, plan: SessionPlan) -> None:
-    try:
-        server.open()
-    except OSError as error:
-        host, port = plan.address
-        raise SetupError(
-            f"the pages cannot be served at {host}:{port} ({error.strerror or error}): name another "
-            "address with --page HOST:PORT"
-        ) from error
 
 
 def _poll_until_stopped(

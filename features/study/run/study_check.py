@@ -1,6 +1,7 @@
 """Complete check of a study, including scenes, worlds, and measures of the report."""
 
 from collections.abc import Iterator
+from functools import partial
 from os.path import isfile
 
 from gazerig.config.export import suggestion
@@ -13,9 +14,9 @@ from gazerig.features.study.rules import objective_rules
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.study_run import WHOLE_SHARE
 from gazerig.robot.analysis.human_norms import BY_KEY
+from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.app.surroundings import surroundings_names
 from gazerig.robot.recording.read import BadRecording, RunRecording
-from gazerig.sim_mock.scenes.registry import scenes
 
 
 def checked_study(name_or_path: str) -> LoadedStudy:
@@ -24,21 +25,18 @@ def checked_study(name_or_path: str) -> LoadedStudy:
     Raises:
         gazerig.config.load.ConfigError: with every fault.
     """
-    return load_study(name_or_path, _surroundings, _objective, _recordings, _films)
-
-
-def _objective(design: StudyDesign) -> Iterator[tuple[str, str]]:
-    """Yield objective measures that neither the page nor the report has."""
-    yield from objective_rules(design, BY_KEY)
+    return load_study(
+        name_or_path, _surroundings, partial(objective_rules, known=BY_KEY), _recordings, _films
+    )
 
 
 def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
     """Yield unknown scenes and worlds."""
     scene, world = design.presentation.scene, design.presentation.world
-    known = scenes()
+    known = scene_names()
     if scene is not None and scene not in known:
         near = suggestion(scene, known) or ";"
-        yield "presentation.scene", f"no scene {scene!r}{near} there is {', '.join(sorted(known))}"
+        yield "presentation.scene", f"no scene {scene!r}{near} there is {', '.join(known)}"
     worlds = surroundings_names()
     if world is not None and "/" not in world and "." not in world and world not in worlds:
         near = suggestion(world, worlds) or ";"

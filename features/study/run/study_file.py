@@ -1,8 +1,8 @@
 """Studies and questionnaires by name or path, checked with their rigs."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from hashlib import sha256
 from os.path import isfile
 from pathlib import Path
@@ -72,33 +72,31 @@ class LoadedStudy:
 
     @cached_property
     def canonical(self) -> bytes:
-        """Return the hashed text: everything that is shown and asked, including defaults."""
-        shown = {key: self._shown(key) for key in self.design.conditions}
+        """Return the hashed text: everything that is shown and asked, including defaults.
+
+        Raises:
+            OSError: a recording or a film does not exist any more.
+        """
+        shown: dict[str, dict[str, object]] = {}
+        for condition, one in self.design.conditions.items():
+            rig = self.rigs[condition]
+            seen: dict[str, object] = {
+                key: value for key, value in values(rig).items() if _section(key) in _GAZE
+            }
+            for key, value in _differences(self.rig, rig).items():
+                if _section(key) not in _MACHINE:
+                    seen[key] = value
+            for name in _ENDS:
+                file = getattr(one, name)
+                if file is not None:
+                    seen[f"{name}_sha256"] = sha256(Path(file).read_bytes()).hexdigest()
+            shown[condition] = seen
         return canonical(self.design, self.questionnaires, shown)
 
     @property
     def sha256(self) -> str:
         """Return the hash for the study's data."""
         return design_sha256(self.canonical)
-
-    def _shown(self, condition: str) -> dict[str, object]:
-        """Return the visible values of a condition by dotted key, and the hashes of its files.
-
-        Raises:
-            OSError: a recording or a film does not exist any more.
-        """
-        rig, one = self.rigs[condition], self.design.conditions[condition]
-        seen: dict[str, object] = {
-            key: value for key, value in values(rig).items() if _section(key) in _GAZE
-        }
-        for key, value in _differences(self.rig, rig).items():
-            if _section(key) not in _MACHINE:
-                seen[key] = value
-        for name in _ENDS:
-            file = getattr(one, name)
-            if file is not None:
-                seen[f"{name}_sha256"] = sha256(Path(file).read_bytes()).hexdigest()
-        return seen
 
 
 def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
@@ -114,9 +112,11 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
     """
     path = _find("studies", name_or_path)
     folder = path.parent
-    checks: list[Check[StudyDesign]] = [design_rules, partial(_asked_faults, folder)]
-    checks += [partial(_rig_faults, folder)]
-    checks += [partial(_check_located, folder, check) for check in further]
+
+    def located(check: Check[StudyDesign]) -> Check[StudyDesign]:
+        return lambda raw: check(_resolve_paths(raw, folder))
+
+    checks = [design_rules, *map(located, (_asked_faults, _rig_faults, *further))]
     design = _resolve_paths(load(path, StudyDesign, checks=checks), folder)
     files = (*design.questionnaires, *design.after)
     design = replace(
@@ -132,12 +132,6 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
         path,
         read_yaml(path).text,
     )
-
-
-def _check_located(
-    folder: Path, check: Check[StudyDesign], raw: StudyDesign
-) -> Iterable[tuple[str, str]]:
-    return check(_resolve_paths(raw, folder))
 
 
 def load_questionnaire(name_or_path: str) -> Questionnaire:
@@ -226,9 +220,8 @@ def _resolve_path(folder: Path, name: str) -> str:
     return str(folder / Path(name).expanduser())
 
 
-def _asked_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
+def _asked_faults(design: StudyDesign) -> Iterator[tuple[str, str]]:
     """Yield unreadable questionnaires, and contradictions with the readable ones."""
-    design = _resolve_paths(raw, folder)
     found: dict[str, Questionnaire] = {}
     for list_name in ("questionnaires", "after"):
         files = getattr(design, list_name)
@@ -245,9 +238,8 @@ def _asked_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
     yield from consistency_rules(keys, found)
 
 
-def _rig_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
+def _rig_faults(design: StudyDesign) -> Iterator[tuple[str, str]]:
     """Yield conditions that cannot be shown at all, or on a running head, or are equal."""
-    design = _resolve_paths(raw, folder)
     try:
         own: Rig | None = load_rig(design.presentation.rig)
     except ConfigError as error:
@@ -262,10 +254,23 @@ def _rig_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
         except ConfigError as error:
             yield from _condition_faults(f"conditions.{key}", one, error)
             continue
-        yield from _file_faults(f"conditions.{key}", one)
+        for name, ending in _ENDS.items():
+            file, at = getattr(one, name), f"conditions.{key}.{name}"
+            if file is not None and not file.endswith(ending):
+                yield at, f"{file} does not end in {ending}; name such a file"
+            elif file is not None and not isfile(file):
+                yield at, f"there is no file {file}; check the name"
         if own is not None:
             yield from _start_faults(design, key, own, rigs[key])
-    yield from _find_equal_conditions(design, rigs)
+    for i, key in enumerate(rigs):
+        for other in list(rigs)[:i]:
+            if _show_same(design, rigs, key, other):
+                rule = (
+                    f"cannot be told apart from {other!r}: both show the same; change a value of "
+                    "one of them, or leave it out"
+                )
+                yield f"conditions.{key}", rule
+                break
 
 
 def _condition_faults(at: str, one: Condition, error: ConfigError) -> Iterator[tuple[str, str]]:
@@ -287,18 +292,6 @@ def _condition_faults(at: str, one: Condition, error: ConfigError) -> Iterator[t
             yield place, f"{more}{fault.rule}"
 
 
-def _file_faults(at: str, one: Condition) -> Iterator[tuple[str, str]]:
-    """Yield missing recordings and films."""
-    for name, ending in _ENDS.items():
-        file = getattr(one, name)
-        if file is None:
-            continue
-        if not file.endswith(ending):
-            yield f"{at}.{name}", f"{file} does not end in {ending}; name such a file"
-        elif not isfile(file):
-            yield f"{at}.{name}", f"there is no file {file}; check the name"
-
-
 def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator[tuple[str, str]]:
     """Yield parameters that cannot change while a head runs from condition to condition."""
     one = design.conditions[key]
@@ -317,22 +310,6 @@ def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator
             f"{name} cannot change while the head runs ({reason}): give the condition a rig of its "
             "own, or show films (presentation.on: film)",
         )
-
-
-def _find_equal_conditions(
-    design: StudyDesign, rigs: Mapping[str, Rig]
-) -> Iterator[tuple[str, str]]:
-    """Yield conditions that show the same as another one."""
-    keys = [key for key in design.conditions if key in rigs]
-    for i, key in enumerate(keys):
-        for other in keys[:i]:
-            if _show_same(design, rigs, key, other):
-                rule = (
-                    f"cannot be told apart from {other!r}: both show the same; change a value of "
-                    "one of them, or leave it out"
-                )
-                yield f"conditions.{key}", rule
-                break
 
 
 def _show_same(design: StudyDesign, rigs: Mapping[str, Rig], key: str, other: str) -> bool:

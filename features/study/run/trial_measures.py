@@ -4,7 +4,7 @@ The participant is the nearest person. The detectors decide from the face and ey
 participant looks at the head (``Face.looks_at_head``); times of uncertainty do not count.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from math import degrees, isfinite, nan
 from pathlib import Path
 
@@ -24,7 +24,6 @@ from gazerig.features.study.records import (
 )
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.gaze.angles import add, norm, scale, sub
-from gazerig.gaze.types import Face
 from gazerig.robot.analysis.gaze_on_face import on_face
 from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.analysis.mutual_gaze import HALF_HIGH_M, HALF_WIDE_M
@@ -62,7 +61,12 @@ def measure_presentations(
         ends = [one for one in wanted if one.recording == name]
         try:
             with used(folder / name):
-                runs = _split_ticks(RunRecording(folder / name).ticks(), ends)
+                # The ticks of each presentation and those shortly before it, in one pass.
+                runs: list[list[Tick]] = [[] for _ in ends]
+                for tick in RunRecording(folder / name).ticks():
+                    for end, mine in zip(ends, runs, strict=True):
+                        if end.from_s - SWITCH_S <= tick.t_s <= end.to_s:
+                            mine.append(tick)
         except SetupError as error:
             say(str(error))
             continue
@@ -71,16 +75,6 @@ def measure_presentations(
             values = _values(study.design.objective, ticks, end.from_s)
             found.append(Measured(end.trial, condition, values, end.side, end.attempt))
     return tuple(found)
-
-
-def _split_ticks(ticks: Iterator[Tick], ends: Sequence[TrialEnded]) -> list[list[Tick]]:
-    """Return the ticks of each presentation, and those shortly before it, in one pass."""
-    cut: list[list[Tick]] = [[] for _ in ends]
-    for tick in ticks:
-        for one, mine in zip(ends, cut, strict=True):
-            if one.from_s - SWITCH_S <= tick.t_s <= one.to_s:
-                mine.append(tick)
-    return cut
 
 
 def _values(names: Sequence[str], ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
@@ -118,13 +112,21 @@ def participant_gaze_measures(ticks: Sequence[Tick], from_s: float) -> dict[str,
     known = looks = both = 0
     first_s = nan
     for tick in ticks:
-        face = _participant(tick)
-        if face is None or face.looks_at_head is None:
+        if tick.percept is None or not tick.percept.faces:
+            continue
+        head_m = tick.pose.p_world_head_m
+        away_m = [norm(sub(face.p_world_m, head_m)) for face in tick.percept.faces]
+        face = tick.percept.faces[away_m.index(min(away_m))]
+        if face.looks_at_head is None:
             continue
         known += 1
         if face.looks_at_head:
             looks += 1
-            both += _is_looking_at(tick, face)
+            elapsed_s = max(0.0, tick.t_s - tick.percept.captured_s)
+            p_m = add(face.p_world_m, scale(face.v_world_m_s, elapsed_s))
+            point = on_face(head_m, cyclopean(tick), p_m, face.R_world_face)
+            if point is not None:  # inside the oval of the face
+                both += (point[0] / HALF_WIDE_M) ** 2 + (point[1] / HALF_HIGH_M) ** 2 <= 1.0
             first_s = first_s if isfinite(first_s) else tick.t_s - from_s
     share = 1.0 / known if known else nan
     return {
@@ -132,20 +134,3 @@ def participant_gaze_measures(ticks: Sequence[Tick], from_s: float) -> dict[str,
         "participant_gaze_share": looks * share,
         "first_look_s": first_s,
     }
-
-
-def _participant(tick: Tick) -> Face | None:
-    """Return the nearest face, None without a face."""
-    faces = tick.percept.faces if tick.percept is not None else ()
-    head = tick.pose.p_world_head_m
-    return min(faces, key=lambda face: norm(sub(face.p_world_m, head)), default=None)
-
-
-def _is_looking_at(tick: Tick, face: Face) -> bool:
-    """Return whether the head's measured gaze is inside the oval of a face."""
-    elapsed_s = max(0.0, tick.t_s - (tick.percept.captured_s if tick.percept is not None else 0.0))
-    p_m = add(face.p_world_m, scale(face.v_world_m_s, elapsed_s))
-    point = on_face(tick.pose.p_world_head_m, cyclopean(tick), p_m, face.R_world_face)
-    return (
-        point is not None and (point[0] / HALF_WIDE_M) ** 2 + (point[1] / HALF_HIGH_M) ** 2 <= 1.0
-    )

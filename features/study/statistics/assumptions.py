@@ -1,6 +1,5 @@
 """Assumptions of the tests, checked on the data."""
 
-from collections.abc import Iterator
 from math import isfinite, nan
 from typing import NamedTuple
 
@@ -38,42 +37,27 @@ def difference_checks(
         differences: (n,) one per participant.
         better_first: (n,) whether the condition expected to be better was seen first.
     """
-    return [
-        *_symmetry(differences), *_normality(differences), *_order(differences, better_first),
-    ]  # fmt: skip
-
-
-def _symmetry(d: Floats) -> Iterator[AssumptionCheck]:
-    """Check the symmetry of the differences: signed ranks assume it."""
-    if len(d) < _LEAST_SKEW or np.ptp(d) == 0.0:
-        return
-    p = float(stats.skewtest(d).pvalue)
-    words = f"skewness {float(stats.skew(d)):.2f}"
-    if p < _LEVEL:
-        words += ": the signed-rank test may answer to the skew; see the counts"
-    yield AssumptionCheck("differences are symmetric (signed-rank)", p, p >= _LEVEL, words)
-
-
-def _normality(d: Floats) -> Iterator[AssumptionCheck]:
-    if len(d) < _LEAST_NORMAL or np.ptp(d) == 0.0:
-        return
-    found = stats.shapiro(d)
-    p = float(found.pvalue)
-    words = f"Shapiro-Wilk W = {float(found.statistic):.3f}"
-    if p < _LEVEL:
-        words += ": read d_z as a description; the tests by ranks do not need it"
-    yield AssumptionCheck("differences are normal (d_z)", p, p >= _LEVEL, words)
-
-
-def _order(d: Floats, better_first: NDArray[np.bool_]) -> Iterator[AssumptionCheck]:
-    """Check that the order of the conditions makes no difference."""
+    d, checks = differences, list[AssumptionCheck]()
+    differ = len(d) > 0 and np.ptp(d) > 0.0
+    if len(d) >= _LEAST_SKEW and differ:
+        p = float(stats.skewtest(d).pvalue)
+        words = f"skewness {float(stats.skew(d)):.2f}"
+        if p < _LEVEL:
+            words += ": the signed-rank test may answer to the skew; see the counts"
+        what = "differences are symmetric (signed-rank)"
+        checks.append(AssumptionCheck(what, p, p >= _LEVEL, words))
+    if len(d) >= _LEAST_NORMAL and differ:
+        found = stats.shapiro(d)
+        p = float(found.pvalue)
+        words = f"Shapiro-Wilk W = {float(found.statistic):.3f}"
+        if p < _LEVEL:
+            words += ": read d_z as a description; the tests by ranks do not need it"
+        checks.append(AssumptionCheck("differences are normal (d_z)", p, p >= _LEVEL, words))
     first, second = d[better_first], d[~better_first]
     what = "the order of the conditions does not matter"
     if not len(first) or not len(second):
-        yield AssumptionCheck(
-            what, nan, False, "all saw them in one order: it cannot be told apart"
-        )
-        return
+        words = "all saw them in one order: it cannot be told apart"
+        return [*checks, AssumptionCheck(what, nan, False, words)]
     p = exact_rank_sum(second, first)
     if not isfinite(p):
         p = float(stats.mannwhitneyu(first, second, method="asymptotic").pvalue)
@@ -82,7 +66,7 @@ def _order(d: Floats, better_first: NDArray[np.bool_]) -> Iterator[AssumptionChe
     )
     if p < _LEVEL:
         words += ": the first impression weighs; compare first presentations alone"
-    yield AssumptionCheck(what, p, p >= _LEVEL, words)
+    return [*checks, AssumptionCheck(what, p, p >= _LEVEL, words)]
 
 
 def range_check(ratings: Floats, points: int) -> AssumptionCheck:

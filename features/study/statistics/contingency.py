@@ -49,7 +49,10 @@ def chi_square(
     if dropped := table.shape[1] - kept.shape[1]:
         which = ", ".join(str(k + 1) for k in np.flatnonzero(table.sum(axis=0) == 0))
         notes.append(f"{dropped} of {table.shape[1]} columns are empty and dropped ({which})")
-    n, least = int(kept.sum()), _least_probability(table.sum(axis=1))
+    n, first = int(kept.sum()), int(table[0].sum())
+    # The least exact probability is that of rows that share no column, two columns in all; for
+    # rows of equal length the reversed table is as extreme.
+    least = min(1.0, (2.0 if 2 * first == n else 1.0) / float(special.binom(n, first)))
     if kept.shape[1] < 2:
         nothing, same = no_effect("Cramér's V", "V"), (*notes, "all answers are the same")
         return StatisticalTest("chi_square", "χ²", 0.0, nan, 1.0, 1.0, least, n, nothing, same)
@@ -60,13 +63,6 @@ def chi_square(
         "chi_square", "χ²", float(found.statistic), float(found.dof), float(found.pvalue),
         exact_chance(kept), least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
     )  # fmt: skip
-
-
-def _least_probability(rows: Counts) -> float:
-    """Return the exact probability of rows that share no column, two columns in all."""
-    n, first = int(rows.sum()), int(rows[0])
-    # For rows of equal length the reversed table is as extreme.
-    return min(1.0, (2.0 if 2 * first == n else 1.0) / float(special.binom(n, first)))
 
 
 def exact_chance(table: Counts) -> float:
@@ -84,13 +80,8 @@ def exact_chance(table: Counts) -> float:
         seen = float(_distance(table[:1], columns, int(table[0].sum()))[0])
         extreme = distances >= seen * (1.0 - 1e-12) - 1e-12
         return min(1.0, float(chances[extreme].sum()))
-    drawn = stats.random_table(table.sum(axis=1), columns, seed=np.random.default_rng(_SEED))
-    tables = drawn.rvs(size=_DRAWS)
-    expected = np.outer(table.sum(axis=1), columns) / table.sum()
-    seen = float((((table - expected) ** 2) / expected).sum())
-    distances = (((tables - expected) ** 2) / expected).sum(axis=(1, 2))
-    as_far = int(np.count_nonzero(distances >= seen * (1.0 - 1e-12)))
-    return (as_far + 1.0) / (_DRAWS + 1.0)
+    drawn = stats.MonteCarloMethod(n_resamples=_DRAWS, rng=np.random.default_rng(_SEED))
+    return float(stats.chi2_contingency(table, correction=False, method=drawn).pvalue)
 
 
 def _tables(columns: Counts, row: int) -> tuple[Counts, Floats]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from math import isfinite, nan, sqrt
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import special, stats
 
 from gazerig.features.study.statistics.results import EffectSize
 from gazerig.gaze.types import Floats
@@ -17,7 +17,7 @@ from gazerig.gaze.types import Floats
 RESAMPLES = 2000
 SEED = 20020401
 _BCA = "BCa bootstrap"
-_MOST_NONCENTRAL = 1e5
+_NO_CENTRE = 1e-9
 
 Along = Callable[..., Floats]
 """Samples (..., n), each along its last axis -> statistics (...)."""
@@ -131,24 +131,12 @@ def cramers_v(chi2: float, n: int, shape: tuple[int, int]) -> EffectSize:
     if df < 1 or width < 1 or not isfinite(chi2):
         return EffectSize("Cramér's V", "V", nan, nan, nan, "none")
     value = sqrt(chi2 / width)
-    low, high = (_noncentrality(chi2, df, share) for share in (0.975, 0.025))
-    bounds = (0.0 if low == 0.0 else sqrt((low + df) / width), sqrt((high + df) / width))
+    low, high = special.chndtrinc(chi2, df, (0.975, 0.025))  # the noncentralities, 0 at the least
+    bounds = (0.0 if low < _NO_CENTRE else sqrt((low + df) / width), sqrt((high + df) / width))
     method = "noncentral chi-square"
     return EffectSize(
         "Cramér's V", "V", value, min(value, bounds[0]), max(value, min(1.0, bounds[1])), method
     )
-
-
-def _noncentrality(chi2: float, df: int, share: float) -> float:
-    """Return the noncentrality with a CDF of ``share`` at chi2, 0 if none is that small."""
-
-    def beyond(centre: float) -> float:
-        return float(stats.ncx2.cdf(chi2, df, centre) if centre else stats.chi2.cdf(chi2, df))
-
-    if beyond(0.0) <= share:
-        return 0.0
-    most = 2.0 * chi2 + 100.0
-    return float(optimize.brentq(lambda c: beyond(c) - share, 0.0, min(most, _MOST_NONCENTRAL)))
 
 
 def bootstrap_interval(

@@ -115,7 +115,10 @@ def signed_rank(
     """
     d = np.asarray(differences, float)
     kept = int(np.count_nonzero(d))
-    notes = _zero_notes(len(d) - kept, len(d), zeros)
+    notes: tuple[str, ...] = ()
+    if kept < len(d):
+        done = "left out (Wilcoxon)" if zeros == "wilcox" else "ranked, then left out (Pratt)"
+        notes = (f"{len(d) - kept} of {len(d)} differences are zero and are {done}",)
     least = min(1.0, (2.0 if two_sided else 1.0) * 0.5 ** len(d))
     if not kept:
         nothing = no_effect("matched rank-biserial correlation", "r")
@@ -128,13 +131,6 @@ def signed_rank(
         "signed_rank", "T", float(found.statistic), nan, float(found.pvalue),
         exact_signed_rank(d, two_sided, zeros), least, len(d), effects.rank_biserial(d), notes,
     )  # fmt: skip
-
-
-def _zero_notes(zeros: int, n: int, way: Zeros) -> tuple[str, ...]:
-    if not zeros:
-        return ()
-    done = "left out (Wilcoxon)" if way == "wilcox" else "ranked, then left out (Pratt)"
-    return (f"{zeros} of {n} differences are zero and are {done}",)
 
 
 def exact_signed_rank(
@@ -199,8 +195,8 @@ def sign(differences: Floats, two_sided: bool = True) -> StatisticalTest:
 def friedman(rows: Floats) -> StatisticalTest:
     """Test whether conditions differ: Friedman's test, with ties.
 
-    The exact probability is that of 9999 orders of the answers within participants, drawn with a
-    fixed seed.
+    The exact probability is that of all orders of the answers within participants, or of 9999
+    orders drawn with a fixed seed if there are more.
 
     Args:
         rows: (participants, conditions), three conditions or more.
@@ -218,25 +214,21 @@ def friedman(rows: Floats) -> StatisticalTest:
         same = ("every participant answered alike everywhere",)
         return StatisticalTest("friedman", "χ²", 0.0, k - 1, 1.0, 1.0, least, n, effect, same)
     found = stats.friedmanchisquare(*rows.T)
-    return StatisticalTest(
-        "friedman", "χ²", float(found.statistic), k - 1, float(found.pvalue),
-        _permuted_friedman(rows), least, n, effect,
+
+    def agreement(*columns: Floats, axis: int) -> Floats:
+        """Return the sum of the squared rank sums."""
+        squares: Floats = (np.sum(columns, axis=axis) ** 2).sum(axis=0)
+        return squares
+
+    exact = stats.permutation_test(
+        stats.rankdata(rows, axis=1).T, agreement, permutation_type="samples", vectorized=True,
+        n_resamples=_PERMUTATIONS, batch=max(1, _AT_ONCE // rows.size), alternative="greater",
+        rng=np.random.default_rng(_SEED),
     )  # fmt: skip
-
-
-def _permuted_friedman(rows: Floats) -> float:
-    """Return the share of shuffles within participants that agree at least as much."""
-    ranks: NDArray[np.float64] = stats.rankdata(rows, axis=1)
-    rng = np.random.default_rng(_SEED)
-    seen = float((ranks.sum(axis=0) ** 2).sum())
-    each = max(1, _AT_ONCE // ranks.size)
-    as_much = 0
-    for start in range(0, _PERMUTATIONS, each):
-        count = min(each, _PERMUTATIONS - start)
-        shuffled = rng.permuted(np.broadcast_to(ranks, (count, *ranks.shape)), axis=2)
-        sums = (shuffled.sum(axis=1) ** 2).sum(axis=1)
-        as_much += int(np.count_nonzero(sums >= seen - 1e-9))
-    return (as_much + 1.0) / (_PERMUTATIONS + 1.0)
+    return StatisticalTest(
+        "friedman", "χ²", float(found.statistic), k - 1, float(found.pvalue), float(exact.pvalue),
+        least, n, effect,
+    )  # fmt: skip
 
 
 def _side(two_sided: bool) -> str:
