@@ -14,7 +14,7 @@ from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.reachability import look_reply, reached_joints
-from gazerig.robot.model.command_checks import check
+from gazerig.robot.model.command_json import check
 from gazerig.robot.model.commands import LookAt
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.reply import JointReply

@@ -110,12 +110,7 @@ class LocalHead(Head):
         return order
 
     def _active_run(self) -> session.ComposedRun:
-        """Return the run.
-
-        Raises:
-            Error: it has not started.
-            HeadEnded: it has ended.
-        """
+        """Return the run."""
         if self._ended:
             raise HeadEnded(f"the head has ended: {self._ended}")
         if self._composed is None:

@@ -31,11 +31,7 @@ class OrderHost(Protocol):
         ...
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Let the head's time pass until a condition is true, or at most ``seconds``.
-
-        Raises:
-            HeadEnded: the head has ended in the meantime.
-        """
+        """Let the head's time pass until a condition is true, or at most ``seconds``."""
         ...
 
     def _release_control(self) -> None:

@@ -7,7 +7,7 @@ import dataclasses
 import types
 import typing
 import unicodedata
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from functools import cache, partial
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -93,7 +93,10 @@ def model_of(params: type) -> type[BaseModel]:
     declared = {f.name: f for f in dataclasses.fields(params) if f.init}
     columns: dict[str, Any] = {}
     for name, shape in shapes_of(params).items():
-        column: dict[str, Any] = {"description": _described(shape) or None}
+        described = shape.description  # with its unit, for an editor's hover text
+        if shape.unit:
+            described = f"{described} [{shape.unit}]".strip()
+        column: dict[str, Any] = {"description": described or None}
         if shape.unit:
             column["json_schema_extra"] = {"unit": shape.unit}
         if declared[name].default is not dataclasses.MISSING:
@@ -130,6 +133,16 @@ def shapes_of(params: type) -> dict[str, Shape]:
         name: _shape(declared, declared.kind, f"{params.__qualname__}.{name}")
         for name, declared in declarations(params).items()
     }
+
+
+def shape_at(shape: Shape, steps: Iterable[str]) -> Shape | None:
+    """Return the shape at a path below another; None if no such key exists."""
+    for step in steps:
+        below = shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
+        if below is None:
+            return None
+        shape = below
+    return shape
 
 
 def _shape(declared: Declaration, kind: Any, place: str) -> Shape:
@@ -204,7 +217,9 @@ def _printable(text: str) -> str:
         raise PydanticCustomError(
             "value_error", "", {"error": f"is longer than {_LONGEST_TEXT} characters; shorten it"}
         )
-    strange = next((one for one in text if _is_unshowable(one)), None)
+    # Controls, halves of characters, ends of lines, turns of the text's direction.
+    kinds = ("Cc", "Cs", "Zl", "Zp")
+    strange = next((c for c in text if unicodedata.category(c) in kinds or c in _TURNS), None)
     if strange is not None:
         raise PydanticCustomError(
             "value_error",
@@ -212,11 +227,6 @@ def _printable(text: str) -> str:
             {"error": f"holds U+{ord(strange):04X}, which cannot be shown; take it out"},
         )
     return text
-
-
-def _is_unshowable(one: str) -> bool:
-    """Whether a character is a control, half of one, ends a line or turns the text's direction."""
-    return unicodedata.category(one) in ("Cc", "Cs", "Zl", "Zp") or one in _TURNS
 
 
 def _exact(shape: Shape, value: object) -> object:
@@ -238,11 +248,6 @@ def _build(params: type, value: object, validate: Callable[[object], BaseModel])
 def _adapter(params: type) -> TypeAdapter[Any]:
     """Return the validator of a whole file."""
     return TypeAdapter(_frozen(params))
-
-
-def _described(shape: Shape) -> str:
-    """Return the description of a value with its unit, for an editor's hover text."""
-    return f"{shape.description} [{shape.unit}]".strip() if shape.unit else shape.description
 
 
 def _miscounted(details: ErrorDetails) -> bool:

@@ -93,7 +93,9 @@ def read(
         faults.append(_syntax(file, text, error))
     else:
         if isinstance(node, MappingNode):
-            if known and not _has_one_of(node, known):
+            keys = [key.value for key, _ in node.value[:1000] if isinstance(key, ScalarNode)]
+            # A key may be misspelt.
+            if known and not any(k in known or get_close_matches(k[:60], known, 1) for k in keys):
                 rule = f"is no such configuration: none of its keys is one of {', '.join(known)}"
                 faults.append(ConfigFault(file, _line(node), "", "", rule))
                 return text, None
@@ -104,12 +106,6 @@ def read(
         line = 1 if node is None else _line(node)
         faults.append(ConfigFault(file, line, "", "", f"{rule}; write 'key: value' lines"))
     return text, None
-
-
-def _has_one_of(node: MappingNode, known: Collection[str]) -> bool:
-    """Whether a key of the top level is a known one, or nearly."""
-    keys = [key.value for key, _ in node.value[:1000] if isinstance(key, ScalarNode)]
-    return any(key in known or get_close_matches(key[:60], known, n=1) for key in keys)
 
 
 class _TooMany(MarkedYAMLError):

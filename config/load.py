@@ -239,16 +239,16 @@ def _by_default(into: type | None, key: str, shape: Shape | None, above: Entry) 
         return None
     made = cast(Any, into).__dataclass_fields__[key].default_factory
     values = made() if made is not MISSING else {}
-    entries = {name: _entries(asdict(value), above) for name, value in values.items()}
+    entries = {name: entries_at(asdict(value), above) for name, value in values.items()}
     return Entry(entries, above.file, above.line)
 
 
-def _entries(value: Any, at: Entry) -> Entry:
+def entries_at(value: Any, at: Entry) -> Entry:
     """Return plain values as entries of the place of another."""
     if isinstance(value, dict):
-        value = {key: _entries(one, at) for key, one in value.items()}
+        value = {key: entries_at(one, at) for key, one in value.items()}
     elif isinstance(value, tuple):
-        value = tuple(_entries(one, at) for one in value)
+        value = tuple(entries_at(one, at) for one in value)
     return Entry(value, at.file, at.line)
 
 

@@ -1,10 +1,10 @@
 """The text of a new rig's file: the shortest that works, from a few answers. Pure."""
 
-import json
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
+
+from gazerig.config.save_text import written
 
 BOARDS: Mapping[str, str] = {
     "dynamixel": "Dynamixel servos on a U2D2, an OpenRB-150 or another adaptor",
@@ -94,8 +94,6 @@ class _Board(NamedTuple):
     gaze: tuple[str, ...] = ()
 
 
-_WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
-"""What YAML may read as something else than text."""
 _NECKLESS_GAZE = (
     "idle: {reach_deg: 28, glance_yaw_deg: 24, glance_pitch_deg: 9, search_aside_deg: 14}"
 )
@@ -167,9 +165,9 @@ def joints_of(text: str) -> tuple[str, ...]:
 def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
     there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` shows it"
     yield f"# A head of {len(new.joints)} servos. All keys, with units and ranges: docs/parameters.md."
-    yield f"name: {_scalar(new.name)}"
+    yield f"name: {written(new.name)}"
     yield "profile: robot"
-    yield f"bus: {{{board.bus}, port: {_scalar(new.port or board.port)}}}  # port: {there}"
+    yield f"bus: {{{board.bus}, port: {written(new.port or board.port)}}}  # port: {there}"
     yield "# Measure in mm: the eyes' centres ahead of and above the neck's pitch axis (or the table)."
     height, ahead, above = (70, 38, 55) if new.has_neck else (0, 0, 90)
     yield "geometry:"
@@ -188,12 +186,6 @@ def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
     if gaze:
         yield "gaze:  # what differs from a head with a neck and fast servos"
         yield from (f"  {line}" for line in gaze)
-
-
-def _scalar(text: str) -> str:
-    """Return a text as YAML, in quotes if it could be read as anything else."""
-    plain = re.fullmatch(r"/?[A-Za-z][\w./-]*", text) and text.lower() not in _WORDS
-    return text if plain else json.dumps(text, ensure_ascii=False)
 
 
 def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:

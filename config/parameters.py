@@ -13,9 +13,9 @@ from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import Any
 
-from gazerig.config.bounds import Shape, shapes_of, validate
+from gazerig.config.bounds import Shape, shape_at, shapes_of, validate
 from gazerig.config.export import abbreviated, suggestion
-from gazerig.config.load import ConfigError, ConfigFault, Entry, validate_entries
+from gazerig.config.load import ConfigError, ConfigFault, Entry, entries_at, validate_entries
 from gazerig.config.plugin_sections import extended
 from gazerig.config.rig import GazeConfig, Rig
 from gazerig.config.schema import RULES
@@ -134,7 +134,8 @@ def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     data, faults = plain(rig), []
     for key, value in changes.items():
         faults += _put(_root(rig), data, key, _frozen(value))
-    outcome = validate_entries(Rig, _entries(data), RULES)
+    unnamed = Entry(None, "", 0)  # as if read from a file without a name
+    outcome = validate_entries(Rig, entries_at(data, unnamed), RULES)
     made, found = outcome
     faults += [dataclasses.replace(fault, line=None) for fault in found]
     if faults or made is None:
@@ -276,11 +277,7 @@ def _at(rig: Rig, key: str) -> Value:
 
 def _is_group(rig: Rig, key: str) -> bool:
     """Return whether a key holds keys of its own in a file."""
-    shape: Shape | None = _root(rig)
-    for step in key.split("."):
-        if shape is None:
-            return False
-        shape = shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
+    shape = shape_at(_root(rig), key.split("."))
     return shape is not None and (shape.params is not None or shape.form == "mapping")
 
 
@@ -347,12 +344,3 @@ def _frozen(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _frozen(item) for key, item in value.items()}
     return value
-
-
-def _entries(value: Any) -> Entry:
-    """Return values as entries, as if read from a file without a name."""
-    if isinstance(value, dict):
-        return Entry({key: _entries(item) for key, item in value.items()}, "", 0)
-    if isinstance(value, tuple):
-        return Entry(tuple(_entries(item) for item in value), "", 0)
-    return Entry(value, "", 0)

@@ -154,11 +154,7 @@ def _with_sections(base: type[T], group: str, key: str, names: tuple[str, ...]) 
 
 
 def _section(group: str, name: str) -> tuple[str, Any, Any]:
-    """Return the field of a part's section.
-
-    Raises:
-        PluginError: the part cannot be used.
-    """
+    """Return the field of a part's section."""
     label = find(group, name).label
     part = load(group, name, _PARTS[group])
     if not _NAME.fullmatch(name):

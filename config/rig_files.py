@@ -78,7 +78,12 @@ def save_over(
         gazerig.config.load.ConfigError: see gazerig.config.save.save.
     """
     check = partial(load_rig, character=layers.character, profile=layers.profile)
-    saved = save(Path(layers.name), wanted, now, check, Rig, None if _is_good(layers) else good)
+    base = None
+    try:
+        load_rig(*layers)
+    except ConfigError:
+        base = good
+    saved = save(Path(layers.name), wanted, now, check, Rig, base)
     paths = tuple(layers_of(*layers))
     return saved, RigFiles(paths, _texts(paths))
 
@@ -118,7 +123,12 @@ def save_copy(
     if layers.name in shipped_names("rigs"):
         copy_shipped(layers.name, to)
     else:
-        _copy(good, Path(to))
+        try:
+            with Path(to).open("xb") as new:
+                new.write(good)
+        except OSError as error:
+            rule = f"cannot be written: {error.strerror}; check it and its folder"
+            raise ConfigError([ConfigFault(to, None, "", "", rule)]) from error
     try:
         return save_over(layers._replace(name=to), good, wanted, now)
     except ConfigError as error:
@@ -132,26 +142,8 @@ def save_copy(
         ) from None
 
 
-def _is_good(layers: RigLayers) -> bool:
-    """Whether a rig's file, as it is now, can be loaded."""
-    try:
-        load_rig(*layers)
-    except ConfigError:
-        return False
-    return True
-
-
 def _texts(paths: tuple[Path, ...]) -> tuple[bytes, ...]:
     try:
         return tuple(read_limited(path, _LARGEST) for path in paths)
     except OSError:
         return ()  # its faults are reported when it is loaded
-
-
-def _copy(text: bytes, to: Path) -> None:
-    try:
-        with to.open("xb") as new:
-            new.write(text)
-    except OSError as error:
-        rule = f"cannot be written: {error.strerror}; check it and its folder"
-        raise ConfigError([ConfigFault(str(to), None, "", "", rule)]) from error

@@ -75,7 +75,7 @@ def save(
             is refused, or another layer overrides it.
     """
     target = Path(os.path.realpath(path))
-    # Refuse a file inside the installed package: an update would overwrite it.
+    # An update of the package would overwrite a file inside it.
     package = Path(os.path.realpath(SHIPPED))
     if package in target.parents:
         raise _fault(
@@ -87,7 +87,6 @@ def save(
     if text == before:
         return SavedFile(target, None, ())
     with _errors_named(target), _beside(target, text) as fresh:
-        # Load the new file and check that it has every value.
         try:
             loaded = check(str(fresh))
         except ConfigError as error:
@@ -98,7 +97,9 @@ def save(
             raise ConfigError(named) from None
         for key, value in changes.items():
             held = _follow(loaded, key)
-            if held is not _ABSENT and not _same(held, value):
+            if held is not _ABSENT and isinstance(value, list | tuple):
+                held, value = list(held), list(value)
+            if held is not _ABSENT and held != value:
                 raise _fault(
                     target,
                     f"{key} stays {held} whatever this file says: a later layer sets it",
@@ -211,12 +212,6 @@ def _leaves(value: Any, path: str = "") -> dict[str, Any]:
     for key, item in value.items():
         found |= _leaves(item, f"{path}.{key}" if path else key)
     return found
-
-
-def _same(held: Any, value: Value) -> bool:
-    if isinstance(value, list | tuple):
-        return list(held) == list(value)
-    return bool(held == value)
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from gazerig.config.bounds import Shape, shapes_of
+from gazerig.config.bounds import Shape, shape_at
 from gazerig.config.entries import composed
 from gazerig.config.gestures import GestureSet, gesture_name, gesture_path, load_gesture
 from gazerig.config.load import load
@@ -202,17 +202,11 @@ def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> 
     end = text.find("\n", at)
     end = len(text) if end < 0 else end
     at = end - 1 if end > at and text[end - 1] == "\r" else end
-    lines = _block(steps, depth, indent, value, into)
-    return _Edit(at, at, "".join(f"{newline}{line}" for line in lines))
-
-
-def _block(steps: list[str], depth: int, indent: int, value: Value, into: type) -> list[str]:
-    """Return the lines of a new key and of the new mappings above it."""
     lines = []
     for n in range(depth, len(steps)):
         body = f"{steps[n]}:" if n < len(steps) - 1 else f"{steps[n]}: {written(value)}"
         lines += _explained(body, comment(into, steps[: n + 1]), " " * (indent + 2 * (n - depth)))
-    return lines
+    return _Edit(at, at, "".join(f"{newline}{line}" for line in lines))
 
 
 def _explained(body: str, description: str, indent: str) -> list[str]:
@@ -228,15 +222,9 @@ def _explained(body: str, description: str, indent: str) -> list[str]:
 
 def comment(into: type, steps: list[str]) -> str:
     """Return unit, range and meaning of the key at a path; "" if no such key exists."""
-    shape: Shape | None = Shape("params", params=into)
-    for step in steps:
-        if shape is None:
-            return ""
-        shape = shapes_of(shape.params).get(step) if shape.params is not None else shape.inner
-    return _described(shape) if shape is not None else ""
-
-
-def _described(shape: Shape) -> str:
+    shape = shape_at(Shape("params", params=into), steps)
+    if shape is None:
+        return ""
     inner = shape.inner or shape
     limits = " | ".join(map(str, inner.choices))
     if inner.low is not None and inner.high is not None:

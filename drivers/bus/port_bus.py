@@ -129,11 +129,7 @@ class PortBus(ABC):
         self._port.closePort()
 
     def _reachable(self, now_s: float) -> bool:
-        """Reopen the port if needed; return whether it is open and no torque release is pending.
-
-        Raises:
-            BusLost: it has been lost for longer than ``give_up_s``.
-        """
+        """Reopen the port if needed; return whether it is open and no torque release is pending."""
         self._now_s = now_s
         if self._link.down and not self._link.try_reopen(now_s):
             return False
@@ -145,11 +141,7 @@ class PortBus(ABC):
         return True
 
     def _switch_all_off(self) -> None:
-        """Switch all torque off, verify it, and report the servos that keep it.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Switch all torque off, verify it, and report the servos that keep it."""
         try:
             released = self._switch_off()
         except BusLost as lost:

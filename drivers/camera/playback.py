@@ -108,11 +108,7 @@ class Recording:
         return bytes(Message.read(ReadDataStream(BytesIO(content)), place.length).data)
 
     def _index(self) -> bool:
-        """Index the frames; return whether the file was closed properly.
-
-        Raises:
-            CameraError: a record is invalid.
-        """
+        """Index the frames; return whether the file was closed properly."""
         try:
             waiting: dict[str, _MessagePlace] = {}
             stamp_ns = -1

@@ -1,4 +1,4 @@
-"""Suppression of OpenCV's messages on the terminal, as ours report the same in one line."""
+"""Suppression of libraries' messages on the terminal, as ours report the same in one line."""
 
 import os
 from collections.abc import Iterator
@@ -20,3 +20,16 @@ def quiet_opencv() -> Iterator[None]:
         yield
     finally:
         cv2.utils.logging.setLogLevel(level)
+
+
+@contextmanager
+def quiet_stderr() -> Iterator[None]:
+    """Suppress what native code writes to the terminal for the duration of a with block."""
+    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nothing)

@@ -201,11 +201,7 @@ def _check_forward(number: int, least: int) -> None:
 
 
 def _frozen(image: Any, path: Path) -> ImageArray:
-    """Return a frame as a read-only BGR array.
-
-    Raises:
-        CameraError: the file has another pixel format.
-    """
+    """Return a frame as a read-only BGR array."""
     pixels = to_bgr(image)
     if pixels is None:
         raise CameraError(f"{path} holds pictures of an unknown kind: convert it to mp4 or png")

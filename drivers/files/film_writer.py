@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 
+from gazerig.drivers.camera.quiet_opencv import quiet_stderr
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import ImageArray
 
@@ -32,7 +33,7 @@ def film_writer(
     os.environ[_OPTIONS] = f"b;{_BITS_PER_S}|deadline;good|auto-alt-ref;0"
     try:
         code = cv2.VideoWriter.fourcc(*_CODEC)
-        with _without_stderr():
+        with quiet_stderr():  # OpenCV claims that WebM does not support its codec VP8
             writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px)
     finally:
         if before is None:
@@ -61,16 +62,3 @@ def film_seconds(path: Path | str) -> float:
         return count / rate_hz
     finally:
         reader.release()
-
-
-@contextmanager
-def _without_stderr() -> Iterator[None]:
-    """Suppress messages of native code: OpenCV claims that WebM does not support its codec VP8."""
-    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nothing, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nothing)

@@ -109,11 +109,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
 
 
 def _enable_channel(board: Board, channel: Channel, pulse: int) -> None:
-    """Enable one channel.
-
-    Raises:
-        ServoMissing: it does not accept its goal.
-    """
+    """Enable one channel."""
     for _ in range(TRIES):
         outcome = hold_channel(board, channel, pulse)
         if outcome is HoldResult.HELD:

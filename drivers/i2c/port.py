@@ -124,11 +124,7 @@ class I2cPort:
                     self._waiting += bytes(message)
 
     def _check_free(self, address: int) -> None:
-        """Check that no kernel driver has claimed an address.
-
-        Raises:
-            BusLost: one has; the message contains the remedy.
-        """
+        """Check that no kernel driver has claimed an address."""
         if self._bus.fd is None or address in self._checked:
             return
         try:

@@ -176,11 +176,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return self._read_rest(b"", length, deadline_s)
 
     def _read_rest(self, got: bytes, length: int, deadline_s: float) -> bytes:
-        """Read until there are ``length`` bytes, or the deadline.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Read until there are ``length`` bytes, or the deadline."""
         while len(got) < length and self._wait(deadline_s):
             more = self._take(length - len(got))
             got = got + more if got else more

@@ -168,11 +168,7 @@ class SmartServoBus(PortBus):
     def _confirm_doubtful(
         self, replies: dict[int, ServoReply], now_s: float
     ) -> dict[int, ServoReply]:
-        """Read servos with a doubtful answer once more; keep values on which both answers agree.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Read servos with a doubtful answer once more; keep values on which both answers agree."""
         # Whether answers were damaged recently.
         places = self._feedback.places
         damaged = self._line.errors.get("corrupt", 0)

@@ -155,11 +155,7 @@ class Provisioning:
                 self._write(servo_id, str(lock), 1)
 
     def _write(self, servo_id: int, name: str, value: int) -> bool:
-        """Write a register; return whether the servo accepted it.
-
-        Raises:
-            ServoMissing: it does not answer.
-        """
+        """Write a register; return whether the servo accepted it."""
         written = self._registers.write(servo_id, name, value)
         if not written and not self._registers.refusal:
             self._raise_missing((servo_id,), {}, name)

@@ -143,11 +143,7 @@ class Recovery:
         return tuple(i for i in ids if i not in denied or torque.get(i, 1))
 
     def _release_lost(self, ids: tuple[int, ...]) -> tuple[int, ...]:
-        """Switch servos off that would move in the wrong direction; return the others.
-
-        Raises:
-            ServoMissing: a servo does not answer.
-        """
+        """Switch servos off that would move in the wrong direction; return the others."""
         if not self._family.single_turn:
             return ids
         present = dict(zip(ids, read_positions(self._line, ids), strict=True))

@@ -210,11 +210,7 @@ class Supervisor(ABC):
                 self._feedback.mark_rearmed(slot)
 
     def _full_speed(self, servo_id: int) -> bool:
-        """Restore a servo's full speed, with its next goal or by a write; return whether it has it.
-
-        Raises:
-            BusLost: the port is lost.
-        """
+        """Restore full speed, with the next goal or by a write; return whether a servo has it."""
         if self._family.goal_speed:
             return True
         name = self._family.arming.register

@@ -1,12 +1,11 @@
 """Detection of faces, people without a visible face, and palms, depending on the model files."""
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from gazerig.drivers.camera.quiet_opencv import quiet_stderr
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.extras import extra_hint
@@ -104,11 +103,7 @@ def add_body_detection(detector: FaceDetector, params: FaceDetectorParams) -> Fa
 
 
 def _load(file: ModelFile) -> Network | None:
-    """Return a network, None if the user has no file for it.
-
-    Raises:
-        ModelFileError: the file is damaged, or LiteRT is not installed.
-    """
+    """Return a network, None if the user has no file for it."""
     try:
         content = file.read()
     except (FileNotFoundError, NotADirectoryError):
@@ -119,7 +114,7 @@ def _load(file: ModelFile) -> Network | None:
         from ai_edge_litert.interpreter import Interpreter
     except ImportError as error:
         raise ModelFileError(extra_hint("ai-edge-litert", "people", error)) from error
-    with _quiet_stderr():
+    with quiet_stderr():  # LiteRT greets on the terminal
         net = Interpreter(model_content=content, num_threads=1)
         net.allocate_tensors()
     (given,), (boxes, scores) = net.get_input_details(), net.get_output_details()
@@ -130,16 +125,3 @@ def _load(file: ModelFile) -> Network | None:
         return net.get_tensor(boxes["index"])[0], net.get_tensor(scores["index"])[0, :, 0]
 
     return run
-
-
-@contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    """Suppress LiteRT's greeting, which native code writes to the terminal."""
-    kept = os.dup(2)
-    with open(os.devnull, "w") as nothing:
-        os.dup2(nothing.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)

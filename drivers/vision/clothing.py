@@ -149,7 +149,13 @@ def clothing_colours(
     if patches:
         lab = cv2.cvtColor(np.concatenate(patches), cv2.COLOR_BGR2LAB).reshape(len(patches), -1, 3)
         for (k, seen), pixels, share in zip(kept, lab, shares, strict=True):
-            out[k] = Clothing(_colours(pixels[seen.ravel()]), round(share, 3))
+            inside = pixels[seen.ravel()]
+            light = _OF_LIGHT[inside[:, 0]].sum(axis=0)
+            a, b = _OF_CHROMA[inside[:, 1]], _OF_CHROMA[inside[:, 2]]
+            both = np.concatenate([light, (a.T @ b).ravel()]) / np.float32(2 * len(inside))
+            # The squares of these roots of the bins' shares add up to 1.
+            roots = tuple(np.sqrt(both, dtype=np.float64).round(4).tolist())
+            out[k] = Clothing(roots, round(share, 3))
     return out
 
 
@@ -166,13 +172,6 @@ def _covered_mask(
     aside, below = np.abs(xs - by.x) / by.px_m, (ys - by.y) / by.px_m
     head = (below > -_HEAD_UP_M)[:, None] & (aside < _HEAD_HALF_M)
     return np.asarray(head | ((below > _HEAD_HALF_M)[:, None] & (aside < _BODY_HALF_M)))
-
-
-def _colours(lab: NDArray[np.uint8]) -> tuple[float, ...]:
-    """Return the square roots of the bins' shares of pixels (n, 3), whose squares add up to 1."""
-    light, a, b = _OF_LIGHT[lab[:, 0]].sum(axis=0), _OF_CHROMA[lab[:, 1]], _OF_CHROMA[lab[:, 2]]
-    both = np.concatenate([light, (a.T @ b).ravel()]) / np.float32(2 * len(lab))
-    return tuple(np.sqrt(both, dtype=np.float64).round(4).tolist())
 
 
 def _of_face(face: DetectedFace) -> _Head | None:

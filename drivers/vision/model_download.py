@@ -81,12 +81,7 @@ def fetch(
 
 
 def _extract(content: bytes, file: ModelFile) -> bytes:
-    """Return a model file from a download.
-
-    Raises:
-        ValueError: it is not the known file.
-        BadZipFile: the archive cannot be read.
-    """
+    """Return a model file from a download."""
     if file.member:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             try:

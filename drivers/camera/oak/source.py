@@ -206,11 +206,7 @@ class OakSource:
         self.close()
 
     def _prepare(self) -> None:
-        """Check the device's features and USB speed; switch its dot projector on.
-
-        Raises:
-            CameraError: it has no colour camera, or is on USB 2 and that is refused.
-        """
+        """Check the device's features and USB speed; switch its dot projector on."""
         stored = self._device.readCalibration()
         try:
             self._calibration = read_calibration(self._dai, stored, self._params)

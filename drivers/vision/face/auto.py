@@ -148,7 +148,12 @@ class AutoDetector:
         self._params = params
         self._log = EventLog()
         self._networks = MtcnnNetworks()
-        self._yunet = self._optional_yunet()
+        self._yunet: YunetNetwork | None = None
+        if file := params.model_file or yunet_file():
+            try:
+                self._yunet = YunetNetwork(file)
+            except ModelFileError as error:
+                self._log.add(f"{error}; until then mtcnn finds the faces")
         self._known: list[_KnownFace] = []
         self._size: tuple[int, ...] = ()
         self._samples = np.zeros(0)
@@ -163,9 +168,14 @@ class AutoDetector:
         self._size = frame.shape
         if first:
             self._known = []
+        height, width = frame.shape[:2]
+        near = min(1.0, self._params.work_width_px / width) * WINDOW_PX / self._params.min_face_px
+        tiles = far_tiles(width, height, self._params.far_width_px, near)
         known = self._track_faces(frame)
         soon = len(known) < len(self._known) or self._is_cut(frame)
-        if first or self._search_due(soon, not known):
+        self._since_search += 1
+        every = self._params.search_every
+        if first or self._since_search >= ((every + 1) // 2 if soon or not known else every):
             self._since_search = 0
             prepared = prepare(frame, self._params.work_width_px)
             assert prepared is not None
@@ -179,36 +189,17 @@ class AutoDetector:
                 least = self._params.min_confidence
                 found += self._accept(frame, [*known, *found], boxes, least)
             known += found
-        else:
-            known += self._search_tile(frame, known, self._tile(frame))
-        if first:
-            for tile in self._tiles(frame):
-                known += self._search_tile(frame, known, tile)
+        elif tiles:
+            self._next_tile = (self._next_tile + 1) % len(tiles)
+            known += self._search_tile(frame, known, tiles[self._next_tile])
+        for tile in tiles if first else ():
+            known += self._search_tile(frame, known, tile)
         self._known = known
         return largest_first([one.face for one in known])
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
         return self._log.drain()
-
-    def _optional_yunet(self) -> YunetNetwork | None:
-        """Return YuNet if the user has its file."""
-        file = self._params.model_file or yunet_file()
-        if not file:
-            return None
-        try:
-            return YunetNetwork(file)
-        except ModelFileError as error:
-            self._log.add(f"{error}; until then mtcnn finds the faces")
-            return None
-
-    def _search_due(self, soon: bool, nothing_known: bool) -> bool:
-        """Return whether the whole frame is searched now instead of a tile."""
-        self._since_search += 1
-        every = self._params.search_every
-        if nothing_known or soon:
-            every = (every + 1) // 2
-        return self._since_search >= every
 
     def _is_cut(self, frame: ImageArray) -> bool:
         """Return whether a frame shows another shot than the previous one."""
@@ -284,25 +275,10 @@ class AutoDetector:
         ]
         return _distinct(found, known)
 
-    def _tiles(self, frame: ImageArray) -> tuple[Tile, ...]:
-        height, width = frame.shape[:2]
-        near = min(1.0, self._params.work_width_px / width) * WINDOW_PX / self._params.min_face_px
-        return far_tiles(width, height, self._params.far_width_px, near)
-
-    def _tile(self, frame: ImageArray) -> Tile | None:
-        """Return the next tile."""
-        tiles = self._tiles(frame)
-        if not tiles:
-            return None
-        self._next_tile = (self._next_tile + 1) % len(tiles)
-        return tiles[self._next_tile]
-
     def _search_tile(
-        self, frame: ImageArray, known: list[_KnownFace], tile: Tile | None
+        self, frame: ImageArray, known: list[_KnownFace], tile: Tile
     ) -> list[_KnownFace]:
         """Search a tile for small faces; return the new ones."""
-        if tile is None:
-            return []
         part = frame[tile.top : tile.bottom, tile.left : tile.right]
         size = tile.width_px, tile.height_px
         way = cv2.INTER_AREA if part.shape[1] > tile.width_px else cv2.INTER_LINEAR

@@ -238,11 +238,7 @@ class MeshNetworks:
 
 
 def _network(file: ModelFile) -> cv2.dnn.Net:
-    """Load a network from a known file.
-
-    Raises:
-        ModelFileError: it is missing or altered.
-    """
+    """Load a network from a known file."""
     path, package = file.path, find_spec(_PACKAGE)
     if not path.exists() and package is not None and package.origin is not None:
         path = Path(package.origin).parent / "data" / file.file

@@ -89,16 +89,13 @@ def _fit(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
     for _ in range(_STEPS):
         weighted = rows * weights[:, None]
         normal = rows.T @ weighted
-        if np.count_nonzero(weights) < _LEAST_POINTS or _flat(normal):
+        # Points on a line have moments without an area.
+        xx, xy, yy = normal[0, 0], normal[0, 1], normal[1, 1]
+        flat = xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12
+        if np.count_nonzero(weights) < _LEAST_POINTS or flat:
             return None, weights, scale
         numbers = np.asarray(np.linalg.solve(normal, weighted.T @ flow))
         errors = np.hypot(*(flow - rows @ numbers).T)
         scale = max(_NOISE_PX, upper_median(errors) / 1.177)
         weights = np.maximum(1.0 - (errors / (_TUKEY * scale)) ** 2, 0.0) ** 2
     return numbers, weights, scale
-
-
-def _flat(normal: Floats) -> bool:
-    """Return whether points are on a line, so that their moments have no area."""
-    xx, xy, yy = normal[0, 0], normal[0, 1], normal[1, 1]
-    return bool(xx * yy - xy * xy <= 1e-6 * max(xx, yy) ** 2 + 1e-12)

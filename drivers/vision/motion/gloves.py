@@ -9,7 +9,7 @@ because more of it becomes visible. The uncertainty of its distance increases me
 """
 
 from math import hypot
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -166,16 +166,11 @@ def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
         window = np.s_[y : y + height, x : x + width]
         inside = np.zeros((height, width), np.uint8)
         cv2.fillConvexPoly(inside, cv2.convexHull(outline) - (x, y), 255)
-        red[window] |= inside & _pale_mask(hsv[window])
+        hue, saturation, value = cv2.split(hsv[window])
+        reddish = np.minimum(hue, 179 - hue) <= _PALE_HUE
+        pale = (value >= _PALE_VALUE) & (reddish | (saturation <= _WHITE_SATURATION))
+        red[window] |= inside & np.where(pale, np.uint8(255), np.uint8(0))
     return red
-
-
-def _pale_mask(hsv: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return a mask of white and pale red."""
-    hue, saturation, value = cv2.split(hsv)
-    reddish = np.minimum(hue, 179 - hue) <= _PALE_HUE
-    pale = (value >= _PALE_VALUE) & (reddish | (saturation <= _WHITE_SATURATION))
-    return np.where(pale, np.uint8(255), np.uint8(0))
 
 
 def _circles(mask: NDArray[np.uint8], least_px: float) -> list[Circle]:

@@ -97,8 +97,11 @@ def segment_motion(
             nearer thing cannot have (against the room or across its motion) counts.
         still: Their difference, if the room keeps its position in the older image.
     """
-    there = None if still is not None and pair.shift is None else _still_positions(pair, ego)
+    there = None
     if still is None or pair.shift is not None:
+        there = _background(ego.B, pair.now.shape)
+        if pair.shift is not None:
+            there += pair.shift
         still = image_difference(pair, there)
     threshold = max(params.min_flow_px, params.noise_factor * ego.noise_px)
     if not by_image:
@@ -134,14 +137,6 @@ def segment_motion(
         if mask.any():
             change[window] = _solid_change(part, at)
     return things
-
-
-def _still_positions(pair: ImagePair, ego: EgoMotion) -> Flow:
-    """Return the positions of still things in the older image, (h, w, 2)."""
-    there = _background(ego.B, pair.now.shape)
-    if pair.shift is not None:
-        there += pair.shift
-    return there
 
 
 def _solid_change(pair: ImagePair, there: Flow | None) -> Plane:

@@ -75,7 +75,10 @@ class MotionTracks:
             found[j] = follow
         for j, centre in enumerate(centres):
             if j not in found:
-                found[j] = self._begin_track(centre, t_s)
+                begun = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
+                self._next_id += 1
+                self._follows.append(begun)
+                found[j] = begun
             follow = found[j]
             follow.centre, follow.velocity_px_s = centre, velocities_px_s[j]
             follow.size_px, follow.seen_s = sizes_px[j], t_s
@@ -102,13 +105,6 @@ class MotionTracks:
     def confirmed(self, follow: PatchTrack) -> bool:
         """Return whether a patch has been detected often enough."""
         return follow.seen >= self._params.confirm_frames
-
-    def _begin_track(self, centre: Floats, t_s: float) -> PatchTrack:
-        """Begin a new track."""
-        follow = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
-        self._next_id += 1
-        self._follows.append(follow)
-        return follow
 
     def _pairs(self, centres: list[Floats], sizes_px: list[float]) -> list[tuple[float, int, int]]:
         """Return possible pairs of tracks and patches; their distance is a share of the gate."""
