@@ -32,7 +32,6 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import Tick, run  # noqa: E402
-from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
 from gazerig.sim_mock.true_gaze import (  # noqa: E402
     angles_of_place,
     gaze_angles,
@@ -43,6 +42,8 @@ from gazerig.sim_mock.true_gaze import (  # noqa: E402
 HERE = Path(__file__).parent / "figures"
 INK, HUMAN = "#1f5fa8", "#c0722e"
 TICK_S = 0.005
+STEP_AT_S = 2.0
+"""The step of the scene steps-aside."""
 
 
 def main() -> None:
@@ -257,9 +258,7 @@ def capture_time() -> None:
         ("capture", INK, "pose at the capture"),
         ("newest", HUMAN, "newest pose"),
     ):
-        t, person, gaze, facing, head, _ = watched(
-            "steps-aside", STEP_AT_S + STEP_S + 1.4, placed_by
-        ).T
+        t, person, gaze, facing, head, _ = watched("steps-aside", STEP_AT_S + 2.1, placed_by).T
         if placed_by == "capture":
             left.plot(t - STEP_AT_S, facing, "k", lw=0.8, label="straight at the person")
             middle.plot(t - STEP_AT_S, person, "k", lw=0.8, label="the person's face")

@@ -14,9 +14,9 @@ from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing, there_and_back
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -141,7 +141,7 @@ def made_for(
 
 @pytest.fixture(scope="module", params=[0, 7])
 def boxing(request: pytest.FixtureRequest) -> Lived:
-    scene = scenes()["boxing"]
+    scene = load_scene("boxing")
     return Lived(made_for("boxing", request.param, 100.0), scene, scene.round_s + 0.05)
 
 
@@ -235,7 +235,7 @@ def test_without_the_pull_of_motion_the_planner_alone_brings_the_gaze_there(plan
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="boxing"))
     if not planned:
         made.robot.ask("behaviour", "wait")
-    lived = Lived(made, scenes()["boxing"], 7.8)
+    lived = Lived(made, load_scene("boxing"), 7.8)
     figures = lived.score.figures()
     count = (2, 1) if planned else (0, 0)
     assert (figures["punch"]["seen"], figures["attack"]["seen"]) == count
@@ -337,7 +337,7 @@ def test_e48_back_on_the_face_within_a_second_of_a_distraction(way_m: Vec3) -> N
 
 
 def test_face_to_face_keeps_the_face_through_all_heights() -> None:
-    scene = scenes()["face-to-face"]
+    scene = load_scene("face-to-face")
     lived = Lived(made_for("face-to-face", rate_hz=100.0), scene, scene.round_s + 0.05)
     figure = lived.score.figures()["face"]
     assert figure["seen"] == figure["of"] == 1

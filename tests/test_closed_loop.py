@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import pytest
+from fakes.runs import play
 from numpy.typing import NDArray
 
 from gazerig.config.parameters import changed
@@ -15,11 +16,9 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.frames import NewestPose, PoseHistory
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
-from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S
-from gazerig.sim_mock.scenes.walks_past import HALF_WAY_M, WALK_M_S
 from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
 
 RIG = changed(
@@ -27,7 +26,8 @@ RIG = changed(
     {"gaze.aversion.silent_mutual_s": 0.0, "gaze.head.goal_model": "attention"},
 )
 """The gaze stays on the face, on which it is measured; the head turns nearly all the way."""
-ARRIVED_S = STEP_AT_S + STEP_S
+STEP_AT_S, ARRIVED_S = 2.0, 2.7
+"""The step of steps-aside."""
 CORRECTED_S = 0.2
 FACE_DEG = 4.0
 """Half of a face's width at the distance of the scene, 1.1 m."""
@@ -82,15 +82,7 @@ def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen
             )
         )
 
-    made.robot.start(made.clock)
-    try:
-        count = run(
-            made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch
-        )
-    finally:
-        made.robot.stop()
-        made.close()
-    assert count.stopped_by == "over"
+    assert play(made, seconds, watch).stopped_by == "over"
     return Seen(*np.array(rows, float).T)
 
 
@@ -109,7 +101,7 @@ def step_by_newest() -> Seen:
 @pytest.fixture(scope="module")
 def walk() -> Seen:
     """Return somebody who walks past."""
-    return watched("walks-past", 1.0 + 2.0 * HALF_WAY_M / WALK_M_S)
+    return watched("walks-past", 3.2)
 
 
 def overshoot_deg(seen: Seen) -> float:

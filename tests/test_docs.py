@@ -25,16 +25,16 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
+from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.cli.examples import all_examples
 from gazerig.robot.model.joint import JointParams
-from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.scenes import script
 
 # The documents describe every feature: without one of them, they cannot be compared with it.
 design = pytest.importorskip("gazerig.features.study.design")
 questionnaire = pytest.importorskip("gazerig.features.study.questionnaire")
 HOME = pytest.importorskip("gazerig.features.study.shipped").HOME
-script = pytest.importorskip("gazerig.features.world.script")
-WORLDS = script.HOME
+WORLDS = pytest.importorskip("gazerig.features.world.room").HOME
 pytest.importorskip("gazerig.features.bringup")
 pytest.importorskip("gazerig.features.lab")
 
@@ -141,7 +141,7 @@ def test_yaml_shown_has_keys_that_there_are() -> None:
             _fits(Shape("params", params=Gesture), data, "gesture")
             continue
         if "people" in data:
-            _fits(Shape("params", params=script.WorldScript), data, "world")
+            _fits(Shape("params", params=script.SceneScript), data, "world")
             continue
         if "conditions" in data or "items" in data:
             form = design.StudyDesign if "conditions" in data else questionnaire.Questionnaire
@@ -272,7 +272,7 @@ SAID = {
 def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper in (EMULATOR, PARAMETERS):
         return  # their tables are compared with the emulator and the declarations
-    words = {*keys(), *defined(), *SERVOS, *scenes(), *all_examples(), *_modes()}
+    words = {*keys(), *defined(), *SERVOS, *scene_names(), *all_examples(), *_modes()}
     words |= {field.name for field in fields(script.WorldCameraParams)}
     words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
         *DYNAMIXEL.registers,
@@ -280,11 +280,12 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     }
     words |= {field.name for field in (*fields(KeyFrame), *fields(Gesture))} | {*LID_GROUPS}
     scripts = (
-        *(script.WorldScript, script.PersonScript, script.PlaceScript),
-        *(script.ThingScript, script.Act),
+        *(script.SceneScript, script.PersonScript, script.PlaceScript),
+        *(script.ThingScript, script.Act, script.ExpectedLook),
+        *(script.SwayScript, script.WaveScript),
     )
     words |= {field.name for one in scripts for field in fields(one)}
-    words |= {*get_args(script.Do), *shipped_names("worlds", WORLDS), script.HEAD}
+    words |= {*get_args(script.Do), *shipped_names("worlds", WORLDS), script.HEAD, script.BASE}
     forms = (
         *(design.StudyDesign, design.Presentation, design.Trials, design.StatisticalPlan),
         *(design.Exclusion, design.Privacy, questionnaire.Questionnaire, questionnaire.Item),

@@ -15,8 +15,8 @@ from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, scene_pixels
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.model.frames import CameraMount
-from gazerig.sim_mock.scenes.registry import scenes
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 LEFT = ((0.8, -0.6, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
@@ -32,7 +32,7 @@ def test_the_newest_pose_is_read_whole() -> None:
 
 def source(scene: str, poses: PoseSlot) -> DrawnSource:
     mount = CameraMount(load_rig("desk").camera)
-    make = partial(scene_pixels, scenes()[scene], mount, 69.0, np.random.default_rng(3))
+    make = partial(scene_pixels, load_scene(scene), mount, 69.0, np.random.default_rng(3))
     return DrawnSource(make, poses)
 
 

@@ -82,11 +82,11 @@ from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.surroundings import Surroundings
 from gazerig.robot.recording.run_format import WORLD
 from gazerig.robot.recording.run_info import WorldInfo
-from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.robot.app.scene_files import load_scene
 class Room:
     stands = ()
     def __init__(self, rig, options, clock):
-        self.scene, self.clock = scenes()["visitor"], clock
+        self.scene, self.clock = load_scene("visitor"), clock
         self.wires = run_bus(rig, options, clock)
     def camera(self, rig, options, sight, placed, rng, own, say):
         where = true_head(self.wires.true_steps, rig, sight.poses)
@@ -100,7 +100,7 @@ class Room:
         return WorldInfo("hall", "a hall", 7, 0.0)
 class Hall(Surroundings):
     def scene(self, options):
-        return scenes()["visitor"]
+        return load_scene("visitor")
     def open(self, rig, options, clock):
         return Room(rig, options, clock)
 """

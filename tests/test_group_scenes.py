@@ -13,14 +13,16 @@ from gazerig.gaze.angles import angle_between, direction, sub
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.sim_mock.scenes.group import HEAD_M
-from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.robot.app.scene_files import load_scene
+from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson
-from gazerig.sim_mock.scenes.three_people import ARRIVES_S, LEAVES_S
-from gazerig.sim_mock.scenes.two_people import PINWHEEL, SPINS_S
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
+ARRIVES_S, LEAVES_S = 6.0, 55.0
+"""Arrival and departure of the third person of three-people."""
+PINWHEEL, SPIN_S = (0.75, 0.0, 0.06), (4.0, 7.0)
+"""Place of the pinwheel of two-people, and when the wind first turns it."""
 GROUPS = ("two-people", "three-people")
 
 
@@ -32,7 +34,7 @@ def off_deg(person: ScenePerson, place: Vec3) -> float:
 
 @pytest.mark.parametrize("name", GROUPS)
 def test_people_turn_to_each_other_and_to_the_robot_and_stay_in_sight_of_it(name: str) -> None:
-    scene = scenes()[name]
+    scene = load_scene(name)
     to_robot: Counter[int] = Counter()
     to_others: Counter[int] = Counter()
     times = np.arange(0.0, scene.round_s, 0.1).tolist()
@@ -55,7 +57,7 @@ def test_people_turn_to_each_other_and_to_the_robot_and_stay_in_sight_of_it(name
 
 
 def test_the_third_comes_and_goes() -> None:
-    third = [scenes()["three-people"].people(t)[2].p_world_face_m for t in (0.0, 30.0, 60.0)]
+    third = [load_scene("three-people").people(t)[2].p_world_face_m for t in (0.0, 30.0, 60.0)]
     assert third[0][0] < 0.0 < 1.0 < third[1][0] and third[2][0] < 0.0
 
 
@@ -74,7 +76,7 @@ def watched(scene: Scene, lived: Lived, start_s: float, end_s: float) -> dict[st
 
 
 def test_e79_among_three_people_all_are_looked_at_and_keep_their_identities() -> None:
-    scene = scenes()["three-people"]
+    scene = load_scene("three-people")
     lived = Lived(made_for("three-people", 0, 50.0), scene, 45.0)
     shares = watched(scene, lived, ARRIVES_S, min(45.0, LEAVES_S))
     assert min(shares[f"person {k}"] for k in range(3)) > 0.12
@@ -84,14 +86,14 @@ def test_e79_among_three_people_all_are_looked_at_and_keep_their_identities() ->
 
 
 def test_of_two_people_neither_is_stared_at() -> None:
-    scene = scenes()["two-people"]
+    scene = load_scene("two-people")
     lived = Lived(made_for("two-people", 1, 50.0), scene, 32.0)
     shares = watched(scene, lived, 8.0, 32.0)
     assert min(shares["person 0"], shares["person 1"]) > 0.2
 
 
 def test_the_pinwheel_turns_as_fast_as_it_says() -> None:
-    scene, start = scenes()["two-people"], SPINS_S[0][0]
+    scene, start = load_scene("two-people"), SPIN_S[0]
     angles = [scene.things(start + t)[0].turned_rad for t in np.arange(0.0, 3.0, 0.001)]
     speeds = [scene.things(start + t)[0].spin_rad_s for t in np.arange(0.0, 3.0, 0.001)]
     assert np.gradient(angles, 0.001)[1:-1] == pytest.approx(speeds[1:-1], abs=0.02)
@@ -105,7 +107,7 @@ def test_e80_what_spins_draws_the_gaze_by_its_spin_alone(reference: float, looks
     bottom_up = replace(rig.gaze.bottom_up, rotation_reference_rad_s=reference)
     gaze = replace(rig.gaze, bottom_up=bottom_up)
     rig = replace(rig, gaze=gaze, loop=replace(rig.loop, rate_hz=50.0))
-    scene, (start_s, end_s) = scenes()["two-people"], SPINS_S[0]
+    scene, (start_s, end_s) = load_scene("two-people"), SPIN_S
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="two-people"))
     lived = Lived(made, scene, end_s)
     on = [tick for tick in lived.within(start_s, end_s) if tick.target.kind == "pinwheel"]

@@ -17,10 +17,10 @@ from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.types import Vec3
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.perception.hands import HAND, Hands, Known
 from gazerig.robot.perception.track import LocalisedDetection
-from gazerig.sim_mock.scenes.group import HEAD_M
-from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 
 EYE: Vec3 = (0.0, 0.0, 0.0)
 FACE: Known = ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -158,7 +158,7 @@ def test_between_two_people_the_arm_tells_whose_hand_it_is_and_it_stays_theirs()
 def test_e91_a_waving_hand_is_found_from_pixels_and_whose_it_is() -> None:
     """The one on the right of three waves from 21.5 s on, the hand before the one in the middle."""
     persons, named, off, faces = Persons(), [], [], {}
-    for frame in frames(scenes()["three-people"], 21.2, 23.7):
+    for frame in frames(load_scene("three-people"), 21.2, 23.7):
         persons.update(frame.percept, HEAD_M)
         hands = frame.seen(HAND)
         if frame.t_s > 22.2:
@@ -174,7 +174,7 @@ def test_e91_a_punch_is_a_hand_before_it_lands() -> None:
     """The second punch of the scene sets out at 4.2 s and is back at 4.8 s."""
     first = next(
         frame.t_s
-        for frame in frames(scenes()["boxing"], 3.6, 4.8)
+        for frame in frames(load_scene("boxing"), 3.6, 4.8)
         if frame.t_s > 4.2 and any(off_deg(p, frame.hands[1]) < 15.0 for _, p in frame.seen(HAND))
     )
     assert first < 4.45
@@ -192,7 +192,7 @@ def test_e91_a_rule_that_names_a_hand_matches_one_that_is_seen() -> None:
     )
     at_rest = looking()._replace(p_world_head_m=HEAD_M)
     targets = []
-    for frame in frames(scenes()["visitor"], 17.2, 18.2):
+    for frame in frames(load_scene("visitor"), 17.2, 18.2):
         target = attention.choose(frame.percept, at_rest, frame.t_s - 17.2)
         targets.append((frame.t_s, target.kind, target.saliences[0].rule))
     assert {kind for t_s, kind, _ in targets if t_s < 17.4} == {"face"}
@@ -201,7 +201,7 @@ def test_e91_a_rule_that_names_a_hand_matches_one_that_is_seen() -> None:
 
 @pytest.mark.parametrize(("scene", "start_s"), [("walks-past", 5.2), ("sits-still", 0.0)])
 def test_e92_who_walks_by_or_sits_still_has_no_hands(scene: str, start_s: float) -> None:
-    for frame in frames(scenes()[scene], start_s, start_s + 2.0):
+    for frame in frames(load_scene(scene), start_s, start_s + 2.0):
         assert frame.seen(HAND) == []
 
 
@@ -338,12 +338,12 @@ def test_e91_a_hand_that_reaches_in_beside_the_camera_is_believed_near(
     place = (HEAD_M[0] + 0.46, HEAD_M[1] + side * 0.316, HEAD_M[2])
     near = [
         any(dist(p, place) < 0.25 for _, p in frame.seen(HAND))
-        for frame in frames(scenes()["boxing"], start_s, start_s + 1.0)
+        for frame in frames(load_scene("boxing"), start_s, start_s + 1.0)
     ]
     assert sum(near[15:]) >= 14
 
 
 def test_e91_a_waving_hand_is_believed_no_nearer_than_it_is() -> None:
-    for frame in frames(scenes()["visitor"], 17.3, 18.6):
+    for frame in frames(load_scene("visitor"), 17.3, 18.6):
         for _, p in frame.seen(HAND):
             assert dist(p, HEAD_M) > 0.85 * dist(frame.hands[0], HEAD_M)

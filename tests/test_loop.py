@@ -17,6 +17,7 @@ from gazerig.gaze.angles import add, angle_between, rotate, rotate_back, rotatio
 from gazerig.gaze.types import PARTS
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -29,7 +30,6 @@ from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.track import LocalisedDetection
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.sim_mock.scenes.visitor import Visitor
 
 
 def made(seed: int = 0) -> Assembly:
@@ -232,7 +232,7 @@ def test_the_same_picture_is_seen_once() -> None:
 
 
 def test_the_visitor_comes_moves_waves_leaves_and_comes_back() -> None:
-    scene = Visitor()
+    scene = load_scene("visitor")
     faces = [scene.people(t)[0].p_world_face_m for t in np.arange(0.0, 44.0, 0.1)]
     assert max(y for _, y, _ in faces) > 0.25 and min(y for _, y, _ in faces) < -2.4
     assert np.linalg.norm(np.array(faces[0]) - faces[-1]) < 0.1

@@ -19,9 +19,9 @@ from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
 from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
 from gazerig.gaze.types import Bodies, Face, Percept, Target, Vec3
-from gazerig.sim_mock.scenes.group import HEAD_M
+from gazerig.robot.app.scene_files import load_scene
+from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Scene
-from gazerig.sim_mock.scenes.three_people import ThreePeople
 
 EYE: Vec3 = (0.0, 0.0, 0.0)
 LEFT, RIGHT, FAR = (1.0, 0.4, 0.0), (1.1, -0.4, 0.0), (2.0, 0.0, 0.0)
@@ -168,7 +168,9 @@ def shares(look_at: str, numbers: tuple[int, ...], start_s: float, end_s: float)
     found = []
     for k in range(round(30 * end_s)):
         t_s = k / 30
-        target = model.choose(seen_by_truth(ThreePeople(), t_s, numbers), state, t_s + 0.05)
+        target = model.choose(
+            seen_by_truth(load_scene("three-people"), t_s, numbers), state, t_s + 0.05
+        )
         if t_s >= start_s:
             found.append(target.id)
     return [found.count(id) / len(found) for id in numbers]

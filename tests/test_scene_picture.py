@@ -11,11 +11,11 @@ import pytest
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Mat3
+from gazerig.robot.app.scene_files import load_scene, scene_names
 from gazerig.robot.dashboard.feed.camera_overlay import draw_heat
 from gazerig.robot.dashboard.feed.live_feed import GazeTrail
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.scenes.picture import ScenePicture
-from gazerig.sim_mock.scenes.registry import scenes
 
 SIZE_PX = (640, 400)
 LENS = intrinsics_of_view(radians(69.0), *SIZE_PX)
@@ -30,9 +30,9 @@ def camera(yaw: float = 0.0, pitch: float = 0.0) -> Mat3:
     return ((a, b, c), (d, e, f), (g, h, i))
 
 
-@pytest.mark.parametrize("name", sorted(scenes()))
+@pytest.mark.parametrize("name", scene_names())
 def test_every_scene_can_be_sent_and_drawn_at_any_time(name: str) -> None:
-    picture = pickle.loads(pickle.dumps(ScenePicture(scenes()[name])))
+    picture = pickle.loads(pickle.dumps(ScenePicture(load_scene(name))))
     drawn = [
         picture.draw(PinholeView(t_s, LENS, SIZE_PX, camera(), EYE_M)).image
         for t_s in (0.0, 5.0, 17.9)
@@ -43,7 +43,7 @@ def test_every_scene_can_be_sent_and_drawn_at_any_time(name: str) -> None:
 
 
 def test_the_picture_turns_with_the_camera() -> None:
-    picture = ScenePicture(scenes()["visitor"])
+    picture = ScenePicture(load_scene("visitor"))
 
     def middle(yaw: float) -> float:
         """The column about which the visitor's blue shirt lies."""
@@ -55,7 +55,7 @@ def test_the_picture_turns_with_the_camera() -> None:
 
 
 def test_nothing_in_front_of_the_camera_and_a_face_at_the_lens_are_drawn_without_harm() -> None:
-    picture = ScenePicture(scenes()["visitor"])
+    picture = ScenePicture(load_scene("visitor"))
     for yaw, pitch in ((pi, 0.0), (0.0, 1.4), (0.0, -1.4)):
         assert picture.draw(PinholeView(2.0, LENS, SIZE_PX, camera(yaw, pitch), EYE_M)).image.any()
     for at_m in ((0.97, -0.05, 0.24), (1.0, -0.05, 0.24), (0.9, -0.05, 0.2)):
@@ -65,8 +65,8 @@ def test_nothing_in_front_of_the_camera_and_a_face_at_the_lens_are_drawn_without
 def test_the_control_loop_need_not_load_opencv_to_name_a_picture() -> None:
     script = (
         "import sys, pickle; from gazerig.sim_mock.scenes.picture import ScenePicture;"
-        "from gazerig.sim_mock.scenes.registry import scenes;"
-        "pickle.dumps(ScenePicture(scenes()['visitor'])); sys.exit('cv2' in sys.modules)"
+        "from gazerig.robot.app.scene_files import load_scene, scene_names;"
+        "pickle.dumps(ScenePicture(load_scene('visitor'))); sys.exit('cv2' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 

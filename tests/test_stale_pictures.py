@@ -7,6 +7,7 @@ from math import degrees, radians
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from fakes.runs import play
 from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import Rig, load_rig
@@ -16,7 +17,7 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.app import run_rig
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.sim_mock.scenes.scene import ScenePerson
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -74,24 +75,13 @@ class Unplugged:
 
 def watched(scene: Passer, patch: pytest.MonkeyPatch) -> tuple[Rig, list[Tick]]:
     """Run the rig before a scene, its camera unplugged for a while."""
-    patch.setattr(run_rig, "scenes", lambda: {scene.name: scene})
+    patch.setattr(run_rig, "load_scene", lambda name, seed: scene)
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     options = RunOptions(mock=True, fast=True, seed=3, scene=scene.name)
     made: Assembly = assemble(rig, options, Substitutes(camera=Unplugged))
     ticks: list[Tick] = []
-    made.robot.start(made.clock)
-    try:
-        run(
-            made.robot,
-            made.clock,
-            made.loop,
-            lambda seconds: "seconds" if seconds >= END_S else None,
-            ticks.append,
-        )
-    finally:
-        made.robot.stop()
-        made.close()
+    play(made, END_S, ticks.append)
     return rig, ticks
 
 

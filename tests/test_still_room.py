@@ -5,13 +5,14 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
+from fakes.runs import play
 from fakes.scenes import EmptyScene
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app import run_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.sim_mock.scenes.scene import Thing
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -32,7 +33,7 @@ class Room(EmptyScene):
 
 def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]:
     """Run a rig that hardly rests between glances around, with all of the head in each."""
-    patch.setattr(run_rig, "scenes", lambda: {room.name: room})
+    patch.setattr(run_rig, "load_scene", lambda name, seed: room)
     rig = load_rig("desk")
     idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_salience=1.0)
     head = replace(rig.gaze.head, eye_only_range_deg=6.0, head_slope=1.0)
@@ -44,18 +45,7 @@ def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]
     )
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene=room.name, pixels=True))
     ticks: list[Tick] = []
-    made.robot.start(made.clock)
-    try:
-        run(
-            made.robot,
-            made.clock,
-            made.loop,
-            lambda s: "seconds" if s >= seconds else None,
-            lambda tick: ticks.append(tick),
-        )
-    finally:
-        made.robot.stop()
-        made.close()
+    play(made, seconds, ticks.append)
     return ticks
 
 

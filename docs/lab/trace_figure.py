@@ -16,8 +16,8 @@ from gazerig.gaze.angles import yaw_pitch
 from gazerig.robot.analysis.human_norms import evoked_blink, head_deg
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.tick import Tick
-from gazerig.sim_mock.scenes.visitor import Visitor
 
 BEGIN_S, SECONDS, RATE_HZ = 8.0, 20.0, 200.0
 PROFILES = ("robot", "mitake", "nakamoto")
@@ -53,7 +53,7 @@ def of_profile(profile: str) -> Trace:
 
 def face_deg(t_s: np.ndarray) -> np.ndarray:
     """Return where the visitor's face is, in deg of yaw from the head."""
-    scene = Visitor()
+    scene = load_scene("visitor")
     faces = np.array([scene.people(t)[0].p_world_face_m for t in t_s.tolist()])
     x, y, _ = (faces - np.array(_HEAD_M)).T
     return np.degrees(np.arctan2(y, x))

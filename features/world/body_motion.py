@@ -23,11 +23,12 @@ from gazerig.features.world.rotations import (
     yaw_of,
     yaw_pitch_roll,
 )
-from gazerig.features.world.script import HEAD, WorldScript
 from gazerig.features.world.time_profiles import periodic, rise, smooth, there_and_back
-from gazerig.features.world.timeline import HEAD_M, TimedAct, floor_m
+from gazerig.features.world.timeline import HEAD_M, floor_m
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.person_shape import EYE_FACE_M, MOUTH_FACE_M
+from gazerig.sim_mock.scenes.script import HEAD, SceneScript
+from gazerig.sim_mock.scenes.timeline import TimedAct
 
 SIDES = ("left", "right")
 SEGMENTS = (
@@ -81,7 +82,7 @@ class BodyMotion:
 
     def __init__(
         self,
-        script: WorldScript,
+        script: SceneScript,
         timelines: Mapping[str, tuple[TimedAct, ...]],
         name: str,
         body: Measures,

@@ -12,8 +12,8 @@ import numpy as np
 
 from gazerig.features.world.rotations import limit_angle, pitch_of, wrap_angle, yaw_of
 from gazerig.features.world.time_profiles import hump, periodic, rise, smooth, there_and_back
-from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.scenes.timeline import TimedAct
 
 HEAD_YAW_RAD, HEAD_UP_RAD, HEAD_DOWN_RAD = radians(70.0), radians(45.0), radians(50.0)
 EYE_RAD = radians(38.0)

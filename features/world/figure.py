@@ -19,9 +19,10 @@ from gazerig.features.world.body_motion import SIDES as SIDES
 from gazerig.features.world.body_motion import BodyMotion
 from gazerig.features.world.gait import RATE_HZ
 from gazerig.features.world.measures import Measures, measures
-from gazerig.features.world.script import WorldScript
-from gazerig.features.world.timeline import TimedAct, timed_acts
+from gazerig.features.world.timeline import timed_acts
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.scenes.script import SceneScript
+from gazerig.sim_mock.scenes.timeline import TimedAct
 
 
 class Segments(NamedTuple):
@@ -40,7 +41,7 @@ class Figures:
         shared: file in which several processes share the motion, None for none.
     """
 
-    def __init__(self, script: WorldScript, seed: int = 0, shared: Path | None = None) -> None:
+    def __init__(self, script: SceneScript, seed: int = 0, shared: Path | None = None) -> None:
         self.script, self.seed, self.shared = script, seed, shared
         self.names: tuple[str, ...] = (
             *(f"{name}/{segment}" for name in script.people for segment in SEGMENTS),

@@ -20,8 +20,8 @@ from gazerig.features.world.room import (
     way_points,
 )
 from gazerig.features.world.time_profiles import hump, rise, smooth
-from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.scenes.timeline import TimedAct
 
 RATE_HZ = 100.0
 """Rows a second of all tables of motion."""

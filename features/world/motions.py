@@ -11,8 +11,8 @@ import numpy as np
 from gazerig.features.world.measures import Measures
 from gazerig.features.world.rotations import axes_along, limit_angle, unit
 from gazerig.features.world.time_profiles import blend, hump, rise, there_and_back
-from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.scenes.timeline import TimedAct
 
 FIST_M = 0.07
 """From the wrist to the middle of a hand or fist."""

@@ -6,18 +6,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from gazerig.features.world.rotations import quaternions, rotate, yaw_of, yaw_pitch_roll
-from gazerig.features.world.script import Act, Fault, WorldScript
 from gazerig.features.world.time_profiles import rise
-from gazerig.features.world.timeline import TimedAct
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.scenes.script import Act, Fault, SceneScript
+from gazerig.sim_mock.scenes.timeline import TimedAct, Timelines
 
 GRIP_M = np.array((0.046, 0.0, -0.085))
 """Middle of a held thing, in the hand's frame."""
 _CHANGES_S = 0.3
 Side = Literal["left", "right"]
 _OTHER: Mapping[Side, Side] = {"left": "right", "right": "left"}
-
-Timelines = Mapping[str, tuple[TimedAct, ...]]
 
 
 class Holder(NamedTuple):
@@ -28,7 +26,7 @@ class Holder(NamedTuple):
     side: str
 
 
-def holders(script: WorldScript, timelines: Timelines, thing: str) -> list[Holder]:
+def holders(script: SceneScript, timelines: Timelines, thing: str) -> list[Holder]:
     """Return the successive holders of a thing; it changes hands in the middle of a pass."""
     first = script.things[thing]
     found = [Holder(0.0, first.held_by, first.side)]
@@ -89,7 +87,7 @@ def thing_poses(
     return np.concatenate((place, quaternions(yaw_pitch_roll(yaw, 0.0 * yaw))), axis=1)
 
 
-def handover_faults(script: WorldScript, timelines: Timelines) -> Iterator[Fault]:
+def handover_faults(script: SceneScript, timelines: Timelines) -> Iterator[Fault]:
     """Yield passes by a person who does not hold the thing, and things that end in another hand."""
     for thing, first in script.things.items():
         holder = first.held_by

@@ -5,12 +5,16 @@ Places are on the floor, in the world's axes: the neck base of the first head is
 
 from collections.abc import Mapping, Sequence
 from math import atan2, cos, pi, radians, sin
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.features.world.script import WorldScript
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.scenes.script import SceneScript
+
+HOME = Path(__file__).parent
+"""The folder with ``worlds``, the shipped scripts."""
 
 Point = tuple[float, float]
 
@@ -96,7 +100,7 @@ ROOMS: Mapping[str, Mapping[str, Place]] = {
 """The places of each room by name."""
 
 
-def places_of(script: WorldScript) -> dict[str, Place]:
+def places_of(script: SceneScript) -> dict[str, Place]:
     """Return all places of a world: its room's, and its own by the same or other names."""
     own = {
         name: Place(one.x_m, one.y_m, radians(one.facing_deg), height_m=one.height_m)
@@ -105,7 +109,7 @@ def places_of(script: WorldScript) -> dict[str, Place]:
     return {**ROOMS[script.room], **own}
 
 
-def places_for(script: WorldScript, name: str) -> dict[str, Place]:
+def places_for(script: SceneScript, name: str) -> dict[str, Place]:
     """Return all places as one person uses them: people who wait outside form a row."""
     row = _WAITING_M * list(script.people).index(name)
     return {

@@ -9,10 +9,10 @@ import numpy as np
 
 from gazerig.features.world.room import LIVING_ROOM, SEAT_M, SOFA_M, Place
 from gazerig.features.world.room_paint import texture
-from gazerig.features.world.script import WorldScript
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.paint import Colour
+from gazerig.robot.description.mesh import Colour
 from gazerig.robot.description.parts import FLOOR_M
+from gazerig.sim_mock.scenes.script import SceneScript
 
 _BOX, _CYLINDER = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
 _ELLIPSOID, _CAPSULE = mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -24,7 +24,7 @@ _TABLE_BELOW_M = 0.20
 
 
 def add_room(
-    spec: Any, script: WorldScript, plinths_m: Sequence[Vec3] = ((0.0, 0.0, 0.0),)
+    spec: Any, script: SceneScript, plinths_m: Sequence[Vec3] = ((0.0, 0.0, 0.0),)
 ) -> None:
     """Add the room of a script to a specification, with its light.
 
@@ -284,7 +284,7 @@ def _hall(room: _Room) -> None:
         room.panel((1.0, side * (half * 0.7 - 0.03), 1.7), -side * 0.5 * pi, (0.9, 1.1), "shapes")
 
 
-def _light(spec: Any, script: WorldScript) -> None:
+def _light(spec: Any, script: SceneScript) -> None:
     """Light the room: from everywhere, from the window's side, and from the ceiling."""
     light = script.light
     spec.visual.headlight.active = 1

@@ -1,37 +1,37 @@
 """Faults that prevent a script from being played: each with its key, the fault and the cure."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from math import hypot
 
 from gazerig.features.world.object_handover import handover_faults
-from gazerig.features.world.room import Place, places_of
-from gazerig.features.world.script import HEAD, Act, Fault, PersonScript, WorldScript
-from gazerig.features.world.timeline import (
-    NEEDS_TARGET,
-    WALKS_TO_PLACES,
-    TimedAct,
-    timed_acts,
-)
+from gazerig.features.world.room import places_of
+from gazerig.features.world.timeline import timed_acts
+from gazerig.sim_mock.scenes.script import HEAD, Fault, PersonScript, SceneScript
+from gazerig.sim_mock.scenes.timeline import name_faults, overlap_faults
 
 HEADS_APART_M = 0.4
 """Smallest distance of two necks."""
 
 
-def faults(script: WorldScript) -> Iterable[Fault]:
+def faults(script: SceneScript) -> Iterable[Fault]:
     """Yield the faults of a script, each with its key."""
+    if script.room == "none":
+        yield "room", "a world needs one: play the script with --scene, or name a room"
+        return
     yield from _misplaced_heads(script)
-    yield from _unknown(script)
-    if next(iter(_unknown(script)), None) is not None:
+    found = [*_without_room(script), *name_faults(script, places_of(script))]
+    yield from found
+    if found:
         return
     timelines = {name: timed_acts(script, name, 0) for name in script.people}
     yield from handover_faults(script, timelines)
     for name, person in script.people.items():
-        yield from _overlaps(script, name, timelines[name])
+        yield from overlap_faults(script, f"people.{name}", timelines[name])
         yield from _legs(script, name, person)
     yield from _crowded(script)
 
 
-def _misplaced_heads(script: WorldScript) -> Iterator[Fault]:
+def _misplaced_heads(script: SceneScript) -> Iterator[Fault]:
     """Find heads with an invalid name or too close to another."""
     placed = [("", 0.0, 0.0)]
     for name, head in script.heads.items():
@@ -45,74 +45,24 @@ def _misplaced_heads(script: WorldScript) -> Iterator[Fault]:
         placed.append((name, head.x_m, head.y_m))
 
 
-def _unknown(script: WorldScript) -> Iterator[Fault]:
-    """Find names of people, places and things that are not there."""
-    places = places_of(script)
-    seats = ", ".join(sorted(places))
+def _without_room(script: SceneScript) -> Iterator[Fault]:
+    """Find what only a script without a room may have, and things that nobody holds."""
     people = ", ".join(script.people)
     for name, person in script.people.items():
-        key = f"people.{name}"
-        if not name.isidentifier() or name == HEAD:
-            yield key, "a name has letters, digits and _, begins with a letter and is not head"
-        if person.start not in places:
-            yield f"{key}.start", f"{script.room} has no place {person.start!r}; it has {seats}"
-        targets = {HEAD, *script.people, *places}
-        if person.looks_at not in targets:
-            yield f"{key}.looks_at", f"no person, no place; there are head, {people}, {seats}"
         for i, act in enumerate(person.acts):
-            for rule_key, rule in _unknown_of(script, name, act, places):
-                yield f"{key}.acts.{i}{rule_key}", rule
+            if act.do in ("glance", "spin") or act.frees != "face":
+                yield f"people.{name}.acts.{i}.do", f"{act.do} of this kind needs room: none"
+        for key in ("level", "sway", "wave"):
+            if getattr(person, key) != getattr(PersonScript(""), key):
+                yield f"people.{name}.{key}", "needs room: none"
     for name, thing in script.things.items():
         if thing.held_by not in script.people:
             yield f"things.{name}.held_by", f"no person {thing.held_by!r}; there are {people}"
+        if thing.at or thing.acts or thing.kind not in ("cup", "ball"):
+            yield f"things.{name}", "at, acts, and kinds other than cup and ball need room: none"
 
 
-def _unknown_of(
-    script: WorldScript, name: str, act: Act, places: Mapping[str, Place]
-) -> Iterator[Fault]:
-    there = ", ".join(sorted(places))
-    if act.do in NEEDS_TARGET and not act.to:
-        yield "", f"{act.do} needs `to`: whom or what"
-    elif act.do in WALKS_TO_PLACES:
-        if act.to and act.to not in places:
-            yield ".to", f"{script.room} has no place {act.to!r}; it has {there}"
-    elif act.do == "pass":
-        if act.to not in script.people or act.to == name:
-            yield ".to", f"another person; there are {', '.join(script.people)}"
-        if act.thing not in script.things:
-            yield ".thing", f"none of the script's `things`: {', '.join(script.things) or 'none'}"
-    elif act.to and act.to not in {HEAD, *script.people, *places}:
-        yield ".to", f"no person, no place; there are head, {', '.join(script.people)}, {there}"
-    for place in act.via:
-        if place not in places:
-            yield ".via", f"{script.room} has no place {place!r}; it has {there}"
-
-
-def _overlaps(script: WorldScript, name: str, acts: tuple[TimedAct, ...]) -> Iterator[Fault]:
-    """Find simultaneous acts on one track, and acts that last beyond the round."""
-    busy: dict[str, tuple[float, int]] = {}
-    for i, one in enumerate(acts):
-        key, spare_s = f"people.{name}.acts.{i}", one.act.vary_s
-        if one.end_s + spare_s > script.round_s + 1e-9:
-            yield (
-                f"{key}.at_s",
-                f"{one.act.do} ends at {one.end_s + spare_s:.1f} s, the round at "
-                f"{script.round_s:g} s; begin earlier or make round_s longer",
-            )
-        for track in one.tracks:
-            until_s, other = busy.get(track, (0.0, -1))
-            begins_s = one.act.at_s - spare_s
-            if begins_s < until_s - 1e-9 and one.act.do != "look_at":
-                yield (
-                    f"{key}.at_s",
-                    f"{one.act.do} begins while {acts[other].act.do} (acts.{other}) keeps the {track} "
-                    f"busy until {until_s:.1f} s; begin then",
-                )
-            lasts_s = one.end_s - one.start_s
-            busy[track] = (max(until_s, one.act.at_s + spare_s + lasts_s), i)
-
-
-def _legs(script: WorldScript, name: str, person: PersonScript) -> Iterator[Fault]:
+def _legs(script: SceneScript, name: str, person: PersonScript) -> Iterator[Fault]:
     """Find a walk of a seated person, a sitting without a seat, or an end of round elsewhere."""
     places = places_of(script)
     at = person.start
@@ -145,7 +95,7 @@ def _legs(script: WorldScript, name: str, person: PersonScript) -> Iterator[Faul
         )
 
 
-def _crowded(script: WorldScript) -> Iterator[Fault]:
+def _crowded(script: SceneScript) -> Iterator[Fault]:
     """Find two people at one place at the same time."""
     stays: dict[str, list[tuple[float, float, str, str]]] = {}
     for name, person in script.people.items():
@@ -165,4 +115,4 @@ def _crowded(script: WorldScript) -> Iterator[Fault]:
 
 
 CHECKS = (faults,)
-"""Rules between several fields, for ``gazerig.config.load.load`` of a WorldScript."""
+"""Rules between several fields, for ``gazerig.config.load.load`` of a SceneScript."""

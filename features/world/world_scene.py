@@ -1,6 +1,5 @@
 """A world as a scene: its people, for the score, the true gaze and detectors without pictures."""
 
-from collections.abc import Iterator
 from functools import cached_property
 from math import atan2
 from typing import Any
@@ -10,11 +9,11 @@ import numpy as np
 from gazerig.features.world.figure import SIDES, Figures
 from gazerig.features.world.motions import FIST_M, OUT_S
 from gazerig.features.world.rotations import rotation_matrix
-from gazerig.features.world.timeline import HEAD_M, TimedAct
+from gazerig.features.world.timeline import HEAD_M, place_m
 from gazerig.gaze.angles import yaw_pitch
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.sim_mock.scenes.boxing import HALF_FIELD_RAD
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+from gazerig.sim_mock.scenes.timeline import HALF_FIELD_RAD, TimedAct, events_of
 
 GLOVE_M, HAND_M, THING_M = 0.078, 0.07, 0.05
 """Radii of the gaze targets."""
@@ -22,8 +21,6 @@ _RAISED_M = 0.50
 """A raised hand is at most this far below the nose."""
 _GLOVE_MIDDLE_M = 0.09
 _SPIN_WITHIN_S = 0.01
-_RETURN_S = 1.3
-_QUIET_S = 0.5
 
 
 class WorldScene:
@@ -53,10 +50,10 @@ class WorldScene:
         found = []
         script = self.figures.script
         for number, (name, person) in enumerate(script.people.items()):
-            nose = self._nose(name, t_s)
+            nose = self.face(name, t_s)
             first = True
             for which, side in enumerate(SIDES):
-                middle = self._hand(name, side, t_s)
+                middle = self.hand(name, side, t_s)
                 if not person.gloves and middle[2] < nose[2] - _RAISED_M:
                     continue
                 if person.gloves or not first:
@@ -78,66 +75,22 @@ class WorldScene:
 
     @cached_property
     def _events(self) -> tuple[Event, ...]:
-        found = [
-            event
-            for name, acts in self.figures.timelines.items()
-            for one in acts
-            for event in self._of_act(name, one)
-        ]
-        boxes = [n for n, person in self.figures.script.people.items() if person.gloves]
-        found += [event for name in boxes for event in self._quiet(name, found)]
-        return tuple(sorted(found, key=lambda event: event.start_s))
+        return events_of(self.figures.script, self.figures.timelines, self)
 
-    def _of_act(self, name: str, one: TimedAct) -> Iterator[Event]:
-        """Yield the events of an act that is visible to the robot."""
-        do, start_s, end_s = one.act.do, one.start_s, one.end_s
-        middle_s = 0.5 * (start_s + end_s)
-        boxes = self.figures.script.people[name].gloves
-        side = one.act.side
-        face = self._nose(name, middle_s)
-        if do == "reach":
-            yield from self._reach(name, one)
-        elif do in ("punch", "wave"):
-            hand = self._hand(name, side, middle_s)
-            due_s = start_s + OUT_S[do][0] * (end_s - start_s) if do == "punch" else None
-            yield Event(do, "look", "hand", start_s, end_s, hand, 0.5, due_s)
-        elif boxes and do == "step":
-            yield Event("step", "look", "face", start_s, end_s, face, 0.6)
-        elif boxes and do == "open_guard":
-            out, back = (0.5 * share * (end_s - start_s) for share in OUT_S[do])
-            yield Event("attack", "look", "attack_target", start_s + out, end_s - back, face, 0.6)
-        elif boxes and do == "feint":
-            until_s = min(start_s + _RETURN_S, self.round_s)
-            yield Event("return", "return", "face", start_s, until_s, face, 0.6)
-        elif do == "speak":
-            yield Event("speak", "look", "face", start_s, end_s, face, 0.5)
+    def place(self, name: str) -> Vec3:
+        """Return a place, at the height of what is looked at there."""
+        return place_m(self.figures.script, name)
 
-    def _reach(self, name: str, one: TimedAct) -> Iterator[Event]:
-        """Expect a look at a reaching hand while it is in view of a camera that points ahead."""
-        inside = [
-            t_s
-            for t_s in np.arange(one.start_s, one.end_s, 0.01).tolist()
-            if self._before_head(self._hand(name, one.act.side, t_s))
-        ]
-        if inside:
-            hand = self._hand(name, one.act.side, 0.5 * (one.start_s + one.end_s))
-            yield Event("reach", "look", "hand", inside[0], inside[-1], hand, 0.25)
+    def out_back_s(self, one: TimedAct) -> tuple[float, float]:
+        """Return how long a hand takes to its target, and back."""
+        lasts_s = one.end_s - one.start_s
+        out, back = OUT_S[one.act.do]
+        return out * lasts_s, back * lasts_s
 
-    def _before_head(self, p_m: Vec3) -> bool:
+    def before_head(self, p_m: Vec3) -> bool:
         """Return whether a point is in the field of view of a camera that points ahead."""
         x, y, z = np.subtract(p_m, HEAD_M).tolist()
         return bool(x > 0.0 and abs(atan2(y, x)) < HALF_FIELD_RAD and z > -0.35 * x)
-
-    def _quiet(self, name: str, events: list[Event]) -> list[Event]:
-        """Expect a look at a boxer's face during longer times without other events."""
-        quiet, free_s = [], 0.0
-        busy = sorted((event.start_s, event.end_s) for event in events)
-        for start_s, end_s in (*busy, (self.round_s, self.round_s)):
-            if start_s - free_s >= _QUIET_S:
-                face = self._nose(name, 0.5 * (free_s + start_s))
-                quiet.append(Event("face", "look", "face", free_s, start_s, face, 0.6))
-            free_s = max(free_s, end_s)
-        return quiet
 
     def _p(self, segment: str, t_s: float) -> Floats:
         return np.asarray(self.figures.segments(t_s).p_m[self.figures.row[segment]])
@@ -146,11 +99,12 @@ class WorldScene:
         quat = self.figures.segments(t_s).quat[self.figures.row[segment]]
         return rotation_matrix(quat)
 
-    def _nose(self, name: str, t_s: float) -> Vec3:
+    def face(self, name: str, t_s: float) -> Vec3:
+        """Return the tip of a nose."""
         back = np.array(self.figures.measures[name].skull_m)
         return _vec(self._p(f"{name}/head", t_s) - self._R(f"{name}/head", t_s) @ back)
 
-    def _hand(self, name: str, side: str, t_s: float) -> Vec3:
+    def hand(self, name: str, side: str, t_s: float) -> Vec3:
         """Return the middle of a hand or glove."""
         gloves = self.figures.script.people[name].gloves
         out = _GLOVE_MIDDLE_M if gloves else FIST_M
@@ -159,10 +113,10 @@ class WorldScene:
 
     def _person(self, name: str, t_s: float) -> ScenePerson:
         R = self._R(f"{name}/head", t_s)
-        nose = self._nose(name, t_s)
+        nose = self.face(name, t_s)
         hand = None
         if not self.figures.script.people[name].gloves:
-            hands = (self._hand(name, side, t_s) for side in SIDES)
+            hands = (self.hand(name, side, t_s) for side in SIDES)
             hand = next((one for one in hands if one[2] > nose[2] - _RAISED_M), None)
         return ScenePerson(nose, yaw_pitch(_vec(R[:, 0])), hand)
 

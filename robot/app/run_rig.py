@@ -14,9 +14,9 @@ from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.params import choices_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
+from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.app.surroundings import surroundings
 from gazerig.robot.recording.run_info import RunInfo, versions
-from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.scenes.scene import Scene
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
@@ -68,15 +68,13 @@ def scene_of(rig: Rig, options: RunOptions) -> Scene | None:
     """Return the requested scene, None if the camera has another source.
 
     Raises:
+        gazerig.config.load.ConfigError: its script is at fault.
         SetupError: the scene is unknown, or the rig has no rule for a behaviour that its action
             planner would have to choose there.
     """
     if options.scene is None:
         return None
-    known = scenes()
-    if options.scene not in known:
-        raise SetupError(f"--scene {options.scene}: unknown; scenes: {', '.join(sorted(known))}")
-    scene = known[options.scene]
+    scene = load_scene(options.scene, options.seed)
     refuse_unruled(rig.gaze.top_down, scene, f"--scene {options.scene}")
     return scene
 
@@ -101,8 +99,10 @@ def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
     Its action planner is switched on, and in a world the finder of red gloves. Rules that lack a
     behaviour stay unchanged: ``scene_of`` refuses the scene.
     """
-    scene: Scene | None = scenes().get(options.scene or "")
-    if options.world is not None:
+    scene: Scene | None = None
+    if options.scene is not None:
+        scene = load_scene(options.scene, options.seed)
+    elif options.world is not None:
         scene = surroundings(options.world).scene(options)
     rules = rig.gaze.top_down
     if scene is None or not scene.behaviours or not {*scene.behaviours} <= rules.rules.keys():

@@ -160,13 +160,6 @@ def complete_shipped(kind: str, home: Path | None = None) -> Callable[[str], lis
     ]
 
 
-def complete_scene(incomplete: str) -> list[str]:
-    """Complete a simulated scene."""
-    from gazerig.sim_mock.scenes.registry import scenes
-
-    return [name for name in sorted(scenes()) if name.startswith(incomplete)]
-
-
 def complete_world(incomplete: str) -> list[str]:
     """Complete a world with physics, or other surroundings."""
     from gazerig.robot.app.surroundings import surroundings_names

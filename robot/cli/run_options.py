@@ -5,15 +5,16 @@ from typing import Annotated
 
 import typer
 
-from gazerig.robot.cli.examples import complete_scene, complete_shipped, complete_world
+from gazerig.robot.cli.examples import complete_shipped, complete_world
 
 Mock = Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")]
 Port = Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")]
 Scene = Annotated[
     str | None,
     typer.Option(
-        help="Look at a simulated scene (default with --mock: visitor).",
-        autocompletion=complete_scene,
+        metavar="NAME|FILE",
+        help="Look at a simulated scene (default with --mock: visitor), or a script of one's own.",
+        autocompletion=complete_shipped("scenes"),
     ),
 ]
 World = Annotated[

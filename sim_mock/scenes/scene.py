@@ -5,8 +5,6 @@ often it is read. World frame (x forward, y left, z up), metres, seconds from th
 scene. Not modelled: bodies below the neck, gait, facial expression.
 """
 
-from collections.abc import Sequence
-from math import atan2, radians
 from typing import Literal, NamedTuple, Protocol
 
 from gazerig.gaze.types import Angles2, Vec3
@@ -87,14 +85,6 @@ class Scene(Protocol):
         ...
 
 
-class Key(NamedTuple):
-    """A person's state from ``t_s`` on: position of the face, and its turn off the robot."""
-
-    t_s: float
-    face: Vec3
-    turn_deg: Angles2 = (0.0, 0.0)
-
-
 def min_jerk(s: float) -> float:
     """Return the minimum-jerk path from 0 to 1 at a share 0..1 of its time."""
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
@@ -107,24 +97,3 @@ def there_and_back(since_s: float, out_s: float, hold_s: float, back_s: float) -
     if since_s < out_s:
         return min_jerk(since_s / out_s)
     return min_jerk(min(1.0, (out_s + hold_s + back_s - since_s) / back_s))
-
-
-def between(keys: Sequence[Key], phase_s: float) -> tuple[Vec3, Angles2]:
-    """Move from key to key with minimum jerk; the face looks at the robot plus its turn.
-
-    Returns the position of the face and its (yaw, pitch); the pitch is the turn's only.
-    """
-    last = keys[0]
-    for following in keys[1:]:
-        if phase_s < following.t_s:
-            break
-        last = following
-    else:
-        following = last
-    span = following.t_s - last.t_s
-    f = min_jerk((phase_s - last.t_s) / span if span > 0.0 else 0.0)
-    x, y, z = (a + f * (b - a) for a, b in zip(last.face, following.face, strict=True))
-    turn, nod = (
-        radians(a + f * (b - a)) for a, b in zip(last.turn_deg, following.turn_deg, strict=True)
-    )
-    return (x, y, z), (atan2(-y, -x) + turn, nod)

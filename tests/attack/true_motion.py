@@ -23,8 +23,8 @@ from true_shafts import Judge, Late, group_of, looked_at, on_time, run, sometime
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.scene_files import scene_names
 from gazerig.robot.model.commands import LookAt
-from gazerig.sim_mock.scenes.registry import scenes
 
 RIGS = ("desk", "feetech", "maker", "pca9685", "mixed")
 LATES: dict[str, Callable[[], Late]] = {
@@ -85,7 +85,7 @@ def table(args: argparse.Namespace) -> None:
 
 def one(rig: Rig, scene: str, late: Late, seconds: float) -> tuple[int, Judge]:
     """Run one rig in one scene; returns the ticks and what true joints did."""
-    looks = scene not in scenes()
+    looks = scene not in scene_names()
     choice = RunOptions(mock=True, fast=True, seed=0, scene="visitor" if looks else scene)
     with looked_at(rig, choice) as (made, shafts):
         judge = Judge(rig)
@@ -101,7 +101,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0, help="simulated, of each run")
     parser.add_argument("--rigs", nargs="*", default=list(RIGS))
-    parser.add_argument("--scenes", nargs="*", default=list(scenes()))
+    parser.add_argument("--scenes", nargs="*", default=list(scene_names()))
     parser.add_argument("--late", nargs="*", default=list(LATES), choices=list(LATES))
     table(parser.parse_args())
 

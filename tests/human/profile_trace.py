@@ -94,18 +94,18 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     """Return what runs in a profile, and what it looks at."""
     calls, kinds = Profile(subcalls=False, builtins=False), set[str]()
     scene = EverythingOnce()
-    shipped = run_rig.scenes
+    shipped = run_rig.load_scene
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
     rig = changed(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
-    run_rig.scenes = lambda: {**shipped(), scene.name: scene}
+    run_rig.load_scene = lambda name, seed: scene
     calls.enable()
     try:
         simulate(rig, options, watch=lambda tick: kinds.add(tick.target.kind))
     finally:
         calls.disable()
-        run_rig.scenes = shipped
+        run_rig.load_scene = shipped
     named: Counter[str] = Counter()
     for code, times, *_ in calls.getstats():
         if isinstance(code, CodeType) and "gaze" in Path(code.co_filename).parts:

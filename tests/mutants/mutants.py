@@ -162,9 +162,9 @@ MUTANTS = (
            "attacks of later rounds are never into an open guard", ("behaviours", "action_planner_rerun")),
     # ---- looks
     Mutant("features/lab/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(first == 0)",
-           "a look that the run's end cuts off is a whole bout", ("report_measures",)),
+           "a look that the run's end cuts off is a whole bout", ("report",)),
     Mutant("features/lab/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(last >= len(t))",
-           "a look that the run's beginning cuts off is a whole bout", ("report_measures",)),
+           "a look that the run's beginning cuts off is a whole bout", ("report",)),
     Mutant("robot/analysis/mutual_gaze.py", "if b > 0 and e < len(t_s)]", "if e < len(t_s)]",
            "a mutual gaze that has begun before has a length", ("two_heads",)),
     # ---- worlds
@@ -194,7 +194,7 @@ MUTANTS = (
            "a reader that was overtaken returns half of two states", ("world_state_file",)),
     Mutant("features/world/faces.py", "share = share * (1.0 - rise((np.abs(aside) - 1.9) / 1.0))", "pass",
            "people turn their heads to what is behind them", ("world_people", "world_acts", "world_faces")),
-    Mutant("features/world/script_faults.py", "begins_s = one.act.at_s - spare_s", "begins_s = one.act.at_s",
+    Mutant("sim_mock/scenes/timeline.py", "begins_s = one.act.at_s - spare_s", "begins_s = one.act.at_s",
            "two acts of one arm may meet by what varies", ("world_scripts",)),
     Mutant("features/world/world_scene.py", "and z > -0.35 * x)", ")",
            "a hand below the picture counts as seen", ("world_acts", "world_scripts", "world_people")),

@@ -21,7 +21,7 @@ from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
-from gazerig.sim_mock.scenes.group import HEAD_M
+from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Event, Scene, ScenePerson, Thing
 
 _HZ = 30.0

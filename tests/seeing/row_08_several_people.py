@@ -13,7 +13,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from gazerig.sim_mock.scenes.group import HEAD_M
+from gazerig.sim_mock.scenes.faces_scene import HEAD_M
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 _SETTLED_S = 2.0

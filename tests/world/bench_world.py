@@ -42,13 +42,6 @@ from gazerig.drivers.types import FaceDetector  # noqa: E402
 from gazerig.drivers.vision.face.detector import face_detector  # noqa: E402
 from gazerig.drivers.vision.face.params import FaceDetectorParams  # noqa: E402
 from gazerig.features.world.figure import Figures  # noqa: E402
-from gazerig.features.world.script import (  # noqa: E402
-    HOME,  # noqa: E402
-    Act,
-    PersonScript,
-    PlaceScript,
-    WorldScript,
-)
 from gazerig.features.world.world_scene import WorldScene  # noqa: E402
 from gazerig.gaze.angles import compose, rotation  # noqa: E402
 from gazerig.gaze.types import Mat3  # noqa: E402
@@ -56,6 +49,13 @@ from gazerig.robot.model.intrinsics import project  # noqa: E402
 from gazerig.robot.model.scene_view import PinholeView  # noqa: E402
 from gazerig.sim_mock.cameras.optics import CameraMotion, OpticsParams, expose  # noqa: E402
 from gazerig.sim_mock.scenes.scene import ScenePerson  # noqa: E402
+from gazerig.sim_mock.scenes.script import (  # noqa: E402
+    HOME,  # noqa: E402
+    Act,
+    PersonScript,
+    PlaceScript,
+    SceneScript,
+)
 
 if TYPE_CHECKING:
     from gazerig.features.world.picture import WorldPicture
@@ -149,11 +149,11 @@ def lens_costs(args: argparse.Namespace) -> None:
 
 def _one_person() -> "WorldPicture":
     """Return a room with one person who is at 1.2 m and does nothing."""
-    script = WorldScript({"p": PersonScript("there")}, places={"there": PlaceScript(1.2, 0.0)})
+    script = SceneScript({"p": PersonScript("there")}, places={"there": PlaceScript(1.2, 0.0)})
     return _played(script)
 
 
-def _played(script: WorldScript) -> "WorldPicture":
+def _played(script: SceneScript) -> "WorldPicture":
     """Return pictures of a script."""
     from gazerig.features.world.figure import Figures
     from gazerig.features.world.figure_model import PeoplePlacer
@@ -242,8 +242,8 @@ def motion(args: argparse.Namespace) -> None:
 
     seconds = 4.0 if args.quick else 12.0
     waves = tuple(Act(at_s=at, do="wave", for_s=2.4) for at in np.arange(0.5, seconds - 2.5, 3.0))
-    nobody = WorldScript(people={"p": PersonScript("door")}, round_s=seconds)
-    somebody = WorldScript(
+    nobody = SceneScript(people={"p": PersonScript("door")}, round_s=seconds)
+    somebody = SceneScript(
         people={"p": PersonScript("there", acts=waves)},
         round_s=seconds,
         places={"there": PlaceScript(1.9, 0.0)},
@@ -268,7 +268,7 @@ def scripts(args: argparse.Namespace) -> None:
     for name in ("living-room", "conversation", "boxing", "crowd"):
         found = {key: np.zeros(3, int) for key in _detectors(args.yunet) if "640" not in key}
         rng = np.random.default_rng(0)
-        script = load(shipped("worlds", name, HOME), WorldScript)
+        script = load(shipped("worlds", name, HOME), SceneScript)
         picture = _played(script)
         scene = WorldScene(name, Figures(script, 0))
         detectors = _detectors(args.yunet)

@@ -12,7 +12,6 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.features.world.gl_context import import_mujoco
-from gazerig.features.world.script import Act, LightParams, PersonScript, WorldScript
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.app.drawn_motion import SyntheticMotionDetector
@@ -22,6 +21,7 @@ from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+from gazerig.sim_mock.scenes.script import Act, LightParams, PersonScript, SceneScript
 
 OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 CAMERA_M: Vec3 = (0.10, 0.0, 0.20)
@@ -69,7 +69,7 @@ class PosedPeople:
         speaks = (Act(at_s=0.5, do="speak", for_s=_ROUND_S - 1.0),)
         people = {f"p{n}": PersonScript("front", n, acts=speaks) for n in looks}
         light = LightParams(shadows=shadows)
-        self.figures = Figures(WorldScript(people, round_s=_ROUND_S, light=light), 1)
+        self.figures = Figures(SceneScript(people, round_s=_ROUND_S, light=light), 1)
         self.model = world_model(self.figures, ()).mj
         self._people = PeoplePlacer(self.model, self.figures)
         self.size_px, self._noise = size_px, noise_grey
@@ -253,7 +253,7 @@ class _NoFaces:
 
 
 def watch_motion(
-    script: WorldScript,
+    script: SceneScript,
     seconds: float,
     turn: float,
     params: Any = None,

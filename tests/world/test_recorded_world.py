@@ -13,9 +13,9 @@ from gazerig.config.load import load, shipped, shipped_names
 from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.heads_scene import RigFrame
+from gazerig.features.world.room import HOME
 from gazerig.features.world.run.head_group import compose_group
 from gazerig.features.world.run.recorded_world import recorded_shapes, world_info
-from gazerig.features.world.script import HOME, WorldScript
 from gazerig.features.world.shapes import ShapesFrom, SpecShapes
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import compose, run
@@ -28,6 +28,7 @@ from gazerig.robot.dashboard.feed.live_feed import (
 )
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_info import WorldInfo, as_text, read_world_info
+from gazerig.sim_mock.scenes.script import SceneScript
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -66,10 +67,10 @@ def test_a_recording_has_its_world_and_the_same_room_and_people_come_of_it(
 
 @pytest.mark.parametrize("name", shipped_names("worlds", HOME))
 def test_a_script_is_the_same_after_a_recording(name: str, tmp_path: Path) -> None:
-    script = load(shipped("worlds", name, HOME), WorldScript)
+    script = load(shipped("worlds", name, HOME), SceneScript)
     file = tmp_path / "again.yaml"
     file.write_text(params_text(script), encoding="utf-8")
-    assert load(file, WorldScript) == script
+    assert load(file, SceneScript) == script
 
 
 def test_another_head_has_the_people_of_the_first_as_from_where_it_stands(tmp_path: Path) -> None:

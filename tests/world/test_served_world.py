@@ -15,7 +15,6 @@ from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.run.poses import RigInState, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld, world_of
 from gazerig.features.world.run.sight import RenderedWorld, WorldCamera, served_pixels
-from gazerig.features.world.script import WorldCameraParams
 from gazerig.features.world.served_world import PUBLISH_MS, ServedWorld
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
@@ -23,6 +22,7 @@ from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.pty.line import BusSettings
+from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 RIG = load_rig("minimal")
 

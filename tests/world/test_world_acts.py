@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gazerig.features.world.figure import SEGMENTS, Figures
-from gazerig.features.world.script import Act, Do, PersonScript, ThingScript, WorldScript
 from gazerig.features.world.script_faults import faults
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.scenes.script import Act, Do, PersonScript, SceneScript, ThingScript
 
 AT_S = 3.0
 ROUND_S = 18.0
@@ -43,7 +43,7 @@ ARM_ACTS = ("wave", "point", "reach", "push", "punch", "feint")
 def figures(acts: tuple[Act, ...], start: str = "behind", *, cup: bool = False) -> Figures:
     people = {"anna": PersonScript(start, acts=acts), "ben": PersonScript("chair_left", look=4)}
     things = {"cup": ThingScript("anna")} if cup else {}
-    return Figures(WorldScript(people, round_s=ROUND_S, things=things), 2)
+    return Figures(SceneScript(people, round_s=ROUND_S, things=things), 2)
 
 
 def still(cup: bool = False) -> Figures:
@@ -67,7 +67,7 @@ def moved_m(acts: tuple[Act, ...], *, cup: bool = False) -> dict[str, float]:
 
 
 def test_there_is_a_case_for_every_act() -> None:
-    assert set(CASES) | {"sit", "stand"} == set(get_args(Do))
+    assert set(CASES) | {"sit", "stand", "glance", "spin"} == set(get_args(Do))
 
 
 @pytest.mark.parametrize("name", sorted(CASES))
@@ -106,7 +106,7 @@ def test_after_an_act_all_is_as_before(name: str) -> None:
 def test_who_sits_is_lower_with_the_thighs_level_and_stands_up_again() -> None:
     acts = (Act(1.0, "stand"), Act(5.0, "sit"))
     person = PersonScript("chair_right", acts=acts)
-    one = Figures(WorldScript({"anna": person}, round_s=ROUND_S), 0)
+    one = Figures(SceneScript({"anna": person}, round_s=ROUND_S), 0)
 
     def height(t_s: float) -> float:
         return float(one.segments(t_s).p_m[one.row["anna/pelvis"], 2])
@@ -121,7 +121,7 @@ def test_who_sits_is_lower_with_the_thighs_level_and_stands_up_again() -> None:
 
 @pytest.mark.parametrize("stature_m", [0.95, 1.3, 1.72, 2.05])
 def test_children_and_tall_people_are_as_tall_as_they_say(stature_m: float) -> None:
-    script = WorldScript({"anna": PersonScript("front", stature_m=stature_m)}, round_s=4.0)
+    script = SceneScript({"anna": PersonScript("front", stature_m=stature_m)}, round_s=4.0)
     assert not list(faults(script))
     found = Figures(script, 0).segments(1.0)
     eyes_m = float(found.p_m[Figures(script, 0).row["anna/left_eye"], 2]) + script.neck_height_m

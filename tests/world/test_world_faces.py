@@ -11,7 +11,7 @@ from rendering import renders as renders
 
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.features.world.script import PersonScript, WorldScript
+from gazerig.sim_mock.scenes.script import PersonScript, SceneScript
 
 pytestmark = pytest.mark.usefixtures("renders")
 
@@ -57,7 +57,7 @@ def test_a_posed_face_has_its_landmarks_where_the_picture_has_them(people: Posed
 
 
 def test_nothing_moves_in_an_empty_room_though_the_head_turns() -> None:
-    nobody = WorldScript(people={"p": PersonScript("door")}, round_s=4.0)
+    nobody = SceneScript(people={"p": PersonScript("door")}, round_s=4.0)
     _, blobs, _ = watch_motion(nobody, 0.7, 1.0)
     assert blobs < 0.05
 

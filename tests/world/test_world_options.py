@@ -12,11 +12,12 @@ from gazerig.config.load import load, shipped
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
+from gazerig.features.world.room import HOME
 from gazerig.features.world.run.run_world import world_of, world_script
-from gazerig.features.world.script import HOME, WorldCameraParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import compose
 from gazerig.robot.cli.run import what_runs
+from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 ASKED = RunOptions(mock=True, world="living-room")
 

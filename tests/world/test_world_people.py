@@ -15,11 +15,12 @@ from gazerig.features.world.body_shape import body_segments
 from gazerig.features.world.faces import looks
 from gazerig.features.world.figure import SEGMENTS, Figures
 from gazerig.features.world.rotations import rotation_matrix
-from gazerig.features.world.script import Act, PersonScript, PlaceScript, WorldScript
-from gazerig.features.world.timeline import HEAD_M, TimedAct
+from gazerig.features.world.timeline import HEAD_M
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.gaze.types import Floats
 from gazerig.robot.description.person_shape import WORLD_LOOKS
+from gazerig.sim_mock.scenes.script import Act, PersonScript, PlaceScript, SceneScript
+from gazerig.sim_mock.scenes.timeline import TimedAct
 
 STEP_S = 0.02
 
@@ -329,7 +330,7 @@ def test_only_a_hand_before_the_camera_is_to_be_looked_at() -> None:
     """A hand that reaches for a thing on the floor is below the picture all the time."""
     found = {}
     for name, height_m in (("level", 1.0), ("floor", 0.2)):
-        script = WorldScript(
+        script = SceneScript(
             {"p": PersonScript("near", acts=(Act(at_s=1.0, do="reach", to="it", for_s=2.8),))},
             round_s=5.0,
             places={

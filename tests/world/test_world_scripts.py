@@ -10,8 +10,18 @@ from world_scripts import WORLDS, read, shipped_world
 from gazerig.config.bounds import shapes_of
 from gazerig.config.faults import ConfigError
 from gazerig.features.world.room import ROOMS
-from gazerig.features.world.script import Act, Do, PersonScript, PlaceScript, WorldScript
-from gazerig.features.world.timeline import LASTS_S
+from gazerig.sim_mock.scenes.script import (
+    Act,
+    Do,
+    ExpectedLook,
+    PersonScript,
+    PlaceScript,
+    SceneScript,
+    SwayScript,
+    ThingScript,
+    WaveScript,
+)
+from gazerig.sim_mock.scenes.timeline import LASTS_S
 
 PAGE = (Path(__file__).parents[2] / "docs" / "world" / "world-scripts.md").read_text()
 
@@ -105,7 +115,16 @@ def test_the_page_names_every_act_place_and_key() -> None:
     for room, places in ROOMS.items():
         (row,) = [row for row in rows if row[0].strip() == room]
         assert set(re.findall(r"\w+", " ".join(row[1:]))) == set(places), room
-    for params in (Act, PersonScript, PlaceScript, WorldScript):
+    for params in (
+        Act,
+        ExpectedLook,
+        PersonScript,
+        PlaceScript,
+        SceneScript,
+        SwayScript,
+        ThingScript,
+        WaveScript,
+    ):
         for key in shapes_of(params):
             assert re.search(rf"\b{key}\b", PAGE), f"{params.__name__}.{key}"
 
@@ -114,3 +133,25 @@ def test_the_example_on_the_page_can_be_played(tmp_path: Path) -> None:
     file = tmp_path / "page.yaml"
     file.write_text(PAGE.split("```")[1])
     assert read(file).people["anna"].acts[-1].to == "door"
+
+
+@pytest.mark.parametrize(
+    ("act", "more", "said"),
+    [
+        ("{at_s: 1, do: glance, yaw_deg: 20}", "", "needs room: none"),
+        ("{at_s: 1, do: open_guard, frees: chest}", "", "needs room: none"),
+        ("{at_s: 1, do: nod}", "    level: true\n", "needs room: none"),
+        ("{at_s: 1, do: nod}", "things:\n  a: {kind: pinwheel}\n", "need room: none"),
+    ],
+)
+def test_what_only_a_scene_without_a_room_has_is_refused_in_a_room(
+    tmp_path: Path, act: str, more: str, said: str
+) -> None:
+    assert said in refused(tmp_path, f"      - {act}\n", "front", more)
+
+
+def test_a_world_needs_a_room(tmp_path: Path) -> None:
+    file = tmp_path / "own.yaml"
+    file.write_text("room: none\npeople: {}\n")
+    with pytest.raises(ConfigError, match="play the script with --scene"):
+        read(file)

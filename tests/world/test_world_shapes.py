@@ -17,12 +17,12 @@ from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.rig_in_world import RigInWorld
+from gazerig.features.world.room import HOME
 from gazerig.features.world.run.run_world import rig_in_world, world_scene
-from gazerig.features.world.script import HOME
 from gazerig.features.world.shapes import SpecShapes, shapes_of
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.robot.dashboard.view.world_view import part_glb, room_glbs
-from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldPart
 

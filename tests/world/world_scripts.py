@@ -4,15 +4,16 @@ from pathlib import Path
 
 from gazerig.config.load import load, shipped
 from gazerig.config.shipped import shipped_names
-from gazerig.features.world.script import HOME, WorldScript
+from gazerig.features.world.room import HOME
 from gazerig.features.world.script_faults import CHECKS
+from gazerig.sim_mock.scenes.script import SceneScript
 
 WORLDS = shipped_names("worlds", HOME)
 
 
-def read(path: Path) -> WorldScript:
-    return load(path, WorldScript, checks=CHECKS)
+def read(path: Path) -> SceneScript:
+    return load(path, SceneScript, checks=CHECKS)
 
 
-def shipped_world(name: str) -> WorldScript:
+def shipped_world(name: str) -> SceneScript:
     return read(shipped("worlds", name, HOME))

@@ -11,13 +11,13 @@ from gazerig.drivers.extras import extra_hint
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.run.run_world import mjcf_of, world_script
-from gazerig.features.world.script import WorldScript
 from gazerig.features.world.script_faults import CHECKS
 from gazerig.features.world.shapes import ShapesFrom, script_shapes
 from gazerig.robot.analysis.mutual_gaze import HeadPlace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.recording.run_info import WorldInfo
+from gazerig.sim_mock.scenes.script import SceneScript
 
 
 def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
@@ -58,12 +58,12 @@ def recorded_shapes(info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
     return ShapesFrom(shapes, RigFrame(*HeadPlace.of(stands))) if stands else shapes
 
 
-def _script(info: WorldInfo) -> WorldScript:
+def _script(info: WorldInfo) -> SceneScript:
     with TemporaryDirectory() as folder:
         file = Path(folder) / f"{info.name}.yaml"
         file.write_text(info.script_yaml, encoding="utf-8")
         try:
-            return load(file, WorldScript, checks=CHECKS)
+            return load(file, SceneScript, checks=CHECKS)
         except ConfigError as error:
             first = str(error).splitlines()[0].replace(f"{folder}/", "")
             raise SetupError(

@@ -28,12 +28,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gazerig.config.load import ConfigError, ConfigFault, load, shipped
+from gazerig.config.load import ConfigError, ConfigFault, load
 from gazerig.config.schema import load_rig, rig_path
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.extras import extra_hint
 from gazerig.features.world.figure import Figures
-from gazerig.features.world.script import HOME, Fault, WorldCameraParams, WorldScript
+from gazerig.features.world.room import HOME
 from gazerig.features.world.script_faults import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
@@ -42,7 +42,9 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
 from gazerig.robot.app.run_bus import BOARDS, CHAINS
 from gazerig.robot.app.run_rig import refuse_unruled
+from gazerig.robot.app.scene_files import script_file
 from gazerig.sim_mock.scenes.scene import Scene
+from gazerig.sim_mock.scenes.script import Fault, SceneScript, WorldCameraParams
 
 if TYPE_CHECKING:
     from gazerig.features.world.physics import World
@@ -210,7 +212,7 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
     return RunWorld(spec, scene, script.camera, others=placed_rigs(others, script, looks=True))
 
 
-def other_rigs(rig: Rig, script: WorldScript) -> dict[str, Rig]:
+def other_rigs(rig: Rig, script: SceneScript) -> dict[str, Rig]:
     """Return the rigs of the other heads of a script, by the heads' names.
 
     Args:
@@ -227,7 +229,7 @@ def other_rigs(rig: Rig, script: WorldScript) -> dict[str, Rig]:
 
 
 def placed_rigs(
-    rigs: Mapping[str, Rig], script: WorldScript, looks: bool
+    rigs: Mapping[str, Rig], script: SceneScript, looks: bool
 ) -> tuple[RigInWorld, ...]:
     """Return the rigs of a script's other heads at their poses.
 
@@ -253,38 +255,31 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
     """
     name = Path(name_or_path).stem
     if mjcf_of(name_or_path) is not None:
-        return WorldScene(name, Figures(WorldScript(people={}), seed))
+        return WorldScene(name, Figures(SceneScript(people={}), seed))
     return WorldScene(name, Figures(world_script(name_or_path), seed))
 
 
-def world_script(name_or_path: str) -> WorldScript:
+def world_script(name_or_path: str) -> SceneScript:
     """Return the script of a world; paths of its heads' rigs are relative to the working folder.
 
     Raises:
         gazerig.config.load.ConfigError: the file is at fault, or there is none of that name.
     """
-    path = Path(name_or_path)
-    if "/" not in name_or_path and path.suffix not in (".yaml", ".yml"):
-        path = shipped("worlds", name_or_path, HOME)
-    try:
-        facts = path.stat()
-    except OSError:
-        return _read(path, None)  # raises with the reason
-    return _read(path, (facts.st_ino, facts.st_mtime_ns, facts.st_size))
+    return _read(*script_file("worlds", name_or_path, HOME))
 
 
 @lru_cache(maxsize=2)
-def _read(path: Path, version: tuple[int, int, int] | None) -> WorldScript:
+def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
     """Return a script; a run requests it several times, and reads it once."""
 
-    def unknown_rigs(script: WorldScript) -> Iterator[Fault]:
+    def unknown_rigs(script: SceneScript) -> Iterator[Fault]:
         for name, head in script.heads.items():
             try:
                 _resolve_rig(path, head.rig)
             except ConfigError as error:
                 yield f"heads.{name}.rig", error.faults[0].rule
 
-    script = load(path, WorldScript, checks=(*CHECKS, unknown_rigs))
+    script = load(path, SceneScript, checks=(*CHECKS, unknown_rigs))
     heads = {
         name: replace(head, rig=_resolve_rig(path, head.rig)) for name, head in script.heads.items()
     }

@@ -22,7 +22,6 @@ from gazerig.drivers.types import Camera, Detections, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.features.world.gl_context import NoRenderer, render_in_calling_thread
 from gazerig.features.world.run.poses import SimulatedPoses, WorldPoses
-from gazerig.features.world.script import WorldCameraParams
 from gazerig.features.world.state_file import HostState
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.gaze.types import Mat3
@@ -40,6 +39,7 @@ from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.motion_source import motion_finder
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import Scene
+from gazerig.sim_mock.scenes.script import WorldCameraParams
 
 if TYPE_CHECKING:
     from gazerig.robot.model.scene_view import SceneView

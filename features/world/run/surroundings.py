@@ -2,7 +2,7 @@
 
 from gazerig.config.rig import Rig
 from gazerig.config.shipped import shipped_names
-from gazerig.features.world.script import HOME
+from gazerig.features.world.room import HOME
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.surroundings import GroupRun, RunRoom, Surroundings
 from gazerig.robot.description.world_shapes import WorldShapes

@@ -1,20 +1,17 @@
-"""The script of a world: its room, its people, and their acts over time.
+"""The script of a scene: its room, its people, and their acts over time.
 
-The configuration's loader reads it from YAML (worlds/*.yaml are shipped). A script repeats after
-every round, so every person must end the round at its starting place.
+The configuration's loader reads it from YAML. ``--scene`` plays a script without a room: faces and
+hands that move through the air. ``--world`` plays one with a room: bodies on its floor. A script
+repeats after every round, so every person must end the round at its starting place.
 
-Place frame: the world's, with the neck base of the (first) head as its origin, on the floor.
+Place frame: the world's, with the neck base of the (first) head above its origin, on the floor.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from gazerig.params import Bounds
-
-HOME = Path(__file__).parent
-"""The folder with ``worlds``, the shipped scripts."""
 
 
 @dataclass(frozen=True)
@@ -69,19 +66,21 @@ Do = Literal[
     "punch",
     "feint",
     "open_guard",
+    "glance",
+    "spin",
 ]
-"""The acts of a person."""
+"""The acts of a person or a thing."""
 
-RoomName = Literal["living-room", "gym", "hall"]
+RoomName = Literal["none", "living-room", "gym", "hall"]
 """The rooms (gazerig.features.world.room)."""
 
-HEAD = "head"
-"""Name of the robot's head in a script."""
+HEAD, BASE = "head", "base"
+"""Names of the robot's head and, without a room, of its neck base in a script."""
 
 
 @dataclass(frozen=True)
 class Act:
-    """One thing that a person does."""
+    """One thing that a person or a thing does."""
 
     # fmt: off
     at_s: Annotated[float, Bounds(0, 600), "when it begins, from the beginning of the round"]
@@ -94,7 +93,33 @@ class Act:
     left_m: Annotated[float, Bounds(-2, 2), "how far to the person's left a step goes"] = 0.0
     speed_m_s: Annotated[float, Bounds(0.2, 2), "speed of a walk"] = 0.9
     thing: Annotated[str, "the thing that is passed"] = ""
+    yaw_deg: Annotated[float, Bounds(-60, 60), "how far to its left a face glances off what it looks at"] = 0.0
+    pitch_deg: Annotated[float, Bounds(-60, 60), "how far up it glances"] = 0.0
+    frees: Annotated[Literal["face", "chest"], "what an open guard leaves free"] = "face"
     vary_s: Annotated[float, Bounds(0, 10), "how much earlier or later it begins at most, by the seed"] = 0.0
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class SwayScript:
+    """Small motion of a face: a sine along each axis of the world."""
+
+    # fmt: off
+    m: Annotated[tuple[float, float, float], Bounds(0, 0.1), "amplitudes, metres"] = (0.005, 0.009, 0.003)
+    hz: Annotated[tuple[float, float, float], Bounds(0, 3), "rates"] = (0.21, 0.17, 0.29)
+    rad: Annotated[tuple[float, float, float], Bounds(-7, 7), "phases at the start"] = (0.0, 1.0, 2.0)
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class WaveScript:
+    """How a hand without an arm waves."""
+
+    # fmt: off
+    aside_m: Annotated[float, Bounds(0, 1), "how far from the middle of the face the hand is"] = 0.25
+    swing_m: Annotated[float, Bounds(0, 0.3), "how far it swings to each side"] = 0.11
+    raise_s: Annotated[float, Bounds(0.1, 2), "how long it takes to rise"] = 0.4
+    smooth: Annotated[bool, "whether it rises with minimum jerk; otherwise with constant speed"] = True
     # fmt: on
 
 
@@ -109,28 +134,51 @@ class PersonScript:
     gloves: Annotated[bool, "wears boxing gloves"] = False
     looks_at: Annotated[str, "what is looked at before the first look_at: a person, a place or head"] = HEAD
     acts: Annotated[tuple[Act, ...], "what is done, in the order of time"] = ()
+    level: Annotated[bool, "without a room: the face does not pitch towards what it looks at"] = False
+    sway: Annotated[SwayScript | None, "without a room: small motion; null: none"] = None
+    wave: Annotated[WaveScript, "without a room: how it waves"] = field(default_factory=WaveScript)
     # fmt: on
 
 
 @dataclass(frozen=True)
 class ThingScript:
-    """A thing that people hand to each other."""
+    """A thing that people hand to each other, or without a room one that moves by itself."""
 
     # fmt: off
-    held_by: Annotated[str, "the person who holds it when the round begins and ends"]
+    held_by: Annotated[str, "the person who holds it when the round begins and ends"] = ""
     side: Annotated[Literal["left", "right"], "in which hand"] = "right"
-    kind: Annotated[Literal["cup", "ball"], "what it is"] = "cup"
+    kind: Annotated[Literal["cup", "ball", "pinwheel", "hand"], "what it is"] = "cup"
+    at: Annotated[str, "without a room: its place, or where a hand is before it reaches"] = ""
+    acts: Annotated[tuple[Act, ...], "without a room: when a pinwheel spins, or a hand reaches"] = ()
+    # fmt: on
+
+
+@dataclass(frozen=True)
+class ExpectedLook:
+    """A time of the round in which the gaze should be on a target."""
+
+    # fmt: off
+    name: Annotated[str, "what happens then"]
+    kind: Annotated[Literal["face", "hand", "pinwheel", "thing"], "kind of the target"]
+    start_s: Annotated[float, Bounds(0, 600), "from when on"]
+    end_s: Annotated[float, Bounds(0, 600), "until when"]
+    at: Annotated[str, "the place of the target"]
+    within_m: Annotated[float, Bounds(0.01, 5), "how far from it the target is at most"] = 0.3
     # fmt: on
 
 
 @dataclass(frozen=True)
 class PlaceScript:
-    """A place of the script's own on the floor."""
+    """A place of the script's own: on the floor, or without a room in the air."""
 
     x_m: Annotated[float, Bounds(-10, 10), "distance ahead of the neck base"]
     y_m: Annotated[float, Bounds(-10, 10), "distance to the left of it"]
     facing_deg: Annotated[float, Bounds(-180, 180), "where one who stands there faces"] = 180.0
-    height_m: Annotated[float, Bounds(0, 3), "height of what is looked or pointed at there"] = 1.3
+    height_m: Annotated[
+        float,
+        Bounds(0, 3),
+        "height above the floor of a face there, or of what is looked or pointed at",
+    ] = 1.3
 
 
 @dataclass(frozen=True)
@@ -159,20 +207,21 @@ class LightParams:
 
 
 @dataclass(frozen=True)
-class WorldScript:
+class SceneScript:
     """A room and the people in it for one round."""
 
     # fmt: off
     people: Annotated[Mapping[str, PersonScript], "who is there, by name"]
-    room: Annotated[RoomName, "the room"] = "living-room"
+    room: Annotated[RoomName, "the room; none: faces and hands alone, for --scene"] = "living-room"
     round_s: Annotated[float, Bounds(2, 600), "length of a round"] = 60.0
     neck_height_m: Annotated[float, Bounds(0.3, 2.0), "height of the robot's neck base above the floor"] = 0.95
     description: Annotated[str, "what happens, in a few words"] = ""
     places: Annotated[Mapping[str, PlaceScript], "places of its own, besides the room's"] = field(default_factory=dict)
-    things: Annotated[Mapping[str, ThingScript], "things that are passed from hand to hand"] = field(default_factory=dict)
+    things: Annotated[Mapping[str, ThingScript], "things, such as those that are passed from hand to hand"] = field(default_factory=dict)
     heads: Annotated[Mapping[str, HeadScript], "other heads beside the first, by name"] = field(default_factory=dict)
     light: Annotated[LightParams, "how bright it is"] = field(default_factory=LightParams)
     camera: Annotated[WorldCameraParams, "pictures of the robot's camera"] = field(default_factory=WorldCameraParams)
+    expected: Annotated[tuple[ExpectedLook, ...] | None, "when the gaze should be where; null: as the acts suggest"] = None
     # fmt: on
 
 

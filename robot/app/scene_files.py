@@ -1,0 +1,65 @@
+"""The files of simulated scenes: by a shipped name, or by a path of the user's own."""
+
+from functools import lru_cache
+from pathlib import Path
+
+from gazerig.config.load import load, shipped
+from gazerig.config.shipped import shipped_names
+from gazerig.drivers.errors import SetupError
+from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
+from gazerig.sim_mock.scenes.script import SceneScript
+
+KIND = "scenes"
+"""The folder of the shipped scenes."""
+
+
+def scene_names() -> tuple[str, ...]:
+    """Return the names of the shipped scenes."""
+    return shipped_names(KIND)
+
+
+def load_scene(name_or_path: str, seed: int = 0) -> FacesScene:
+    """Return a simulated scene.
+
+    Args:
+        name_or_path: name of a shipped scene, or path of a script.
+        seed: of acts with a random time.
+
+    Raises:
+        gazerig.config.load.ConfigError: the file is at fault.
+        SetupError: there is none of that name.
+    """
+    if not is_path(name_or_path) and name_or_path not in scene_names():
+        raise SetupError(
+            f"--scene {name_or_path}: unknown; scenes: {', '.join(scene_names())}; "
+            "or give the path of a script (.yaml)"
+        )
+    script = _read(*script_file(KIND, name_or_path))
+    return FacesScene(Path(name_or_path).stem, script, seed)
+
+
+def is_path(name_or_path: str) -> bool:
+    """Return whether a script is given by its path."""
+    return "/" in name_or_path or Path(name_or_path).suffix in (".yaml", ".yml")
+
+
+def script_file(
+    kind: str, name_or_path: str, home: Path | None = None
+) -> tuple[Path, tuple[int, int, int] | None]:
+    """Return the path of a script, and the version of its content, None if it cannot be read.
+
+    Raises:
+        gazerig.config.load.ConfigError: none of that name is shipped.
+    """
+    path = Path(name_or_path) if is_path(name_or_path) else shipped(kind, name_or_path, home)
+    try:
+        facts = path.stat()
+    except OSError:
+        return path, None
+    return path, (facts.st_ino, facts.st_mtime_ns, facts.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
+    """Return a script; a run requests it several times, and reads it once."""
+    return load(path, SceneScript, checks=(faults,))

@@ -1,0 +1,278 @@
+"""A script's acts with their true start and end times, and the looks that they draw.
+
+The acts of a person are on tracks: legs, mouth, head, eyes, left arm, right arm. Acts on one track
+follow each other; acts on different tracks may overlap.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event
+from gazerig.sim_mock.scenes.script import HEAD, Act, Fault, SceneScript
+
+_ARMS = ("left arm", "right arm")
+TRACKS: Mapping[str, tuple[str, ...]] = {
+    "walk": ("legs",),
+    "step": ("legs",),
+    "turn": ("legs",),
+    "sit": ("legs",),
+    "stand": ("legs",),
+    "look_at": ("eyes",),
+    "speak": ("mouth",),
+    "nod": ("head",),
+    "shake": ("head",),
+    "be_hit": ("head",),
+    "glance": ("head",),
+    "guard": ("guard",),
+    "open_guard": _ARMS,
+    "gesture": _ARMS,
+}
+"""The tracks of an act; an act that is not listed is on the arm of its side."""
+LASTS_S: Mapping[str, float] = {
+    "step": 0.9,
+    "turn": 1.2,
+    "sit": 1.7,
+    "stand": 1.7,
+    "look_at": 0.0,
+    "speak": 3.0,
+    "nod": 1.2,
+    "shake": 1.2,
+    "be_hit": 0.7,
+    "wave": 2.6,
+    "gesture": 3.0,
+    "point": 2.2,
+    "reach": 2.8,
+    "push": 2.0,
+    "pass": 2.4,
+    "punch": 0.6,
+    "feint": 0.3,
+    "open_guard": 1.4,
+    "glance": 0.6,
+    "spin": 3.0,
+}
+"""Default durations of acts; the duration of a walk follows from its path."""
+NEEDS_TARGET = ("walk", "turn", "look_at", "point", "reach", "push", "pass", "punch")
+WALKS_TO_PLACES = ("walk", "step")
+HALF_FIELD_RAD = 34.5 / 180.0 * np.pi
+"""Half of the camera's horizontal field: a hand farther to the side cannot be detected."""
+_RETURN_S = 1.3
+_QUIET_S = 0.5
+
+
+class TimedAct(NamedTuple):
+    """An act with its start and end; ``target``: a fixed point, None for a person."""
+
+    act: Act
+    start_s: float
+    end_s: float
+    target: Vec3 | None = None
+
+    @property
+    def tracks(self) -> tuple[str, ...]:
+        """Return the tracks of the act."""
+        return TRACKS.get(self.act.do, (f"{self.act.side} arm",))
+
+
+Timelines = Mapping[str, tuple[TimedAct, ...]]
+
+
+def timed_acts(
+    script: SceneScript,
+    name: str,
+    seed: int,
+    lasts_s: Callable[[Act, str], float],
+    target: Callable[[Act], Vec3 | None],
+) -> tuple[TimedAct, ...]:
+    """Return the acts of a person, in the script's order, with random times from the seed.
+
+    Args:
+        script: with the person.
+        name: of the person.
+        seed: of the random times.
+        lasts_s: returns the duration of an act that begins at a place.
+        target: returns the fixed target of an act, None for a person.
+    """
+    person = script.people[name]
+    rng = np.random.default_rng([seed, list(script.people).index(name)])
+    at, found = person.start, []
+    for act in person.acts:
+        start_s = max(0.0, act.at_s + act.vary_s * float(rng.uniform(-1.0, 1.0)))
+        found.append(TimedAct(act, start_s, start_s + lasts_s(act, at), target(act)))
+        if act.do in WALKS_TO_PLACES and act.to:
+            at = act.to
+    return tuple(found)
+
+
+def name_faults(
+    script: SceneScript, places: Collection[str], robot: tuple[str, ...] = (HEAD,)
+) -> Iterator[Fault]:
+    """Find names of people, places and things that are not there.
+
+    Args:
+        script: whose names are checked.
+        places: of its room and its own.
+        robot: names of the robot's parts that can be looked at.
+    """
+    seats, people = ", ".join(sorted(places)), ", ".join(script.people)
+    targets = {*robot, *script.people, *places}
+    for name, person in script.people.items():
+        key = f"people.{name}"
+        if not name.isidentifier() or name in robot:
+            yield key, "a name has letters, digits and _, begins with a letter and is not head"
+        if person.start not in places:
+            yield f"{key}.start", f"{script.room} has no place {person.start!r}; it has {seats}"
+        if person.looks_at not in targets:
+            yield f"{key}.looks_at", f"no person, no place; there are head, {people}, {seats}"
+        for i, act in enumerate(person.acts):
+            for rule_key, rule in _act_faults(script, name, act, places, targets):
+                yield f"{key}.acts.{i}{rule_key}", rule
+    for i, look in enumerate(script.expected or ()):
+        if look.at not in places:
+            yield f"expected.{i}.at", f"{script.room} has no place {look.at!r}; it has {seats}"
+        if not look.start_s < look.end_s <= script.round_s:
+            yield (
+                f"expected.{i}.end_s",
+                f"after start_s and within the round of {script.round_s:g} s",
+            )
+
+
+def _act_faults(
+    script: SceneScript, name: str, act: Act, places: Collection[str], targets: set[str]
+) -> Iterator[Fault]:
+    there = ", ".join(sorted(places))
+    if act.do in NEEDS_TARGET and not act.to:
+        yield "", f"{act.do} needs `to`: whom or what"
+    elif act.do in WALKS_TO_PLACES:
+        if act.to and act.to not in places:
+            yield ".to", f"{script.room} has no place {act.to!r}; it has {there}"
+    elif act.do == "pass":
+        if act.to not in script.people or act.to == name:
+            yield ".to", f"another person; there are {', '.join(script.people)}"
+        if act.thing not in script.things:
+            yield ".thing", f"none of the script's `things`: {', '.join(script.things) or 'none'}"
+    elif act.to and act.to not in targets:
+        yield ".to", f"no person, no place; there are head, {', '.join(script.people)}, {there}"
+    for place in act.via:
+        if place not in places:
+            yield ".via", f"{script.room} has no place {place!r}; it has {there}"
+
+
+def overlap_faults(script: SceneScript, key: str, acts: tuple[TimedAct, ...]) -> Iterator[Fault]:
+    """Find simultaneous acts on one track, and acts that last beyond the round.
+
+    Args:
+        script: with the acts.
+        key: of the person or thing that does them.
+        acts: in the script's order, begun as if none varied.
+    """
+    busy: dict[str, tuple[float, int]] = {}
+    for i, one in enumerate(acts):
+        at, spare_s = f"{key}.acts.{i}.at_s", one.act.vary_s
+        if one.end_s + spare_s > script.round_s + 1e-9:
+            yield (
+                at,
+                f"{one.act.do} ends at {one.end_s + spare_s:.1f} s, the round at "
+                f"{script.round_s:g} s; begin earlier or make round_s longer",
+            )
+        for track in one.tracks:
+            until_s, other = busy.get(track, (0.0, -1))
+            begins_s = one.act.at_s - spare_s
+            if begins_s < until_s - 1e-9 and one.act.do != "look_at":
+                yield (
+                    at,
+                    f"{one.act.do} begins while {acts[other].act.do} (acts.{other}) keeps the {track} "
+                    f"busy until {until_s:.1f} s; begin then",
+                )
+            lasts_s = one.end_s - one.start_s
+            busy[track] = (max(until_s, one.act.at_s + spare_s + lasts_s), i)
+
+
+class Players(Protocol):
+    """Where the people and things of a script are."""
+
+    def face(self, name: str, t_s: float) -> Vec3:
+        """Return the tip of a nose."""
+        ...
+
+    def hand(self, name: str, side: str, t_s: float) -> Vec3:
+        """Return the middle of a hand."""
+        ...
+
+    def place(self, name: str) -> Vec3:
+        """Return a place, at the height of what is looked at there."""
+        ...
+
+    def out_back_s(self, one: TimedAct) -> tuple[float, float]:
+        """Return how long a hand takes to its target, and back."""
+        ...
+
+    def before_head(self, p_m: Vec3) -> bool:
+        """Return whether a point is in the field of view of a camera that points ahead."""
+        ...
+
+
+def events_of(script: SceneScript, timelines: Timelines, players: Players) -> tuple[Event, ...]:
+    """Return the events of a round and the response of a person's gaze.
+
+    They are those that the script lists, or those that its acts suggest.
+    """
+    if script.expected is not None:
+        return tuple(
+            Event(one.name, "look", one.kind, one.start_s, one.end_s, players.place(one.at), one.within_m)
+            for one in script.expected
+        )  # fmt: skip
+    boxers = [name for name, person in script.people.items() if person.gloves]
+    found: list[Event] = []
+    for name, acts in timelines.items():
+        for one in acts:
+            found += _events_of_act(script, players, name, one, name in boxers)
+    for name in boxers:
+        # A boxer's face is looked at during longer times without other events.
+        quiet, free_s = [], 0.0
+        busy = sorted((event.start_s, event.end_s) for event in found)
+        for start_s, end_s in (*busy, (script.round_s, script.round_s)):
+            if start_s - free_s >= _QUIET_S:
+                face = players.face(name, 0.5 * (free_s + start_s))
+                quiet.append(Event("face", "look", "face", free_s, start_s, face, 0.6))
+            free_s = max(free_s, end_s)
+        found += quiet
+    return tuple(sorted(found, key=lambda event: event.start_s))
+
+
+def _events_of_act(
+    script: SceneScript, players: Players, name: str, one: TimedAct, boxes: bool
+) -> Iterator[Event]:
+    """Yield the events of an act that is visible to the robot."""
+    do, side, start_s, end_s = one.act.do, one.act.side, one.start_s, one.end_s
+    middle_s = 0.5 * (start_s + end_s)
+    if do == "reach":
+        # A look is expected while the hand is in view of a camera that points ahead.
+        times = np.arange(start_s, end_s, 0.001).tolist()
+        inside = [t_s for t_s in times if players.before_head(players.hand(name, side, t_s))]
+        if inside:
+            hand = players.hand(name, side, middle_s)
+            yield Event("reach", "look", "hand", inside[0], inside[-1], hand, 0.25)
+    elif do == "wave":
+        yield Event(do, "look", "hand", start_s, end_s, players.hand(name, side, middle_s), 0.5)
+    elif do == "punch":
+        due_s = start_s + players.out_back_s(one)[0]
+        ends = (players.hand(name, side, t_s) for t_s in (start_s, due_s))
+        x, y, z = (0.5 * (a + b) for a, b in zip(*ends, strict=True))
+        yield Event(do, "look", "hand", start_s, end_s, (x, y, z), 0.5, due_s)
+    elif do == "speak":
+        yield Event("speak", "look", "face", start_s, end_s, players.face(name, middle_s), 0.5)
+    elif boxes and do in ("step", "open_guard", "feint"):
+        face = players.face(name, middle_s)
+        if do == "step":
+            yield Event("step", "look", "face", start_s, end_s, face, 0.6)
+        elif do == "feint":
+            until_s = min(start_s + _RETURN_S, script.round_s)
+            yield Event("return", "return", "face", start_s, until_s, face, 0.6)
+        else:
+            out_s, back_s = (0.5 * one_s for one_s in players.out_back_s(one))
+            yield Event(
+                "attack", "look", "attack_target", start_s + out_s, end_s - back_s, face, 0.6
+            )
