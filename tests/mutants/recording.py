@@ -130,6 +130,6 @@ RECORDING = (
            "a lens loses its distortion", ("oak_calibration",)),
     Mutant("drivers/camera/recording_format.py", '"width": shot.image.shape[1]', '"width": shot.image.shape[0]',
            "a lens is as wide as it is high", ("camera_recording",)),
-    Mutant("drivers/camera/playback.py", "if not self._frames or stamp_ns > self._frames[-1].stamp_ns:", "if True:",
+    Mutant("drivers/camera/playback.py", "if topic == fmt.PICTURE and stamp_ns > last_ns:", "if topic == fmt.PICTURE:",
            "frames run back in time", ("camera_recording",)),
 )  # fmt: skip
