@@ -30,7 +30,7 @@ COSTS_S = {
     "human_head": 6,
     "run": 6,
     "seeing_faces": 6,
-    "sweep": 6,
+    "sweep": 10,
     "two_heads": 6,
     "api": 5,
     "behaviours": 5,
@@ -56,7 +56,6 @@ COSTS_S = {
     "retune": 4,
     "run_refused": 4,
     "servo_faults": 4,
-    "sweep_fit": 4,
     "tutorial": 4,
     "world_shapes": 4,
 }

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from outside_package import install, on_path
-from test_page_figures import looking
+from test_page_parts import looking
 
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.panels.package_panels import PagePanels, own_panels

@@ -1,5 +1,6 @@
 """Only those come in who may: no other origin, nobody without the token, nobody by the back."""
 
+import asyncio
 import json
 import os
 import socket
@@ -8,8 +9,9 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -22,7 +24,9 @@ from websockets.sync.client import ClientConnection
 from gazerig.robot.dashboard.door import page_files
 from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.door.browsers import MOST as MOST_CONNECTIONS
+from gazerig.robot.dashboard.door.browsers import TabLimits
 from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES, browser_of
+from gazerig.robot.dashboard.requests.outbox import TokenBucket, from_browser
 
 BROWSER = Path(page_files.__file__).parents[1] / "browser"
 
@@ -384,3 +388,144 @@ def test_a_message_that_is_too_long_ends_its_connection_alone(near: Rig) -> None
 def test_a_browser_cannot_publish_the_page(near: Rig) -> None:
     handlers = near.server._websock_server._incoming_handlers
     assert not [kind.__name__ for kind in handlers if "ShareUrl" in kind.__name__]
+
+
+# --- The token of the page: without it nothing is seen and nothing moves
+
+
+@pytest.fixture(scope="module")
+def far() -> Iterator[Rig]:
+    """A page as other machines see it: at an address that has no name of the loopback."""
+    with opened("127.0.0.2") as rig:
+        yield rig
+
+
+# --- the token ------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["127.0.0.1", "127.0.0.2"])
+def either(request: pytest.FixtureRequest, near: Rig, far: Rig) -> Rig:
+    """The page for this machine, which has other users, and the one for others."""
+    return near if request.param == "127.0.0.1" else far
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/view/", "/rig/line", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
+)
+def test_without_the_token_nothing_is_seen(either: Rig, path: str) -> None:
+    status, headers, text = fetch(either.url + path)
+    assert status == 403 and text.startswith("refused") and len(text.splitlines()) == 1
+    assert "Set-Cookie" not in headers
+
+
+@pytest.mark.parametrize("cookie", [None, "wrong", "", "\xff"])
+def test_without_the_token_nothing_moves(either: Rig, cookie: str | None) -> None:
+    either.asked.clear()
+    either.stops.clear()
+    given = None if cookie is None else f"{either.door._cookie}={cookie}"
+    for body in (b'{"do":"resume"}', b'{"do":"stop","why":"x"}'):
+        assert either.post(body, Cookie=given)[0] == 403
+    for path in ("/view", "/rig/line"):
+        with pytest.raises(InvalidStatus) as refused:
+            either.knock(path, Cookie=given)
+        assert refused.value.response.status_code == 403
+    assert either.asked == either.stops == []
+
+
+def test_the_token_becomes_a_cookie_and_leaves_the_address(either: Rig) -> None:
+    status, headers, text = fetch(f"{either.url}/?look=here&token={TOKEN}")
+    assert (status, headers["Location"], text) == (302, "/?look=here", "")
+    cookie = headers["Set-Cookie"]
+    assert "HttpOnly" in cookie and "SameSite=Strict" in cookie
+    assert either.get()[0] == 200
+    with either.knock() as socket_:
+        assert socket_.recv(timeout=PATIENCE_S)
+
+
+@pytest.mark.parametrize(
+    "path", ["//evil/", "/%5Cevil/", "/\\evil/", "///evil", "//evil/%2e%2e//x"]
+)
+def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str) -> None:
+    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
+        there.sendall(
+            f"GET {path}?token={TOKEN} HTTP/1.1\r\nHost: {near.address}\r\n"
+            "Connection: close\r\n\r\n".encode()
+        )
+        answer = there.recv(4096).decode()
+    place = next(line for line in answer.splitlines() if line.startswith("Location: "))
+    assert place.startswith("Location: /") and place[11:12] not in ("/", "\\")
+
+
+def test_the_token_does_not_help_another_origin(either: Rig) -> None:
+    either.asked.clear()
+    with pytest.raises(InvalidStatus):
+        either.knock(origin=ELSEWHERE)
+    assert either.post(b'{"do":"resume"}', Origin=ELSEWHERE)[0] == 403
+    assert either.asked == []
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/../../../../etc/passwd", "/%2e%2e/%2e%2e/%2e%2e/etc/passwd", "/..%2f..%2f..%2fetc%2fpasswd",
+     "//etc/passwd", "/assets/../../../../../../etc/passwd", "/\\..\\etc\\passwd"],
+)  # fmt: skip
+def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
+    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
+        there.settimeout(PATIENCE_S)
+        there.sendall(
+            f"GET {path} HTTP/1.1\r\nHost: {near.address}\r\nCookie: {near.cookie}\r\n"
+            "Connection: close\r\n\r\n".encode()
+        )
+        answer = b"".join(iter(lambda: there.recv(1 << 16), b""))
+    assert b"root:" not in answer and b" 500 " not in answer.splitlines()[0]
+
+
+# --- What a browser of the page may take and ask for, and a stop that nobody answers
+
+
+def test_a_place_is_left_by_the_browser_with_the_most() -> None:
+    async def crowd() -> list[str]:
+        places, left = TabLimits(3), []
+        with ExitStack() as stack:
+            for name in ("a", "b", "b", "c", "d"):
+                leave = stack.enter_context(places.take(name))
+                left.append((name, leave))
+            return [name for name, leave in left if leave.is_set()]
+
+    assert asyncio.run(crowd()) == ["a", "b"] or asyncio.run(crowd()) == ["b", "a"]
+
+
+def test_a_rate_lets_a_burst_pass_and_then_so_many_a_second() -> None:
+    rate = TokenBucket(10.0, 5.0)
+    assert [rate.take(0.0) for _ in range(7)] == [True] * 5 + [False] * 2
+    assert sum(rate.take(0.001 * n) for n in range(1000)) == pytest.approx(10, abs=1)
+    assert rate.take(1e6) and rate.wait_s(1e6) == 0.0
+
+
+def test_only_small_objects_are_asked_for() -> None:
+    assert from_browser(b'{"a": [1, 2]}', "me") == {"a": [1, 2]}
+    assert from_browser(b"[]", "me") is None and from_browser(b"{", "me") is None
+    assert from_browser('{"do": "stop", "why": "x", "who": "you"}', "me") == {
+        "do": "stop", "why": "x", "who": "me",
+    }  # fmt: skip
+
+
+def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent() -> None:
+    with opened("127.0.0.1") as rig:
+        stall = [True]
+
+        def stalls(asked: Any) -> str:
+            while stall[0]:
+                time.sleep(0.02)
+            return ""
+
+        rig.stop = stalls  # type: ignore[method-assign]
+        rig._listener._take = stalls
+        status, _, text = rig.post(b'{"do": "stop", "why": "x"}')
+        assert status == 503 and "does not answer" in text
+        stall[0] = False
+        for _ in range(100):
+            if rig.post(b'{"do": "stop", "why": "x"}')[0] == 204:
+                break
+        else:
+            raise AssertionError("no stop was taken")

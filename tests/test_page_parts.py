@@ -1,20 +1,30 @@
 """What the page is made of: shapes, words, traces, and the picture with what was found."""
 
 import math
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from html import escape
+from typing import TypeVar, cast
 
 import cv2
 import numpy as np
 import pytest
+import viser
 from desk import GAZE_JOINTS
 from present import present
-from six_joints import ESTIMATED_RAD, SIX, WISH_RAD, of_six
+from shown_page import SNAPSHOT
+from six_joints import ESTIMATED_RAD, SIX, TELLS_NOTHING, WISH_RAD, of_six
 
+from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.drivers.types import BusHealth, DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.types import Salience
+from gazerig.gaze.types import PARTS, Salience
+from gazerig.robot.analysis.heatmap import on_canvas
+from gazerig.robot.analysis.human_norms import BY_KEY, fastest_peak, slowest_peak
+from gazerig.robot.app.rig_description import shape_of
+from gazerig.robot.control.tick_text import health_text
 from gazerig.robot.dashboard.feed.camera_overlay import (
     FARTHEST_M,
     IMAGE_WIDTH_PX,
@@ -24,30 +34,65 @@ from gazerig.robot.dashboard.feed.camera_overlay import (
     encode,
     ground,
 )
-from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, pack, unpack
-from gazerig.robot.dashboard.panels.attention_panel import reason, winner
+from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices
+from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, REPLAY, pack, unpack
+from gazerig.robot.dashboard.page_view import PageView
+from gazerig.robot.dashboard.panels.attention_panel import reason, saliences, winner
+from gazerig.robot.dashboard.panels.dwell_chart import BIN_S, BINS, DwellChart
+from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
+from gazerig.robot.dashboard.panels.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face
 from gazerig.robot.dashboard.panels.joint_charts import (
     GROUPS,
     MOST_POINTS,
     ChartGroup,
+    JointCharts,
     JointSeries,
     groups_of,
     mean_deg,
 )
-from gazerig.robot.dashboard.panels.servo_health import guard, health
+from gazerig.robot.dashboard.panels.main_sequence_chart import KEPT, MainSequenceChart
+from gazerig.robot.dashboard.panels.panel import PanelView
+from gazerig.robot.dashboard.panels.run_figures import RunFigure, RunFigures, compare_with_band
+from gazerig.robot.dashboard.panels.servo_health import (
+    NO_FEEDBACK,
+    guard,
+    health,
+    servo_table,
+    strain_of_heat,
+    strain_of_load,
+    strain_of_voltage,
+)
 from gazerig.robot.dashboard.panels.status import (
     alarms,
     group_reasons,
     other_heads,
     without_feedback,
 )
+from gazerig.robot.dashboard.requests.outbox import Outbox
+from gazerig.robot.dashboard.view.head_view import lid_edges
+from gazerig.robot.dashboard.view.overlays import OverlayPanel, field_edge
 from gazerig.robot.dashboard.view.people import fixated_part
 from gazerig.robot.dashboard.view.scene_node import along, turned_up, upright_along
+from gazerig.robot.dashboard.widgets.widget import Html, Widget
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.description.mesh import Mesh, cap, ellipsoid, lid, ring, turned
 from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.leader import Leader
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
-from gazerig.robot.model.types import OtherHead, SeenFace, Snapshot, Trail
+from gazerig.robot.model.types import (
+    CommandedPose,
+    LoopFigures,
+    OtherHead,
+    SeenBlink,
+    SeenCamera,
+    SeenFace,
+    SeenFixation,
+    SeenSaccade,
+    ServoLimits,
+    Servos,
+    Snapshot,
+    Trail,
+)
 
 LENS = Intrinsics(300.0, 300.0, 319.5, 239.5)
 Terms = tuple[float, float, float, float, float]
@@ -362,3 +407,558 @@ def test_depth_is_drawn_on_only_where_it_is_wanted_and_there() -> None:
     deep = replace(found, depth_m=np.full((480, 640), 1.0, np.float32))
     shown = ground(deep, depth=True)
     assert shown is not None and len(np.unique(shown[:430].reshape(-1, 3), axis=0)) == 1
+
+
+# --- Figures that fill as the rig runs: timeline, main sequence, rests on face parts, heat map
+
+
+FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def looking(t_s: float, name: str = "face 1: nose", part: str | None = "N") -> Snapshot:
+    """A head at the origin that looks straight at a face a metre away."""
+    face = SeenFace(1, (1.0, 0.0, 0.0), FACING, tuple((1.0, 0.0, 0.0) for _ in PARTS))
+    return Snapshot(
+        t_s=t_s, measured_rad=(0.0,) * 9, desired_rad=(0.0,) * 9, R_world_head=AHEAD,
+        p_world_head_m=(0.0, 0.0, 0.0), p_world_eyes_m=((0.0, 0.03, 0.0), (0.0, -0.03, 0.0)),
+        gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), lids=(0.8, 0.8),
+        p_world_target_m=(1.0, 0.0, 0.0), target_name=name, why="", phase="fixate", level="ok",
+        reasons=(), faces=(face,), bodies=(), rate_hz=200.0, health="",
+        target_kind=name.split()[0], target_id=1, target_part=part, joints=GAZE_JOINTS,
+    )  # fmt: skip
+
+
+# --- the strip of the last half minute --------------------------------------------------
+
+
+def test_stretches_join_end_to_end_and_are_forgotten() -> None:
+    timeline = Timeline()
+    for k in range(1000):
+        t_s = 0.05 * k
+        timeline.update(looking(t_s, "face 1: nose" if t_s < 40.0 else "hand <7>", None))
+    (face, hand) = timeline.intervals("target")
+    assert face == (0.0, pytest.approx(39.95), "face 1")
+    assert hand == (pytest.approx(39.95), pytest.approx(49.95), "hand <7>")
+    for k in range(1000, 1700):
+        timeline.update(looking(0.05 * k, "hand <7>", None))
+    assert [what for _, _, what in timeline.intervals("target")] == ["hand <7>"]
+
+
+def test_strip_shows_targets_saccades_blinks_and_the_guard_and_runs_no_markup() -> None:
+    timeline = Timeline()
+    timeline.update(looking(0.0, "hand <7>", None))
+    timeline.update(replace(looking(10.0, "hand <7>", None), worst="hold"))
+    jump, shut = SeenSaccade(4.0, 0.05, 12.0, 300.0), SeenBlink(6.0, 0.3)
+    timeline.update(replace(looking(20.0), events=(jump, shut)))
+    drawn = timeline.drawing()
+    for said in ("hand &lt;7&gt;", "12.0 deg, 50 ms", "blink, 300 ms", "<title>hold</title>"):
+        assert said in drawn
+    assert "hand <7>" not in drawn
+    assert all(0.0 <= float(x) <= 320.0 for x in re.findall(r"<rect x='([-\d.]+)'", drawn))
+
+
+def test_what_is_older_than_the_strip_is_not_drawn() -> None:
+    timeline = Timeline()
+    timeline.update(replace(looking(0.0), events=(SeenBlink(0.0, 0.31),)))
+    assert "310 ms" in timeline.drawing()
+    timeline.update(looking(STRIP_S + 0.1))
+    assert "310 ms" not in timeline.drawing()
+
+
+def test_strip_says_when_somebody_stopped_the_rig_and_starts_anew_with_the_clock() -> None:
+    timeline = Timeline()
+    timeline.update(looking(50.0))
+    timeline.update(replace(looking(51.0), stopped="space bar"))
+    assert [what for _, _, what in timeline.intervals("guard")] == ["ok", "stopped"]
+    timeline.update(looking(0.0))
+    assert timeline.intervals("guard") == ((0.0, 0.0, "ok"),)
+
+
+# --- the main sequence ------------------------------------------------------------------
+
+
+def circles(drawn: str) -> np.ndarray:
+    """Centres (n, 2) of all dots."""
+    found = re.findall(r"<circle cx='([\d.]+)' cy='([\d.]+)'", drawn)
+    return np.array(found, float).reshape(-1, 2)
+
+
+def test_a_dot_a_saccade_in_both_pictures_the_newest_marked() -> None:
+    sequence = MainSequenceChart()
+    for size in (4.0, 8.0):
+        sequence.update(SeenSaccade(0.0, 0.04, size, 25.0 * size))
+    drawn = sequence.drawing()
+    speeds, lengths = circles(drawn)[:2], circles(drawn)[2:]
+    assert "2 saccades" in drawn
+    assert speeds[1, 0] > speeds[0, 0] and speeds[1, 1] < speeds[0, 1]
+    assert lengths[0, 1] == lengths[1, 1]
+    assert drawn.count("r='3.4'") == 2
+
+
+def test_a_saccade_like_peoples_lies_in_their_range() -> None:
+    def inside(speed_deg_s: float) -> bool:
+        sequence = MainSequenceChart()
+        sequence.update(SeenSaccade(0.0, 0.045, 10.0, speed_deg_s))
+        drawn = sequence.drawing()
+        (outline,) = re.findall(r"<polygon points='([^']+)'", drawn)[:1]
+        band = np.array([pair.split(",") for pair in outline.split()], float)
+        x, y = circles(drawn)[0]
+        column = band[np.abs(band[:, 0] - x).argsort()[:2], 1]
+        return bool(column.min() <= y <= column.max())
+
+    low, high = float(slowest_peak(10.0)), float(fastest_peak(10.0))
+    assert inside((low + high) / 2)
+    assert not inside(0.7 * low) and not inside(1.3 * high)
+
+
+def test_only_the_newest_saccades_are_drawn_but_all_are_counted() -> None:
+    sequence = MainSequenceChart()
+    for _ in range(KEPT + 50):
+        sequence.update(SeenSaccade(0.0, 0.04, 5.0, 200.0))
+    drawn = sequence.drawing()
+    assert len(circles(drawn)) == 2 * KEPT
+    assert f"{KEPT + 50} saccades" in drawn
+
+
+# --- rests on face parts ----------------------------------------------------------------
+
+
+def test_shares_are_of_the_time_on_parts() -> None:
+    dwell = DwellChart()
+    assert dwell.shares() == {}
+    for part, seconds in (("LE", 0.3), ("LE", 0.3), ("M", 0.2), (None, 5.0)):
+        dwell.update(SeenFixation(0.0, seconds, part))
+    shares = dwell.shares()
+    assert shares["LE"] == pytest.approx(0.75) and shares["M"] == pytest.approx(0.25)
+    assert sum(shares.values()) == pytest.approx(1.0)
+    drawn = dwell.drawing()
+    assert "75 %" in drawn and "25 %" in drawn and "3 rests" in drawn
+
+
+def test_rests_are_counted_by_length_and_the_long_ones_together() -> None:
+    dwell = DwellChart()
+    for seconds in (0.05, 0.25, 0.27, 99.0):
+        dwell.update(SeenFixation(0.0, seconds, "N"))
+    drawn = dwell.drawing()
+    for said in ("1 of 0 ms", "2 of 200 ms", f"1 of {1e3 * BIN_S * (BINS - 1):.0f} ms"):
+        assert said in drawn
+
+
+# --- the heat map -----------------------------------------------------------------------
+
+
+def test_gaze_meets_the_face_where_it_points() -> None:
+    # The face looks back: its left is the head's right, so a gaze to the left has y below 0.
+    left = np.array((1.0, 0.03, 0.02)) / np.linalg.norm((1.0, 0.03, 0.02))
+    aside = replace(looking(0.0), gaze_world=(tuple(left), tuple(left)))
+    point = gaze_on_face(aside)
+    assert point is not None
+    assert point == pytest.approx((-0.03 * 1.028, 0.02 * 1.028))
+    assert gaze_on_face(replace(aside, phase="saccade")) is None
+    assert gaze_on_face(replace(aside, target_kind="hand")) is None
+    assert gaze_on_face(replace(aside, target_id=2)) is None
+
+
+def test_a_face_that_moves_is_met_where_it_is_by_now() -> None:
+    shot = looking(0.0)
+    walking = replace(shot.faces[0], v_world_m_s=(0.0, 0.5, 0.0))
+    point = gaze_on_face(replace(shot, faces=(walking,), frame_age_s=0.1))
+    assert point == pytest.approx((0.05, 0.0))
+
+
+def test_the_map_is_brightest_where_the_gaze_was() -> None:
+    heat = GazeMap()
+    for k in range(51):
+        heat.update(looking(0.04 * k))
+    assert heat.seconds == pytest.approx(2.0)
+    picture = heat.image().astype(int)
+    assert picture.shape == (HIGH_PX, WIDE_PX, 3)
+    yellow = picture[..., 0] + picture[..., 1] - 2 * picture[..., 2]
+    row, column = np.unravel_index(yellow.argmax(), yellow.shape)
+    expected = on_canvas(np.zeros((1, 2)))[0] / SHRINK
+    assert (column, row) == pytest.approx(tuple(expected), abs=6.0)
+
+
+def test_a_pause_adds_no_time() -> None:
+    heat = GazeMap()
+    for t_s in (0.0, 5.0, 1.0):
+        heat.update(looking(t_s))
+    assert heat.seconds == 0.0
+
+
+# --- the eyes' field --------------------------------------------------------------------
+
+
+def test_the_edge_of_the_field_lies_at_its_limits() -> None:
+    edge = field_edge((100.0, 60.0, 60.0, 75.0), left=True)
+    away = np.degrees(np.arccos(edge[:, 0] / np.linalg.norm(edge, axis=1)))
+    left, above, right, below = (away[i] for i in (0, 18, 36, 54))
+    assert (left, above, right, below) == pytest.approx((100.0, 60.0, 60.0, 75.0))
+    mirrored = field_edge((100.0, 60.0, 60.0, 75.0), left=False)
+    assert np.allclose(mirrored[[0, 18, 36]], edge[[36, 18, 0]] * (1.0, -1.0, 1.0))
+
+
+# --- the figures of the run -------------------------------------------------------------------
+
+
+def told(count: int, speed: float, seconds: float = 60.0) -> dict[str, RunFigure]:
+    """Figures of a minute with so many saccades of 5 deg, of so much of people's speed."""
+    figures, dwell = RunFigures(), DwellChart()
+    for k in range(count):
+        t_s = seconds * k / count
+        peak = speed * float(fastest_peak(5.0))
+        event = SeenSaccade(t_s, 0.035, 5.0, peak)
+        figures.update(replace(looking(t_s), events=(event,)))
+        dwell.update(SeenFixation(t_s, 0.3, "LE" if k % 2 else "M"))
+    figures.update(looking(seconds))
+    return {figure.key: figure for figure in figures.figures(dwell)}
+
+
+def test_figures_are_those_of_the_report() -> None:
+    found = told(150, 0.9)
+    assert found["rate"].value == pytest.approx(2.5) and found["rate"].events == 150
+    assert found["peak_small"] == RunFigure("peak_small", 1.0, 150)
+    assert found["below_15"].value == 1.0 and found["duration_small"].value == 1.0
+    assert found["eyes_share"].value == pytest.approx(0.5)
+    assert found["too_soon"] == RunFigure("too_soon", 0.0, 149)
+    assert found["blink_rate"].value == 0.0
+    assert "peak_large" not in found
+    assert told(150, 1.2)["peak_small"].value == 0.0
+
+
+def test_few_events_never_judge_and_chance_is_called_so() -> None:
+    band = BY_KEY["duration_small"]  # a share of .75 and more, of at least 30
+    assert compare_with_band(RunFigure(band.key, 0.0, 29), band) == "too few: 29 of 30"
+    assert compare_with_band(RunFigure(band.key, 0.8, 30), band) == "inside"
+    assert compare_with_band(RunFigure(band.key, 0.7, 40), band) == "may be chance"
+    assert compare_with_band(RunFigure(band.key, 0.7, 4000), band) == "outside"
+    assert compare_with_band(RunFigure(band.key, 0.0, 30), band) == "outside"
+    rate = BY_KEY["rate"]
+    assert compare_with_band(RunFigure("rate", 4.2, 100), rate) == "may be chance"
+    assert compare_with_band(RunFigure("rate", 6.0, 100), rate) == "outside"
+
+
+def test_the_table_shows_the_range_of_people_and_its_source() -> None:
+    figures = RunFigures()
+    assert "no eye movement" in figures.table(DwellChart())
+    for k in range(40):
+        figures.update(replace(looking(0.5 * k), events=(SeenSaccade(0.5 * k, 0.5, 5.0, 9.0),)))
+    table = figures.table(DwellChart())
+    assert "75 to 100" in table and "Bahill" in table and "outside" in table
+
+
+# --- The health of servos, loop and picture in words and colours, and why the gaze is where it is
+
+
+LIMITS = ServoLimits((55.0,) * 9, (65.0,) * 9, (3.8,) * 9, (6.7,) * 9, (0.5,) * 9)
+WELL = Servos(
+    (30.0,) * 9, (5.0,) * 9, (0.1,) * 9, (True,) * 9, ("",) * 9, (0.0,) * 9, (0,) * 9, LIMITS
+)
+REST = (0.0,) * 9
+T = TypeVar("T")
+
+
+def healthy(t_s: float = 1.0) -> Snapshot:
+    eyes = ((0.03, 0.031, 0.14), (0.03, -0.031, 0.14))
+    sight = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    return Snapshot(
+        t_s=t_s, measured_rad=REST, desired_rad=REST, R_world_head=AHEAD,
+        p_world_head_m=(0.03, 0.0, 0.14), p_world_eyes_m=eyes, gaze_world=sight, lids=(0.8, 0.8),
+        p_world_target_m=(1.0, 0.0, 0.14), target_name="thing <4>", why="slide <0.4>",
+        phase="pursue", level="ok", reasons=(), faces=(), bodies=(), rate_hz=200.0,
+        health="bus ok", behaviour="wait", servos=WELL,
+        timing=LoopFigures(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), frame_age_s=0.06,
+        commanded_pose=CommandedPose(AHEAD, (0.03, 0.0, 0.14), eyes, sight, (0.8, 0.8)),
+        camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6), field_deg=(100.0, 60.0, 60.0, 75.0),
+        trail=(Trail(t_s, REST, REST, REST),),
+        events=(SeenSaccade(0.5, 0.05, 5.0, 180.0), SeenFixation(0.2, 0.3, "LE")),
+        joints=GAZE_JOINTS,
+    )  # fmt: skip
+
+
+def put(column: tuple[float | None, ...], i: int, value: float | None) -> tuple[float | None, ...]:
+    return (*column[:i], value, *column[i + 1 :])
+
+
+@pytest.mark.parametrize(
+    ("celsius", "strain"), [(54.9, ""), (55.0, "near"), (65.0, "over"), (None, "")]
+)
+def test_heat_is_told_by_what_the_guard_does(celsius: float | None, strain: str) -> None:
+    assert strain_of_heat(WELL._replace(temperature_c=put(REST, 2, celsius)), 2) == strain
+
+
+@pytest.mark.parametrize(("load", "strain"), [(0.5, ""), (-0.51, "near"), (-0.95, "over")])
+def test_load_is_told_by_its_size(load: float, strain: str) -> None:
+    assert strain_of_load(WELL._replace(load=(load,) * 9), 0) == strain
+
+
+@pytest.mark.parametrize(("volts", "strain"), [(3.7, "near"), (3.8, ""), (6.8, "near"), (None, "")])
+def test_voltage_is_told_by_both_ends(volts: float | None, strain: str) -> None:
+    assert strain_of_voltage(WELL._replace(voltage_v=put(REST, 1, volts)), 1) == strain
+
+
+def test_without_limits_nothing_is_coloured() -> None:
+    hot = WELL._replace(temperature_c=(90.0,) * 9, limits=None)
+    assert strain_of_heat(hot, 0) == ""
+    assert strained(servo_table(hot, GAZE_JOINTS)) == 0
+
+
+def strained(html: str) -> int:
+    """How many figures are coloured."""
+    return html.count("<td class='near'>") + html.count("<td class='over'>")
+
+
+def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
+    table = servo_table(WELL, GAZE_JOINTS)
+    assert table.count("<tr") == 10
+    assert strained(table) == 0 and "class='fault'" not in table
+    assert "neck roll" in table and "+10 %" in table
+
+
+def test_faults_and_silence_are_said_beside_the_joint() -> None:
+    fault = ("", "overload <1>") + ("",) * 7
+    table = servo_table(
+        WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6), GAZE_JOINTS
+    )
+    assert "left eye tilt<div class='fault'>" in table and "overload &lt;1&gt;" in table
+    assert "right eye pan<div class='fault'>" in table and "silent for 1.2 s" in table
+    assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9), GAZE_JOINTS)
+    assert "no data of the servos" in servo_table(Servos(), ())
+
+
+def test_what_was_not_measured_is_a_dash_and_no_zero() -> None:
+    unread = WELL._replace(temperature_c=(None,) * 9, voltage_v=(None,) * 9, unanswered=())
+    assert servo_table(unread, GAZE_JOINTS).count(">-</td>") == 27
+
+
+def test_a_servo_that_tells_nothing_has_no_figures() -> None:
+    table = servo_table(TELLS_NOTHING, SIX, SIX)
+    assert table.count(f">{NO_FEEDBACK}</td>") == 6 and "not noticed" in table
+    assert " %" not in table and ">-</td>" not in table  # a load of 0 is none that was measured
+    assert "eyes pan" in table and "neck" not in table
+    assert NO_FEEDBACK not in servo_table(WELL, GAZE_JOINTS)
+
+
+def test_only_the_joints_nobody_measures_are_without_figures() -> None:
+    table = servo_table(WELL, GAZE_JOINTS, ("left_upper_lid",))
+    assert table.count(f">{NO_FEEDBACK}</td>") == 1 and table.count("+10 %") == 8
+    silent = servo_table(WELL._replace(age_s=(1.25,) * 9), GAZE_JOINTS, GAZE_JOINTS)
+    assert silent.count("silent for 1.2 s") == 9  # a board that is gone is told all the same
+
+
+def test_loop_figures_are_told_and_coloured_when_late() -> None:
+    said = health(healthy())
+    for words in ("200.0 Hz", "0.04 ms", "0.21 ms", "0.90 ms", "3 slots overrun", "60 ms</b> old"):
+        assert words in said
+    assert strained(said) == 0
+    late = replace(healthy(), timing=LoopFigures(200.0, 0.1, 2.0, 4.0, 2, 2, 5.0))
+    assert strained(health(late)) == 2
+    assert "no frame yet" in health(replace(healthy(), frame_age_s=None))
+
+
+def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
+    tugs = (
+        Salience(4, "thing", 0.41, 0.0, 0.0, 0.0, 0.0, 1.0, 0.41),
+        Salience(1, "<b>", 0.02, 0.0, 0.0, 0.0, 0.5, 0.6, 0.3),
+    )
+    shot = replace(healthy(), saliences=tugs, character="shy", conversation="listen")
+    said = saliences(shot)
+    assert said.index("thing 4") < said.index("&lt;b&gt; 1")
+    assert "translation 0.41" in said and "translation 0.02 rule 0.50" in said
+    assert "looming 0.00</div>" not in said
+    assert "0.60 &times;&ensp;0.30" in said
+    named = winner(shot)
+    for words in ("thing &lt;4&gt;", "because it moves", "behaviour: wait", "character: shy",
+                  "conversation: listen"):  # fmt: skip
+        assert words in named
+    assert "wanders" in saliences(healthy()) and "slide &lt;0.4&gt;" in winner(healthy())
+
+
+def as_it_is(shot: Snapshot) -> Snapshot:
+    return shot
+
+
+# --- on a page --------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def server():
+    made = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield made
+    made.stop()
+
+
+def watched() -> tuple[Widgets, PanelView]:
+    """Panels that a browser shows."""
+    widgets = Widgets()
+    panel = PanelView(widgets)
+    widgets.join("a browser", lambda: None)
+    return widgets, panel
+
+
+def words_of(widgets: Widgets) -> str:
+    """Everything that is written in the panels, in whatever drawer."""
+    every = widgets._widgets.values()
+    titles = [str(one.props.get("title", "")) for one in every if type(one) is Widget]
+    return " ".join([one.content for one in every if isinstance(one, Html)] + titles)
+
+
+@pytest.mark.parametrize(("made", "last"), [(as_it_is, "neck roll"), (of_six, "right lower lid")])
+def test_panel_takes_snapshots_and_fills_its_tabs(
+    made: Callable[[Snapshot], Snapshot], last: str
+) -> None:
+    widgets, panel = watched()
+    shots = tuple(made(healthy(0.04 * k)) for k in range(51))
+    for shot in shots:
+        panel.update((shot,))
+        panel.show()
+    said = words_of(widgets)
+    for words in (
+        "thing &lt;4&gt;", "51 saccades", "51 rests", last, "the last 30 seconds",
+        "saccades a second", "bus ok",
+    ):  # fmt: skip
+        assert words in said
+    charts = panel.traces.charts
+    assert len(charts) == 3
+    assert all(len(cast("list[float]", chart.props["x"])) > 40 for chart in charts)
+    panel.update((made(healthy(0.0)),))
+    for _ in range(26):
+        panel.show()
+    again = words_of(widgets)
+    assert "51 saccades" not in again and "1 saccade<" in again
+    panel.silent()
+    assert "the rig has sent nothing" in panel.silence.content
+    panel.update((made(healthy(0.1)),))
+    assert panel.silence.content == ""
+
+
+def test_what_nobody_measured_is_drawn_and_named_otherwise() -> None:
+    _, panel = watched()
+    view = panel.traces
+
+    def shown(t_s: float, estimated: tuple[str, ...]) -> list[bool]:
+        shot = of_six(healthy(t_s), estimated)
+        panel.update((shot,))
+        panel.draw_all()
+        panel.show()
+        named = [chart.names()[2] == "estimated, not measured" for chart in view.charts]
+        lines = [cast("list[list[str]]", chart.props["lines"]) for chart in view.charts]
+        assert named == [line[2][1] == "estimated" for line in lines]
+        assert named == ["no feedback" in chart.title for chart in view.charts]
+        return named
+
+    assert shown(1.0, SIX) == [True, True, True]
+    assert "> measured<" not in view.key.content and "estimated" in view.key.content
+    assert "no measurements" in panel.estimation_note.content
+    before = view.charts
+    assert shown(1.1, SIX) == [True, True, True]
+    assert view.charts is before  # what stays as it is is not made again
+    assert shown(1.2, ("left_lower_lid",)) == [False, False, True]
+    assert "> measured<" in view.key.content and "estimated" in view.key.content
+    assert panel.estimation_note.content == ""
+    assert shown(1.3, ()) == [False, False, False]
+    assert "estimated" not in view.key.content
+
+
+class Nobody:
+    """A stop button and an ear that take whatever they are told."""
+
+    def tell(self, state: Mapping[str, object]) -> None:
+        self.reported = dict(state)
+
+
+def test_who_comes_late_sees_all_panels_as_they_are_now(
+    server: viser.ViserServer,
+) -> None:
+    button = Nobody()
+    widgets = Widgets()
+    view = PageView(server, widgets, Outbox(None), button.tell)  # type: ignore[arg-type]
+    view.show(News((replace(healthy(1.0), target_name="the first"),), None, ended=False))
+    for k in range(20):  # nobody looks
+        view.show(News((healthy(1.1 + 0.1 * k),), None, ended=False))
+    last = replace(of_six(healthy(4.0)), target_name="the last", stopped="a test")
+    view.show(News((last,), None, ended=False))
+    known = {"stopped": "a test", "silent": False, "without_feedback": 6}
+    assert button.reported.items() >= known.items()
+    panel = view._panel
+    widgets.join("a browser", lambda: None)
+    view.show(News((), None, ended=False))
+    assert "the last" in panel.winner.content and NO_FEEDBACK in panel.health.content
+    assert len(panel.traces.charts) == 3 and "no feedback" in panel.traces.charts[0].title
+
+
+def test_the_menu_of_traces_is_that_of_the_rig() -> None:
+    traces = JointSeries()
+    view = JointCharts(Widgets().panel("watch"))
+    traces.add(healthy(1.0))
+    view.show(traces)
+    assert view.what.options == ("yaw", "pitch", "left eye", "right eye", "neck")
+    view.what.value = "neck"
+    view.show(traces)
+    assert "neck, roll" in view.charts[-1].title
+    traces.add(of_six(healthy(2.0)))
+    view.show(traces)
+    assert view.what.options == ("yaw", "pitch", "left eye", "right eye")
+    assert view.what.value == "yaw" and "lower lids" in view.charts[-1].title
+    view.what.value = "left eye"
+    view.show(traces)
+    titles = " ".join(chart.title for chart in view.charts)
+    assert len(view.charts) == 4 and titles.count("both eyes") == 2
+    assert "left upper lid" in titles and "left lower lid" in titles
+
+
+def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> None:
+    view = OverlayPanel(server.scene)
+
+    def seen() -> set[str]:
+        nodes = {"ghost": "/ghost", "camera": "/camera", "eyes": "/field_left"}
+        handles = server.scene._handle_from_node_name
+        return {name for name, node in nodes.items() if node in handles and handles[node].visible}
+
+    edges = lid_edges(shape_of(load_rig("desk")))
+    view.show(healthy(), OverlayChoices(ghost=True, camera=True, eyes=True), edges)
+    assert seen() == {"ghost", "camera", "eyes"}
+    view.show(healthy(), OverlayChoices(ghost=False, camera=True, eyes=False), edges)
+    assert seen() == {"camera"}
+    view.show(
+        replace(healthy(), commanded_pose=None, camera=None, field_deg=None),
+        OverlayChoices(eyes=True),
+        edges,
+    )
+    assert seen() == set()
+
+
+def test_a_recording_without_pictures_says_so(server: viser.ViserServer) -> None:
+    widgets = Widgets()
+    view = PageView(server, widgets, Outbox(None), Nobody().tell)  # type: ignore[arg-type]
+    state = {"at_s": 1.0, "duration_s": 9.0, "playing": False, "speed": 1.0, "sought_s": None}
+    assert view._panel.image.data == b""
+    without = {**state, "pictures": False}
+    view.show(News((healthy(),), None, ended=False, others=((REPLAY, without),)))
+    shown = cv2.imdecode(np.frombuffer(view._panel.image.data, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert shown is not None and 0.01 < (shown > 180).mean() < 0.1  # words on a dark ground
+
+
+def test_bus_faults_are_told_in_plain_words() -> None:
+    errors = {"timeout": 74, "rearmed": 1, "late computer": 0, "pulse": 2}
+    said = health_text(BusHealth(0, 0, errors))
+    assert said == "bus: pulse 2 times, torque on again 1 time, no answer 74 times"
+    assert health_text(BusHealth(0, 0, {})) == "bus ok"
+
+
+def test_a_recording_that_stands_still_is_no_silent_rig(server: viser.ViserServer) -> None:
+    button = Nobody()
+    view = PageView(server, Widgets(), Outbox(None), button.tell)  # type: ignore[arg-type]
+    state = {"at_s": 1.0, "duration_s": 9.0, "playing": False, "speed": 1.0, "sought_s": None}
+    view.show(News((healthy(),), None, ended=False, others=((REPLAY, state),)))
+    view.silent()
+    assert button.reported["recording"] is True and "silent" not in button.reported
+
+
+def test_the_age_of_the_frame_is_said_once() -> None:
+    shot = replace(SNAPSHOT, frame_age_s=0.073, perception="frame 73 ms old | face 1 at 0.94 m")
+    said = health(shot)
+    assert said.count("73 ms") == 1 and "<div>face 1 at 0.94 m</div>" in said
+    assert "<div>no face</div>" in health(replace(shot, perception="no face"))
+    blind = health(replace(shot, frame_age_s=None, perception="no frame yet"))
+    assert blind.count("no frame yet") == 1

@@ -10,9 +10,8 @@ from gazerig.gaze.angles import angle_between, norm, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.types import GazeState, Target, Vec3
-from gazerig.robot.model.gaze_error import gaze_error
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.kinematics import Kinematics, gaze_error
 from gazerig.robot.model.types import JointAngles, JointState
 
 AT_END_DEG = 1.0

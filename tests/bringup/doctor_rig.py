@@ -14,24 +14,12 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
-
-
 RANGES = ((1, 1650, 2446, "left_eye_pan"), (2, 1650, 2446, "left_eye_tilt"),
           (7, 1252, 2844, "neck_yaw"))  # fmt: skip
-
-
 EYE = {"dynamixel": "xl330-m077", "feetech": "sts3215"}
-
-
 NECK = {"dynamixel": "xc330-m288", "feetech": "sts3215"}
-
-
 SPEED = {"dynamixel": 6000.0, "feetech": 3000.0}
-
-
 PAN, TILT, YAW = "left_eye_pan (servo 1)", "left_eye_tilt (servo 2)", "neck_yaw (servo 7)"
-
-
 each = pytest.mark.parametrize("kind", [DYNAMIXEL, FEETECH], ids=lambda kind: kind.name)
 
 

@@ -6,6 +6,9 @@ Most in simulated time; of each command one is on a pseudo-terminal too, and mar
 import json
 import re
 import shlex
+import signal
+import time
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,23 +16,26 @@ from typing import Any
 import pytest
 import typer
 from command_line import invoked
+from commands_started import hear, start, status
 from desk import GAZE_JOINTS
-from served_rigs import hide_real_ports, rig_files, served
+from served_rigs import Served, hide_real_ports, rig_files, served
 from typer.testing import CliRunner
 
 from gazerig.config.save import copy_shipped, save_rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.serial.port import BlockingPort, port_of
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli import ports
+from gazerig.features.bringup.cli.manual_session import holding_text, unreleased_text
+from gazerig.features.bringup.manual_control import ManualControl
 from gazerig.robot.cli.main import app
-from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
-
 SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 LINE = {"desk": DynamixelLine, "feetech": FeetechLine}
 ROW = r"(\d) +[│|] ([\w-]+) +[│|] ([\d.]+) +[│|] (\d+) +[│|] "
@@ -370,3 +376,340 @@ def test_every_cure_of_the_doctor_can_be_typed(
         assert values["port"] == path, words
         if "rig" in values and words[0] != "scan":
             assert values["rig"] == str(rig), words
+
+
+# --- jog, home, look-at and monitor as they are typed, on rigs of every kind
+
+
+@pytest.fixture
+def rigs(tmp_path: Path) -> dict[str, str]:
+    """Return the paths of rigs of one's own by kind."""
+    return rig_files(tmp_path)
+
+
+@pytest.fixture
+def desk() -> Iterator[Served]:
+    with served("desk") as buses:
+        yield buses
+
+
+@pytest.mark.pty
+def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
+    path = desk.ports
+    process = start("jog", "neck_yaw", "60", "--speed", "15", "--port", path)
+    hear(process.stderr, "torque on")
+    time.sleep(0.3)
+    process.send_signal(signal.SIGTERM)
+    _, words = process.communicate(timeout=30)
+    assert process.returncode == 1 and "SIGTERM" in words
+    # A starved machine has no time left for the way.
+    assert re.search(r"parked( \(not there in time\))?, torque off on all servos", words)
+    assert not any(status(desk.command, servo_id)["torque"] for servo_id in range(1, 10))
+
+
+def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stop = ManualControl.stop
+
+    def unconfirmed(self: ManualControl) -> tuple[str, ...]:
+        return *stop(self), "neck_roll (servo 9): torque-off not confirmed: cut the servo power"
+
+    monkeypatch.setattr(ManualControl, "stop", unconfirmed)
+    done = invoked("jog", "left_eye_pan", "-2", "--mock", "--seconds", "0", "--no-park")
+    assert done.code == 1
+    assert "torque off on all servos; neck_roll (servo 9): torque-off not confirmed" in done.err
+
+
+def test_monitor_changes_nothing(desk: Served) -> None:
+    path = desk.ports
+    before = desk.command("status")
+    done = invoked("monitor", "--once", "--port", path)
+    assert done.code == 0, done.err
+    assert [line.split()[0] for line in done.out.splitlines()[1:10]] == list(GAZE_JOINTS)
+    after = json.loads(desk.command("status"))
+    for servo, was in zip(after["servos"], json.loads(before)["servos"], strict=True):
+        assert (servo["torque"], servo["goal"]) == (was["torque"], was["goal"])
+    desk.command("lose 3")
+    lost = invoked("monitor", "--once", "--port", path)
+    assert lost.code == 0 and "no answer" in lost.out
+
+
+def test_jog_says_what_was_applied() -> None:
+    done = invoked(
+        "jog", "left_eye_pan", "-20", "--mock", "--speed", "60", "--seconds", "0", "--no-park"
+    )
+    assert done.code == 0, done.err
+    assert re.search(r"left_eye_pan: desired -20\.0, measured -\d+\.\d deg", done.err)
+    assert "torque on: 9 servos" in done.err
+    assert "torque off on all servos" in done.err
+
+
+def test_jog_beyond_the_range_is_refused_at_once_with_the_range() -> None:
+    done = invoked("jog", "left_eye_pan", "500", "--mock")
+    assert done.code == 2
+    assert done.err == "left_eye_pan 500.0 deg is outside its range, -35..35 deg\n"
+
+
+def test_home_goes_to_the_centre() -> None:
+    done = invoked("home", "--mock", "--speed", "60")
+    assert done.code == 0, done.err
+    assert "left_upper_lid: desired 20.0" in done.err
+    assert "arrived" in done.err and "parked" not in done.err
+
+
+def test_look_at_tells_error_and_vergence() -> None:
+    done = invoked("look-at", "1", "-0.2", "0.3", "--mock", "--seconds", "3", "--no-park")
+    assert done.code == 0, done.err
+    errors = re.search(r"gaze error: left eye (\S+), right eye (\S+) deg", done.err)
+    assert errors is not None and max(map(float, errors.groups())) < 2.0
+    assert re.search(r"vergence: 3\.\d+ deg, the point needs 3\.5", done.err)
+
+
+def test_monitor_as_lines_of_json() -> None:
+    done = invoked("monitor", "--mock", "--json", "--seconds", "1.5", "--rate", "10")
+    lines = [json.loads(line) for line in done.out.splitlines()]
+    assert done.code == 0 and 2 <= len(lines) <= 16
+    assert set(lines[0]["joints"]) == set(GAZE_JOINTS)
+    assert lines[-1]["t_s"] > lines[0]["t_s"] and lines[-1]["unanswered"] == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("jog", "neck_yaw", "10"),
+        ("home",),
+        ("look-at", "1", "0", "0.3"),
+        ("monitor", "--once"),
+        ("calibrate", "--dry-run", "--joint", "neck_yaw"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_an_absent_port_is_said_with_what_there_is(words: tuple[str, ...]) -> None:
+    done = invoked(*words, "--port", "/dev/ttyNowhere")
+    assert done.code == 2
+    assert "no serial port /dev/ttyNowhere" in done.err
+
+
+def test_nonsense_is_refused_before_the_torque_is_on() -> None:
+    for words in (("jog", "nose", "3"), ("jog", "neck_yaw", "nan"), ("look-at", "nan", "0", "0")):
+        done = invoked(*words, "--mock")
+        assert done.code == 2 and "torque on" not in done.err
+
+
+# --- hobby servos and rigs of several kinds
+
+
+def test_monitor_shows_every_kind_in_one_table(rigs: dict[str, str]) -> None:
+    done = invoked("monitor", rigs["mixed"], "--mock", "--once")
+    assert done.code == 0, done.err
+    rows = {line.split()[0]: line.split() for line in done.out.splitlines()[1:9]}
+    assert rows["eyes_pan"][1:] == ["0", "-", "-", "none", "-", "-", "-", "-", "off", "-"]
+    assert rows["neck_yaw"][1] == "neck:7" and rows["neck_yaw"][-1] == "none"
+    assert rows["neck_pitch"][1] == "tilt:1" and "us/step" in done.out
+    assert "estimated from the pulse" in done.out
+
+
+def test_monitor_of_a_mixed_rig_as_json(rigs: dict[str, str]) -> None:
+    done = invoked("monitor", rigs["mixed"], "--mock", "--json", "--seconds", "0")
+    reported = json.loads(done.out.splitlines()[0])["joints"]
+    assert reported["eyes_pan"]["measured"] is False and reported["neck_yaw"]["measured"] is True
+
+
+def test_on_real_wires_hobby_servos_are_asked_for_first(
+    rigs: dict[str, str],
+) -> None:
+    rig = rigs["mixed"]
+    with served(rig) as buses:
+        refused = invoked("jog", rig, "neck_yaw", "5", "--port", buses.ports)
+        assert refused.code == 2 and "say --yes" in refused.err
+        assert "torque on" not in refused.err
+        assert all(one["target"] == 0 for one in json.loads(buses.command("status"))["servos"])
+        words = ("--port", buses.ports, "--yes", "--speed", "60", "--seconds", "0")
+        done = invoked("jog", rig, "eyes_pan", "8", *words)
+        assert done.code == 0, done.err
+        assert "go to their parking place at once" in done.err
+        assert "torque on: 2 servos hold where they are, 6 hobby servos" in done.err
+        assert re.search(r"eyes_pan: desired 8\.0, estimated \d\.\d deg", done.err)
+        assert re.search(r"parked( \(.*\))?, torque off on all servos", done.err)
+        assert all(one["target"] == 0 for one in json.loads(buses.command("status"))["servos"])
+
+
+def test_home_opens_all_four_lids() -> None:
+    done = invoked("home", "maker", "--mock", "--speed", "60")
+    assert done.code == 0, done.err
+    assert "left_lower_lid: desired 22.0, estimated 22.0" in done.err
+    assert "pulses on: 6 hobby servos" in done.err
+
+
+def test_look_at_of_a_maker_s_head_says_what_it_cannot_do() -> None:
+    words = ("maker", "1", "-0.2", "0.1", "--mock", "--seconds", "1.5", "--no-park")
+    done = invoked("look-at", *words)
+    assert done.code == 0, done.err
+    assert "mean line of sight" in done.err and "vergence: none" in done.err
+    assert "head:" not in done.err and "estimated, not measured" in done.err
+
+
+def test_what_servos_do_alone_is_said_for_the_kinds_that_there_are(rigs: dict[str, str]) -> None:
+    mixed = unreleased_text(load_rig(rigs["mixed"]))
+    assert "watchdog" in mixed and "Feetech" in mixed and "Maestro" in mixed
+    assert "own watchdog and hold" in unreleased_text(load_rig("desk"))
+    assert "watchdog" not in unreleased_text(load_rig("feetech"))
+    assert holding_text(load_rig("desk")) == "torque on: 9 servos hold where they are"
+
+
+# --- scan, doctor, setup and reboot of boards that move hobby servos, as people type them
+
+
+@pytest.fixture
+def on_pca9685(tmp_path):
+    """Return the path of the maker's rig with a PCA9685 in place of its Maestro."""
+    return rig_files(tmp_path)["pca9685"]
+
+
+def test_scan_of_a_maestro():
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine())
+        bus.command("error signal")
+        bus.command("script on")
+        code, out, _ = invoked("scan", "--port", path)
+        assert code == 0 and "Pololu Maestro: 6 channels or more" in out
+        assert "serial signal error" in out and "its own script runs" in out
+        assert "nothing else was sent" in out and "searched dynamixel" not in out
+        code, out, _ = invoked("scan", "--port", path, "--json", "--kind", "maestro")
+        (board,) = json.loads(out)["boards"]
+        assert code == 0 and board["script"] is True and board["errors"] == []
+
+
+def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine(crc=True))
+        board = SerialPort(path, "Pololu Mini Maestro", "1ffb:008a", None)
+        monkeypatch.setattr(ports, "serial_ports", lambda host: (board,))
+        for words in (
+            ("scan", "--port", path, "--kind", "feetech"),
+            ("scan", "--port", path, "--kind", "dynamixel"),
+            ("setup", "--port", path, "--joint", "neck_yaw", "--yes"),
+            ("setup", "feetech", "--port", path, "--joint", "neck_yaw", "--yes"),
+            ("reboot", "neck_yaw", "--port", path),
+            ("doctor", "--port", path),
+        ):
+            code, _, err = invoked(*words)
+            assert code == 2 and "board of Pololu" in err and "would move" in err, words
+        # Any packet of theirs would have been an error to it.
+        assert json.loads(bus.command("status"))["errors"] == []
+        code, out, _ = invoked("scan", "--port", path)
+        assert code == 0 and "12 channels" in out
+        assert invoked("doctor", "maker", "--port", path).code == 0
+
+
+def test_setup_of_a_maestro_moves_one_channel_after_another_with_a_yes():
+    answers = "\ny\n\ny\ny\nn\n"
+    code, _, err = invoked(
+        "setup", "maker", "--mock", "--joint", "eyes_pan", "--joint", "left_upper_lid",
+        answers=answers,
+    )  # fmt: skip
+    assert code == 0 and "channel  0: Min 1088, Max 1936, Speed" in err
+    assert "nothing of this can be set over the serial line" in err
+    assert "all 2 channels reach both ends" in err
+    assert "it goes to 1500 us at once" in err and "did the eyes pan move" in err
+    assert "skipped: left_upper_lid" in err and "done: 1 of 2" in err
+
+
+def test_setup_of_a_maestro_finds_a_range_that_cuts_and_a_servo_on_another_channel():
+    with served("maker") as (port, _, command):
+        command("set max-us 1900")
+        command("script 0")
+        code, _, err = invoked(
+            "setup", "maker", "--port", port, "--joint", "eyes_pan",
+            # set; supply off; on again; move; it was another; move; that is it
+            answers="\ny\n\ny\nn\ny\ny\n",
+        )  # fmt: skip
+        assert code == 0 and "ran a script of its own: stopped" in err
+        assert "and the board stays at 1900 us: set its Min to 1088 and its Max to 1936" in err
+        assert "plug its servo into channel 0" in err and "done: 1 of 1" in err
+        first = json.loads(command("status"))["servos"][0]
+        assert first["position"] == 0
+
+
+@pytest.mark.pty
+def test_setup_of_a_maestro_with_yes_does_not_guess_about_the_supply():
+    code, _, err = invoked("setup", "maker", "--mock", "--yes", "--joint", "eyes_tilt")
+    assert code == 0 and "--yes cannot know that the supply is off" in err and "done: 1 of 1" in err
+
+
+def test_setup_of_a_maestro_that_does_not_answer():
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine(), choices={"mode": "mute"})
+        code, _, err = invoked("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
+        assert code == 2 and "no Maestro answers: on USB take the first of its two ports" in err
+
+
+def test_setup_of_a_board_that_is_too_small(monkeypatch):
+    with PtyBus() as bus:
+        path = bus.start_device(MaestroLine(6, crc=True))
+        board = SerialPort(path, "Pololu Micro Maestro", "1ffb:0089", None)
+        monkeypatch.setattr(ports, "serial_ports", lambda host: (board,))
+        code, _, err = invoked("setup", "maker", "--port", path, "--yes", "--joint", "eyes_pan")
+        assert code == 0 and "USB Dual Port" in err
+        monkeypatch.setattr(
+            "gazerig.features.bringup.cli.setup_boards.USB_CHANNELS", {"1ffb:0089": 2}
+        )
+        code, _, err = invoked("setup", "maker", "--port", path, "--yes")
+        assert code == 2 and "has channels 0..1, not those of left_upper_lid (channel 2)" in err
+
+
+def test_setup_of_a_pca9685_measures_its_clock_and_moves_one_channel_after_another(on_pca9685):
+    with served(on_pca9685) as (port, _, command):
+        command("set oscillator-mhz 25.44")
+        code, _, err = invoked(
+            "setup", on_pca9685, "--port", port, "--joint", "eyes_pan", "--joint", "left_upper_lid",
+            # what the meter shows, at last; write it; move; another moved; move; that is it; skip
+            answers="about 50\n5.09 Hz\n50.9 hz\ny\ny\nn\ny\ny\nn\n",
+        )  # fmt: skip
+        assert code == 0 and "eyes_pan: channel 0 of board 0x40" in err
+        assert "channel 15, where no joint is, gives 1500 us at 50 Hz" in err
+        assert "'about 50': type the frequency or the pulse" in err
+        assert "would be a clock of 2.54 MHz" in err and "about 50.0 Hz" in err
+        assert "its clock has 25.435 MHz: pulses were 1.7 % too short" in err
+        assert "plug its servo into channel 0" in err and "skipped: left_upper_lid" in err
+        status = json.loads(command("status"))["servos"]
+        assert not any(one["target"] for one in status)
+        assert abs(status[0]["place"] - 6000) < 80 and status[2]["place"] == 5920
+    text = Path(on_pca9685).read_text(encoding="utf-8")
+    assert "# mine" in text and load_rig(on_pca9685).bus.pca9685.oscillator_hz == 25_435_000
+
+
+def test_setup_of_a_pca9685_with_yes_measures_nothing(on_pca9685):
+    code, _, err = invoked("setup", on_pca9685, "--mock", "--yes", "--joint", "eyes_pan")
+    assert code == 0 and "--yes has no meter" in err and "done: 1 of 1" in err
+
+
+def test_reboot_of_a_maestro_says_what_there_is_instead():
+    with served("maker") as (port, _, command):
+        line = port_of(port)
+        line.setBaudRate(115_200)
+        line.write(bytes.fromhex("84 00 70 2E 2B"))
+        line.closePort()
+        words = ("reboot", "maker", "eyes_pan", "--port", port)
+        code, _, err = invoked(*words, answers="n\n")
+        assert code == 0 and "has no restart over its serial line" in err and "left as it is" in err
+        assert json.loads(command("status"))["servos"][0]["position"] == 6000
+        command("error crc")
+        code, _, err = invoked(*words, "--yes")
+        assert code == 0 and "cleared now: serial CRC error" in err
+        assert json.loads(command("status"))["servos"][0]["position"] == 0
+
+
+def test_the_command_port_is_the_first_of_the_two_of_a_maestro(monkeypatch):
+    both = [SerialPort(f"/dev/ttyNONE{n}", "Maestro", "1ffb:0089", None) for n in range(2)]
+    monkeypatch.setattr(ports, "serial_ports", lambda host: both)
+    assert "no serial port /dev/ttyNONE0" in invoked("scan").err
+
+
+def test_doctor_and_setup_of_a_pca9685(on_pca9685):
+    code, out, _ = invoked("doctor", on_pca9685, "--mock")
+    assert code == 0 and "answers at 0x40; pulses on 0 of 6 channels" in out
+    code, _, err = invoked("setup", on_pca9685, "--mock", "--yes")
+    assert code == 0 and "board 0x40: jumpers none closed" in err
+    assert "eyes_pan: channel 0 of board 0x40" in err

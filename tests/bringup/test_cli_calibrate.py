@@ -297,29 +297,33 @@ def test_the_first_word_says_what(words: tuple[str, ...], shows: str) -> None:
     assert done.code == 0 and shows in done.out
 
 
+NO_NOSE = "no such joint; there is left_eye_pan"
+
+
 @pytest.mark.parametrize(
-    "words",
+    ("words", "says"),
     [
-        ("--joint", "nose"),
-        ("desk", "--joint", "nose"),
-        ("joints", "--joint", "nose"),
-        ("joints", "desk", "--joint", "nose"),
-        ("--mock", "desk", "--joint", "nose"),
+        (("--joint", "nose"), NO_NOSE),
+        (("desk", "--joint", "nose"), NO_NOSE),
+        (("joints", "--joint", "nose"), NO_NOSE),
+        (("joints", "desk", "--joint", "nose"), NO_NOSE),
+        (("--mock", "desk", "--joint", "nose"), NO_NOSE),
+        # Nothing said is the joints of the shipped rig, which is never written.
+        ((), "desk.yaml"),
+        ((), "copy it"),
+        (("nose",), "nothing named 'nose' is shipped"),
+        (("board", "b.pdf", "--square", "60"), "does not fit on a4"),
+        (
+            ("camera", "desk", "--mock", "--dry-run", "--ruler", "0"),
+            "a printer scales by 0.2 to 5",
+        ),
     ],
 )
-def test_joints_with_and_without_their_name(words: tuple[str, ...]) -> None:
+def test_what_is_refused_is_said_with_and_without_the_word_joints(
+    words: tuple[str, ...], says: str
+) -> None:
     done = calibrate(*words)
-    assert done.code == 2 and "no such joint; there is left_eye_pan" in done.err
-
-
-def test_nothing_said_is_the_joints_of_the_shipped_rig_which_is_never_written() -> None:
-    done = calibrate()
-    assert done.code == 2 and "desk.yaml" in done.err and "copy it" in done.err
-
-
-def test_a_word_that_is_neither_command_nor_rig_is_said() -> None:
-    done = calibrate("nose")
-    assert done.code == 2 and "nothing named 'nose' is shipped" in done.err
+    assert done.code == 2 and says in done.out + done.err
 
 
 def test_a_rig_file_named_like_a_command_has_a_path(
@@ -342,22 +346,10 @@ def test_the_board_is_written(name: str, tmp_path: Path) -> None:
     assert "print it at 100 % on letter" in done.out + done.err
 
 
-def test_a_board_too_large_is_refused(tmp_path: Path) -> None:
-    done = calibrate("board", str(tmp_path / "b.pdf"), "--square", "60")
-    assert done.code == 2
-    assert "does not fit on a4" in done.out + done.err
-
-
 def test_a_simulated_lens_is_measured_and_shown() -> None:
     done = calibrated("camera", "--mock", "--what", "lens", "--dry-run")
     assert "camera.lens.fx_px" in done.out + done.err
     assert "reprojection error 0." in done.out + done.err
-
-
-def test_a_ruler_that_cannot_be_is_refused() -> None:
-    done = calibrate("camera", "desk", "--mock", "--dry-run", "--ruler", "0")
-    assert done.code == 2
-    assert "a printer scales by 0.2 to 5" in done.out + done.err
 
 
 def test_a_camera_on_the_base_has_no_place_on_the_head(tmp_path: Path) -> None:

@@ -2,17 +2,66 @@
 
 from dataclasses import replace
 from functools import cache
+from xml.etree.ElementTree import fromstring
 
 import pytest
 from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one, setups_of
 from present import present
 
-from gazerig.drivers.servo_bus.discovery import ping
+from gazerig.drivers.errors import PortError, ServoMissing
+from gazerig.drivers.feetech.memory_table import TABLE_END
+from gazerig.drivers.i2c import bridge
+from gazerig.drivers.maestro.line import MaestroLink
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.registers import (
+    AWAKE,
+    LED0,
+    MODE1,
+    PRESCALE,
+    SLEEP,
+    prescale_of,
+    pulse,
+)
+from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
+from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.features.bringup.doctor.diagnostics import worst
+from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.bus_search import SearchRound
+from gazerig.features.bringup.channel_test import send_home
+from gazerig.features.bringup.cli.scan import remarks
+from gazerig.features.bringup.doctor.boards import stop_script, visit_maestro, visit_pca9685
+from gazerig.features.bringup.doctor.diagnostics import (
+    Diagnostic,
+    Fix,
+    group_findings,
+    join_places,
+    summarize,
+    worst,
+)
 from gazerig.features.bringup.doctor.families import CHECKS
+from gazerig.features.bringup.doctor.run import (
+    UDEV_RULE,
+    PortFacts,
+    apply_fixes,
+    examine_latency,
+    examine_port,
+    find_servos,
+    fix_latency,
+)
 from gazerig.features.bringup.doctor.servo_rules import examine, read_state
+from gazerig.features.bringup.maestro_settings import (
+    clipping_text,
+    instructions,
+    range_us,
+    settings_file,
+    start_limits,
+    wide_range,
+)
 from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.pca9685.bridge import build_bridge
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 FIRMWARE = {"dynamixel": 53, "feetech": 353}
@@ -57,8 +106,6 @@ BOTH_RULES = [
     ({"min_position_limit": 1700}, "warn", "1700..2446 cut the YAML's range 1650..2446", "--fix"),
     ({"max_position_limit": 4095}, "note", "1650..4095 are wider than the YAML's range", "--fix"),
 ]
-
-
 DYNAMIXEL_RULES = [
     ({"drive_mode": 1}, "warn", "Drive Mode 1 (reversed)", "--fix"),
     (
@@ -89,8 +136,6 @@ DYNAMIXEL_RULES = [
     ({"bus_watchdog": 255}, "warn", "bus watchdog has tripped", "--fix"),
     ({"baud_rate": 1}, "warn", "its Baud Rate is 57600", "gazerig setup"),
 ]
-
-
 FEETECH_RULES = [
     ({"status": 0x20}, "error", "reports: overload", "gazerig reboot 1"),
     ({"status": 0x08}, "error", "reports: overcurrent", "shorts"),
@@ -114,8 +159,6 @@ FEETECH_RULES = [
     ({"overload_torque": 100}, "warn", "overload protection cannot act", "Overload Torque (36)"),
     ({"protection_time": 0}, "warn", "overload protection cannot act", "Protection Time (35)"),
 ]
-
-
 RULES = [
     *((kind, *rule) for kind in (DYNAMIXEL, FEETECH) for rule in BOTH_RULES),
     *((DYNAMIXEL, *rule) for rule in DYNAMIXEL_RULES),
@@ -293,17 +336,13 @@ def test_nobody(kind):
 
 
 @each
-def test_two_servos_with_one_id(kind):
+@pytest.mark.parametrize(
+    ("fault", "says"), [("collide 2", "two servos share id 2"), ("corrupt 2", "in pieces only")]
+)
+def test_two_servos_with_one_id_and_one_of_which_only_pieces_come(kind, fault, says):
     rig = Rig(kind)
-    rig.command("collide 2")
-    assert "alone" in one(rig.check(), "error", TILT, "two servos share id 2").remedy
-
-
-@each
-def test_a_servo_of_which_only_pieces_come(kind):
-    rig = Rig(kind)
-    rig.command("corrupt 2")
-    assert "alone" in one(rig.check(), "error", TILT, "in pieces only").remedy
+    rig.command(fault)
+    assert "alone" in one(rig.check(), "error", TILT, says).remedy
 
 
 def test_what_servos_suffer():
@@ -327,3 +366,462 @@ def test_reading_changes_nothing(kind):
     before = rig.kept()
     rig.check()
     assert rig.kept() == before
+
+
+# --- What the doctor mends, what it says of ports, and its words
+
+
+def test_fix_mends_what_is_safe_and_says_it():
+    rig = Rig(DYNAMIXEL)
+    rig.set(
+        1, return_delay_time=250, drive_mode=1, operating_mode=4, secondary_id=9,
+        startup_configuration=1, min_position_limit=0, max_position_limit=4095,
+    )  # fmt: skip
+    rig.set(2, bus_watchdog=255)
+    before = rig.chain.positions_steps()
+    done = rig.fix(rig.check())
+    assert all(one.done for one in done)
+    assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
+    assert f"{TILT}: bus watchdog 255 -> 0: done" in map(str, done)
+    assert worst(rig.check()) == "note" and not any(f.fixes for f in rig.check())
+    assert rig.chain.positions_steps() == before
+    assert rig.fix(rig.check()) == []
+
+
+def test_fix_mends_an_sts_servo_for_good():
+    rig = Rig(FEETECH)
+    rig.set(1, return_delay_time=250, operating_mode=1, phase=28, unloading_condition=0,
+            temperature_limit=90, min_position_limit=0, max_position_limit=0)  # fmt: skip
+    rig.set(2, lock=0, status_return_level=0)
+    before = rig.chain.positions_steps()
+    done = rig.fix(rig.check())
+    assert all(one.done for one in done), [str(one) for one in done]
+    assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
+    assert f"{TILT}: lock 0 -> 1: done" in map(str, done)
+    assert not any(f.fixes for f in rig.check())
+    assert rig.chain.positions_steps() == before
+    for i in (1, 2):  # it outlives the power
+        rig.chain[i].restart()
+    rig.pass_time(1.0)
+    assert not any(f.fixes for f in rig.check()) and worst(rig.check()) == "note"
+    assert rig.chain[1].read(TABLE_END - 1, 1) and rig.chain[1].read(55, 1) == b"\1"
+
+
+def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
+    rig = Rig(DYNAMIXEL)
+    servo = rig.chain[2]
+    servo.memory.set("status_return_level", 0)
+    servo.status_level = 0
+    found = one(rig.check(), "error", TILT, "answers pings and nothing else")
+    (done,) = rig.fix([found])
+    assert done.done and worst(rig.check()) == "note"
+
+
+@each
+def test_fix_leaves_a_servo_alone_whose_torque_is_on(kind):
+    rig = Rig(kind)
+    rig.set(1, return_delay_time=250)
+    rig.hold(1)
+    (done,) = rig.fix(rig.check())
+    assert str(done) == f"{PAN}: return delay time 250 -> 0: not done, its torque is on"
+    assert (rig.get(1, "return_delay_time"), rig.get(1, "torque_enable")) == (250, 1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "fault", "says"),
+    [
+        (DYNAMIXEL, "refuse 7 7", "does not take it"),
+        (DYNAMIXEL, "lose 7", "does not answer"),
+        (FEETECH, "lose 7", "does not answer"),
+    ],
+)
+def test_a_servo_that_does_not_take_it_is_said(kind, fault, says):
+    rig = Rig(kind)
+    fix = Diagnostic("warn", "w", YAW, "", (Fix(7, "return_delay_time", 3, 0),))
+    rig.command(fault)
+    (done,) = rig.fix([fix])
+    assert not done.done and says in done.what
+
+
+# --- ports
+
+USB = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-FTDI-if00")
+
+
+def facts(access, holders=()):
+    return PortFacts("/dev/ttyUSB0", access, holders, (USB,))
+
+
+def test_a_good_port_and_its_lasting_name():
+    first, second = examine_port(facts(Access(True, True, True, "dialout", True)))
+    assert (first.level, second.level) == ("ok", "note")
+    assert "/dev/serial/by-id/usb-FTDI-if00" in second.remedy
+
+
+@pytest.mark.parametrize(
+    ("access", "holders", "words", "cure"),
+    [
+        (Access(False, False, False, "", False), (), "no such port", "by-id/usb-FTDI-if00 (U2D2)"),
+        (Access(True, False, True, "root", True), (), "no serial port", "gazerig scan"),
+        (Access(True, True, False, "dialout", False), (), "the group dialout only",
+         "sudo usermod -aG dialout $USER"),
+        (Access(True, True, False, "dialout", True), (), "the group dialout only",
+         "log out and in again"),
+        (Access(True, True, True, "dialout", True), ("minicom (process 12)",),
+         "held open by minicom (process 12)", "end it"),
+    ],
+)  # fmt: skip
+def test_a_port_that_cannot_be_used(access, holders, words, cure):
+    (only,) = examine_port(facts(access, holders))
+    assert only.level == "error" and words in only.what and cure in only.remedy
+
+
+def test_latency_timer(tmp_path):
+    host = Host(latency=tmp_path)
+    assert examine_latency("/dev/ttyUSB0", host) == []
+    file = tmp_path / "ttyUSB0" / "latency_timer"
+    file.parent.mkdir()
+    file.write_text("16\n")
+    (slow,) = examine_latency("/dev/ttyUSB0", host)
+    assert slow.level == "warn" and "16 ms" in slow.what
+    assert UDEV_RULE in slow.remedy and str(file) in slow.remedy
+    assert UDEV_RULE == (
+        'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
+    )
+    (done,) = fix_latency("/dev/ttyUSB0", host)
+    assert str(done) == "/dev/ttyUSB0: latency timer 16 -> 1 ms: done"
+    (good,) = examine_latency("/dev/ttyUSB0", host)
+    assert good.level == "ok" and fix_latency("/dev/ttyUSB0", host) == []
+    file.write_text("what?")
+    (unread,) = examine_latency("/dev/ttyUSB0", host)
+    assert unread.level == "note"
+
+
+def test_a_port_that_is_not_there_ends_the_examination(tmp_path):
+    rig = Rig(DYNAMIXEL)
+    rig.port.port_name = str(tmp_path / "ttyUSB9")
+    (only,) = rig.check_all(Host())
+    assert only.level == "error" and only.where.endswith("ttyUSB9")
+
+
+def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
+    rig, host = Rig(DYNAMIXEL), Host(processes=tmp_path)
+    rig.port.port_name = "/dev/null"  # a character device that may be opened
+    rig.port.faults.command("deny on")
+    findings = rig.check_all(host)
+    assert worst(findings) == "error" and findings[-1].where == "/dev/null"
+    rig.port.faults.command("clear")
+    assert len(rig.check_all(host)) > 3
+    assert not rig.port.is_open
+    rig.port.setBaudRate = lambda baud: False  # type: ignore[assignment, method-assign]
+    with pytest.raises(PortError, match="cannot run at 1000000"):
+        find_servos(rig.port, DYNAMIXEL, rig.setups, BAUD, lambda _: None)
+
+
+# --- words
+
+
+def test_findings_in_words():
+    finding = Diagnostic("warn", "hot", "neck_yaw (servo 7)", "let it cool")
+    assert str(finding) == "warn: neck_yaw (servo 7): hot: let it cool"
+    assert worst([]) == "ok"
+    same = [Diagnostic("note", "n", f"j{i} (servo {i})") for i in (1, 2, 4)]
+    worst_first = group_findings([*same, finding])
+    assert [row[0] for row in worst_first] == ["warn", "note"]
+    assert worst_first[1] == ("note", "j1, j2, j4 (servos 1-2, 4)", "n", "")
+    assert join_places(["/dev/ttyUSB0", "j1 (servo 1)"]) == "/dev/ttyUSB0, j1 (servo 1)"
+    fixable = Diagnostic("warn", "w", "x", fixes=(Fix(1, "return_delay_time", 0, 250),))
+    assert summarize([finding, fixable], "desk", False) == (
+        "desk: 2 warn; gazerig doctor --fix mends 1 of them"
+    )
+    assert "--fix" not in summarize([fixable], "desk", True)
+
+
+def test_remarks_of_a_scan():
+    two = (FoundServo(1, 1190, 53, BAUD, "xl330-m077"), FoundServo(1, 1190, 53, BAUD, "xl330-m077"))
+    said = " ".join(remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
+    assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
+    merged = [SearchRound("dynamixel", BAUD, True, two[:1], shared=(1,))]
+    assert "two or more servos have id 1" in " ".join(remarks(merged, "/dev/x"))
+    rounds = [
+        SearchRound("dynamixel", 9600, junk=40),
+        SearchRound("dynamixel", 57_600, protocol_1=(5,)),
+        SearchRound("dynamixel", 1, possible=False),
+    ]
+    lines = list(remarks(rounds, "/dev/x"))
+    assert any("only pieces came" in line for line in lines)
+    assert any("Protocol 1 as id 5" in line for line in lines)
+    assert "searched dynamixel at 9600, 57600 bit/s" in lines[0] and "supply" in lines[-1]
+    # Feetech servos answer the old protocol's ping: that is no riddle where they were found.
+    sts = SearchRound("feetech", 57_600, True, two[:1])
+    assert not any("Protocol 1" in line for line in remarks([*rounds, sts], "/dev/x"))
+
+
+# --- Findings about boards of hobby servos and their channels, fixes, and settings of a Maestro
+
+
+CHANNEL_PAN = ServoConfig(0, "hobby", 4400, 7600, 9000.0, "eyes_pan", rest_steps=6000)
+LID = ServoConfig(2, "hobby", 3600, 7200, 9000.0, "left_upper_lid", rest_steps=5000)
+SETUPS = (CHANNEL_PAN, LID)
+MINI, MICRO = "1ffb:008a", "1ffb:0089"
+
+
+class BoardRig:
+    """A board in this process; what is sent to it is kept."""
+
+    def __init__(self, channels=12, params=None, setups=SETUPS, usb="", **board):
+        self.board = build_board(channels, lambda: 0.0, **board)
+        self.sent = b""
+        self.port = InProcessPort(self.board, self.tap)
+        self.params, self.setups, self.usb = params or MaestroParams(), setups, usb
+
+    def tap(self, data):
+        self.sent += data
+
+    def do(self, text):
+        self.board.exchange(bytes.fromhex(text))
+
+    def check(self):
+        return visit_maestro(self.port, self.params, self.setups, self.usb)
+
+    def errors(self):
+        return self.board.faults.board()["errors"]
+
+
+def test_a_good_board_and_what_no_board_tells():
+    rig = BoardRig(usb=MINI)
+    findings = rig.check()
+    assert {f.level for f in findings} == {"ok", "note"}
+    assert "12 channels" in one(findings, "ok", "the board", "compact and the pololu form").what
+    assert one(findings, "note", "the servos", "hobby servos report nothing")
+    reported = one(findings, "note", "the board", "serial timeout cannot be read")
+    assert "Pololu's program" in reported.remedy and "gazerig setup" in reported.remedy
+    wide = one(findings, "note", "left_upper_lid (channel 2)", "goes to 900..1800 us")
+    assert "Min to 896" in wide.remedy and "cuts goals silently" in wide.what
+    assert not any(f.where == "eyes_pan (channel 0)" for f in findings)
+
+
+def test_nothing_moves_and_no_error_is_made():
+    rig = BoardRig(usb=MINI)
+    rig.do("84 00 70 2E")
+    rig.check()
+    assert [one["position"] for one in rig.board.faults.reports()] == [6000] + [0] * 11
+    assert rig.errors() == [] and b"\xff" not in rig.sent
+
+
+def test_nobody_answers():
+    rig = BoardRig()
+    rig.board.choose("mode", "mute")
+    (only,) = rig.check()
+    assert only.level == "error" and "serial pins" in only.remedy
+    rig.usb = MINI
+    (only,) = rig.check()
+    assert "USB Dual Port" in only.remedy and "serial pins" not in only.remedy
+
+
+@pytest.mark.parametrize(("real", "wanted"), [(True, False), (False, True)])
+def test_check_bytes(real, wanted):
+    rig = BoardRig(params=MaestroParams(crc=wanted), crc=real)
+    found = one(rig.check(), "error", "the board", "the YAML says crc")
+    assert f"bus.maestro.crc: {str(real).lower()}" in found.remedy
+
+
+def test_another_device_number():
+    rig = BoardRig(params=MaestroParams(protocol="pololu"), device=3)
+    found = one(rig.check(), "error", "the board", "answers the compact form only")
+    assert "its device number is not 12" in found.remedy
+    assert (
+        worst(BoardRig(params=MaestroParams(protocol="pololu", device=3), device=3).check())
+        == "note"
+    )
+
+
+def test_a_board_with_fewer_channels_than_the_rig():
+    far = CHANNEL_PAN._replace(id=8, name="eyes_tilt")
+    rig = BoardRig(6, setups=(CHANNEL_PAN, far), usb=MICRO)
+    findings = rig.check()
+    assert one(findings, "error", "the board", "has 6 channels, the YAML says 12")
+    assert one(findings, "error", "eyes_tilt (channel 8)", "channels 0..5 only")
+    assert bytes.fromhex("9008") not in rig.sent  # an error to a board sends all channels home
+
+
+def test_where_the_size_is_not_known_a_missing_channel_is_found_by_its_silence():
+    far = CHANNEL_PAN._replace(id=8, name="eyes_tilt")
+    rig = BoardRig(6, setups=(CHANNEL_PAN, far))
+    assert one(rig.check(), "error", "eyes_tilt (channel 8)", "does not answer about this channel")
+    assert rig.errors() == []  # the doctor has cleaned up after itself
+
+
+def test_a_channel_that_may_not_be_there_is_not_asked_for_while_servos_have_pulses():
+    far = CHANNEL_PAN._replace(id=8, name="eyes_tilt")
+    rig = BoardRig(6, setups=(CHANNEL_PAN, far))
+    rig.do("84 00 70 2E")
+    assert one(rig.check(), "note", "eyes_tilt (channel 8)", "was not read")
+    assert bytes.fromhex("9008") not in rig.sent
+    assert rig.board.faults.reports()[0]["position"] == 6000
+    known = BoardRig(12, setups=(CHANNEL_PAN, far), usb=MINI)
+    known.do("84 00 70 2E")
+    assert not any(f.where == "eyes_tilt (channel 8)" for f in known.check())
+
+
+@pytest.mark.parametrize(
+    ("name", "says", "level", "cure"),
+    [
+        ("signal", "serial signal error", "warn", "bus.maestro.baud"),
+        ("crc", "serial CRC error", "warn", "Enable CRC"),
+        ("protocol", "serial protocol error", "warn", "another program"),
+        ("script-counter", "script program counter error", "warn", "delete it"),
+        ("timeout", "serial timeout", "note", "while no program runs"),
+    ],
+)
+def test_errors_that_it_held(name, says, level, cure):
+    rig = BoardRig()
+    rig.board.faults.command(f"error {name}")
+    found = one(rig.check(), level, "the board", f"cleared now: {says}")
+    assert cure in found.remedy
+    assert not any("cleared now" in f.what for f in rig.check())
+
+
+def test_a_script_is_stopped_by_fix():
+    rig = BoardRig()
+    rig.board.faults.command("script 0")
+    findings = rig.check()
+    assert one(findings, "warn", "the board", "runs a script")
+    assert rig.board.faults.board()["script"]  # looking alone does not stop it
+    (done,) = apply_fixes(lambda _: stop_script(rig.port, rig.params), findings)
+    assert str(done) == "the board: script 1 -> 0: done"
+    assert not rig.board.faults.board()["script"] and worst(rig.check()) != "warn"
+
+
+def test_pulses_without_a_program():
+    rig = BoardRig()
+    rig.do("84 00 70 2E")
+    found = one(rig.check(), "warn", "eyes_pan (channel 0)", "1500 us though no program runs it")
+    assert "gazerig home" in found.remedy
+    rig.do("84 00 00 1F")
+    found = one(rig.check(), "error", "eyes_pan (channel 0)", "outside its range 1100..1900 us")
+    assert "switch the servo supply off" in found.remedy
+
+
+def test_home():
+    rig = BoardRig()
+    rig.do("84 00 70 2E")
+    rig.do("55")
+    rig.do("84 00 70 2E")
+    rig.port.setBaudRate(115_200)
+    assert send_home(MaestroLink(rig.port, rig.params)) == ("serial protocol error",)
+    assert [c["position"] for c in rig.board.faults.reports()] == [0] * 12
+    rig.board.choose("mode", "mute")
+    with pytest.raises(ServoMissing, match="no Maestro answers"):
+        send_home(MaestroLink(rig.port, rig.params))
+
+
+# --- what to set in Pololu's program
+
+
+def test_ranges_are_rounded_outwards_to_what_a_board_can_keep():
+    assert range_us(CHANNEL_PAN) == (1088, 1904)
+    assert range_us(LID) == (896, 1808)
+    assert (wide_range(CHANNEL_PAN), wide_range(LID)) == (None, (896, 1808))
+    edge = CHANNEL_PAN._replace(min_steps=3968, max_steps=8000)
+    assert (range_us(edge), wide_range(edge)) == ((992, 2000), None)
+    assert wide_range(edge._replace(max_steps=8001)) == (992, 2016)
+
+
+def test_what_to_set_is_said_for_every_channel():
+    said = "\n".join(instructions(MaestroParams(device=5, crc=True), SETUPS, True))
+    assert "USB Dual Port" in said and "Device Number: 5" in said and "Enable CRC: on" in said
+    assert "channel  2: Min  896, Max 1808, Speed" in said and "Timeout: 0.50 s" in said
+    pins = "\n".join(instructions(MaestroParams(baud=57_600), SETUPS, False))
+    assert "UART, fixed baud rate 57600" in pins and "USB Dual Port" not in pins
+
+
+def test_the_same_as_a_settings_file_of_pololu_s_programs():
+    params = MaestroParams(device=5, crc=True)
+    root = fromstring(settings_file(params, SETUPS, True))
+    assert (root.findtext("EnableCrc"), root.findtext("SerialMode")) == ("true", "USB_DUAL_PORT")
+    assert root.findtext("SerialTimeout") == "50"  # hundredths of a second
+    channels = root.findall("Channels/Channel")
+    assert len(channels) == params.channels
+    assert {one.get("homemode") for one in channels} == {"Off"}
+    lid = channels[LID.id]
+    assert (lid.get("name"), lid.get("min"), lid.get("max")) == (LID.name, "3584", "7232")
+    assert (int(present(lid.get("speed"))), int(present(lid.get("acceleration")))) == start_limits(
+        LID
+    )
+    assert len(fromstring(settings_file(MaestroParams(channels=6), SETUPS, False))[7]) == 6
+
+
+@pytest.mark.parametrize(("steps_s", "units"), [(3100.0, 31), (3300.0, 32), (12_345.0, 124)])
+def test_a_speed_is_given_as_the_board_keeps_it(steps_s, units):
+    assert start_limits(LID._replace(max_speed_steps_s=steps_s))[0] == units
+
+
+def test_a_place_that_is_cut():
+    assert clipping_text(LID, 3600, 3968) == (
+        "left_upper_lid (channel 2) is sent to 900 us and the board stays at 992 us: set its Min "
+        "to 896 and its Max to 1808 in Pololu's program"
+    )
+    assert "gives no pulses" in clipping_text(LID, 3600, 0)
+
+
+# --- PCA9685
+
+CHANNELS = (
+    ServoConfig(0, "hobby", 4400, 7600, 12_000.0, "eyes_pan"),
+    ServoConfig(1, "hobby", 4400, 7600, 12_000.0, "eyes_tilt"),
+)
+PCA9685 = Pca9685Params()
+
+
+class Pca9685Rig:
+    """One emulated board, and what a program before may have left in it."""
+
+    def __init__(self) -> None:
+        self.now_s = 1.0
+        self.chain = build_bridge((0x40,), lambda: self.now_s)
+        self.port = InProcessPort(self.chain)
+
+    def leave_pulse(self, channel: int, counts: int) -> None:
+        self.port.setBaudRate(PCA9685.baud)
+        prescale = prescale_of(PCA9685.frequency_hz, PCA9685.oscillator_hz)
+        for register, data in (
+            (MODE1, bytes((SLEEP,))),
+            (PRESCALE, bytes((prescale,))),
+            (MODE1, bytes((AWAKE,))),
+            (LED0 + 4 * channel, pulse(counts)),
+        ):
+            self.port.write(bridge.write(0x40, register, data))
+            self.now_s += 0.01
+
+
+def test_a_good_pca9685_is_well_and_what_it_cannot_tell_is_said() -> None:
+    findings = visit_pca9685(Pca9685Rig().port, PCA9685, CHANNELS)
+    assert worst(findings) == "note"
+    assert findings[0].what == "answers at 0x40; pulses on 0 of 2 channels"
+    assert any("no watchdog" in one.what for one in findings)
+
+
+def test_a_board_that_is_not_there_is_one_finding_with_its_remedy() -> None:
+    (only,) = visit_pca9685(Pca9685Rig().port, Pca9685Params(address=0x41), CHANNELS)
+    assert only.level == "error" and only.what == "no PCA9685 answers at 0x41"
+    assert "VCC" in only.remedy and "jumpers" in only.remedy
+
+
+def test_a_channel_that_no_board_has() -> None:
+    wrong = CHANNELS[1]._replace(id=16)
+    findings = visit_pca9685(Pca9685Rig().port, PCA9685, (CHANNELS[0], wrong))
+    assert findings[0].level == "error" and "channels 0 to 15" in findings[0].what
+    assert "eyes_tilt" in findings[0].where
+
+
+@pytest.mark.parametrize(
+    ("counts", "level", "remedy"),
+    [(307, "warn", "gazerig home"), (500, "error", "reboot eyes_pan")],
+)
+def test_pulses_of_a_pca9685_that_were_left_on(counts: int, level: str, remedy: str) -> None:
+    rig = Pca9685Rig()
+    rig.leave_pulse(0, counts)
+    found = visit_pca9685(rig.port, PCA9685, CHANNELS)[0]
+    assert found.level == level and "though no program runs it" in found.what
+    assert remedy in found.remedy

@@ -10,12 +10,13 @@ from served_rigs import rig_files
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.calibration.linkage_calibration import HobbyMarker
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
 from gazerig.features.bringup.cli.prompts import Lines
 
 
-class Servo:
+class Servo(HobbyMarker):
     """Keeps what it is told."""
 
     def __init__(self) -> None:

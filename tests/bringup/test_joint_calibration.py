@@ -1,8 +1,9 @@
 """Zero, sign and range from servo positions, anywhere on the encoder, with and without its seam."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import radians
-from typing import cast
+from typing import Any, cast
 
 import pytest
 from hypothesis import given
@@ -10,6 +11,9 @@ from hypothesis import strategies as st
 
 from gazerig.config.rig import LidJoints
 from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
+from gazerig.drivers.maestro.commands import MaestroCodec
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.calibration.endstop_search import (
     STEPS_PER_DEG,
     EndStop,
@@ -18,6 +22,7 @@ from gazerig.features.bringup.calibration.endstop_search import (
     go,
     search,
 )
+from gazerig.features.bringup.calibration.hobby_access import SPEED_US_S, HobbyServoHandle
 from gazerig.features.bringup.calibration.joint_calibration import (
     Calibration,
     CalibrationRefused,
@@ -31,8 +36,108 @@ from gazerig.features.bringup.calibration.joint_calibration import (
     lid_keys,
     with_calibration,
 )
+from gazerig.features.bringup.calibration.joint_procedure import (
+    calibrate_by_hand,
+    calibrate_by_motion,
+)
+from gazerig.features.bringup.calibration.linkage_calibration import (
+    LEAD_US,
+    HandMarker,
+    HobbyMarker,
+    angle_now,
+    calibrate_by_marks,
+    fit_linkage,
+    likely_angle,
+    spread_between,
+)
+from gazerig.features.bringup.calibration.smart_servo_access import (
+    CalibrationStopped,
+    SingleJoint,
+    SingleServo,
+)
+from gazerig.features.bringup.servo_families import kind_of
+from gazerig.robot.app.run_bus import emulated_lines
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY
+from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+
+EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
+NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0)
+STS = JointParams(3, "sts3215", -35.0, 35.0, 300.0, 20000.0)
+GENTLY = StopSearchParams()
+FREE = (-1e9, 1e9)
+
+
+class Bench:
+    """One emulated servo between stops, and a person with a script."""
+
+    def __init__(
+        self, joint: JointParams, start: int = 2100, stops: tuple[float, float] = FREE
+    ) -> None:
+        self.clock = SimulatedClock()
+        physics = Physics(stop_low_steps=stops[0], stop_high_steps=stops[1])
+        spec = ServoSpec(joint.id, joint.model, start, physics=physics)
+        build = build_feetech if joint is STS else build_dynamixel
+        self.chain = build([spec], self.clock.now_s)
+        self.port = InProcessPort(self.chain, sleep_until=self.clock.sleep_until)
+        self.port.setBaudRate(1_000_000)
+        self.kind = kind_of(joint.model)
+        self.registers = Registers(self.port, self.kind.family)
+        self.why: str | None = None
+        self.id = joint.id
+        self.script: list[int] = []
+        self.said: list[str] = []
+        self.agreed = True
+        name = "neck_yaw" if joint is NECK else "left_eye_pan"
+        self.servo = SingleServo(name, joint.id, joint.model, self.port)
+        self.joint = SingleJoint(name, joint, self.servo, self.clock, lambda: self.why)
+
+    def get(self, register: str) -> int:
+        value = self.registers.read(self.id, register)
+        assert value is not None
+        return value
+
+    def put(self, register: str, value: int) -> None:
+        assert self.registers.write_persistent(self.id, register, value)
+
+    def limits(self) -> tuple[int, int]:
+        return self.get("min_position_limit"), self.get("max_position_limit")
+
+    def restart(self) -> None:
+        self.chain.faults.command(f"brown-out {self.id}")
+        self.clock.sleep_until(self.clock.now_s() + 1.0)
+
+    def command(self, text: str) -> None:
+        self.port.faults.command(text.format(id=self.id))
+        self.clock.sleep_until(self.clock.now_s() + 0.1)
+
+    # gazerig.features.bringup.calibration.joint_procedure.Operator
+
+    def tell(self, line: str) -> None:
+        self.said.append(line)
+
+    def wait(self, question: str, live: Callable[[], str]) -> None:
+        self.said.append(question)
+        if not self.script:
+            raise CalibrationStopped("stopped by you")
+        left = self.script.pop(0)
+        while left:
+            step = max(-100, min(100, left))
+            self.chain.here(self.id).turn(step)
+            left -= step
+            self.clock.sleep_until(self.clock.now_s() + 0.04)
+            live()
+
+    def agrees(self, question: str, live: Callable[[], str]) -> bool:
+        self.said.append(question)
+        live()
+        return self.agreed
+
 
 JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 TURN = 4096
@@ -279,3 +384,596 @@ def test_a_jaw_may_rest_at_its_stop_and_an_eye_may_not() -> None:
     assert made.max_deg == pytest.approx(29.0, abs=0.05)
     with pytest.raises(CalibrationRefused, match=r"straight ahead .* is not between"):
         calibration("neck_yaw", Marks(2400, 2047, 2045), joint, 2.0)
+
+
+# --- Calibrating one emulated joint by hand or by motion; refused joints; and a push rod
+
+
+STOPS = (1700.0, 2500.0)
+each = pytest.mark.parametrize("joint", [EYE, STS], ids=["dynamixel", "feetech"])
+
+
+@each
+def test_by_hand_zero_sign_and_range_are_found(joint: JointParams) -> None:
+    bench = Bench(joint)
+    bench.script = [-400, 850, -440]  # left end at fewer steps: the sign is -1
+    bench.servo.check()
+    found = calibrate_by_hand(bench.joint, bench, 2.0)
+    assert found.sign == -1 and found.zero_step == pytest.approx(2110, abs=2)
+    assert found.max_deg == pytest.approx((2110 - 1700) / STEPS_PER_DEG - 2.0, abs=0.2)
+    assert found.min_deg == pytest.approx(-(2550 - 2110) / STEPS_PER_DEG + 2.0, abs=0.2)
+    assert "turn left_eye_pan to its LEFT end, then press Enter" in bench.said
+    assert bench.get("torque_enable") == 0
+
+
+@each
+def test_by_hand_torque_that_was_left_on_goes_off_first(joint: JointParams) -> None:
+    bench = Bench(joint)
+    bench.registers.write(joint.id, "torque_enable", 1)
+    bench.script = []
+    with pytest.raises(CalibrationStopped):
+        calibrate_by_hand(bench.joint, bench, 2.0)
+    assert bench.get("torque_enable") == 0
+
+
+@pytest.mark.parametrize("start", [3900, 200])
+def test_by_hand_over_the_seam_is_refused_with_the_turn_that_helps(start: int) -> None:
+    bench = Bench(EYE, start)
+    bench.script = [600, -1200, 600]
+    with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* take the horn off"):
+        calibrate_by_hand(bench.joint, bench, 2.0)
+    with pytest.raises(SetupError, match="cannot set its middle"):
+        bench.servo.set_middle()
+
+
+def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
+    bench = Bench(STS, 3900)
+    bench.script = [600, -1200, 600]
+    with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* --set-middle"):
+        calibrate_by_hand(bench.joint, bench, 2.0)
+    bench.servo.set_middle()
+    bench.script = [600, -1200, 600]
+    found = calibrate_by_hand(bench.joint, bench, 2.0)
+    assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
+
+
+def test_a_joint_next_to_the_seam_is_calibrated_on_its_side() -> None:
+    bench = Bench(EYE, 3700)
+    bench.script = [300, -800, 400]
+    found = calibrate_by_hand(bench.joint, bench, 2.0)
+    assert found.zero_step == 3600 and found.max_deg < 36.0
+
+
+def test_a_servo_turned_by_whole_turns_before_gives_the_same() -> None:
+    bench = Bench(EYE)
+    bench.chain.here(1).turn(4096)
+    bench.script = [400, -800, 400]
+    assert calibrate_by_hand(bench.joint, bench, 2.0).zero_step == 2100
+
+
+def test_an_offset_that_was_set_can_be_cleared_for_good() -> None:
+    bench = Bench(STS, 3000)
+    bench.servo.set_middle()
+    offset = bench.get("position_offset")
+    bench.servo.check()
+    assert offset
+    assert bench.servo.clear_offset() == offset
+    bench.restart()
+    assert bench.get("position_offset") == 0
+    assert bench.get("present_position") == pytest.approx(3000, abs=4)
+
+
+def test_a_homing_offset_can_be_cleared() -> None:
+    bench = Bench(EYE)
+    bench.put("homing_offset", 300)
+    assert bench.servo.clear_offset() == 300
+    bench.servo.check()
+    assert bench.get("homing_offset") == 0
+
+
+# --- driven
+
+
+@each
+def test_by_motion_finds_the_stops_and_puts_everything_back(joint: JointParams) -> None:
+    bench = Bench(joint, 2100, STOPS)
+    bench.put("min_position_limit", 2000)
+    bench.put("max_position_limit", 2200)
+    names = (
+        ("torque_limit", "goal_speed", "acceleration", "lock")
+        if joint is STS
+        else ("goal_pwm", "profile_acceleration", "profile_velocity", "bus_watchdog")
+    )
+    before = [bench.get(name) for name in names]
+    found = calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert found.sign == 1 and found.zero_step == pytest.approx(2100, abs=8)
+    assert found.max_deg == pytest.approx(400 / STEPS_PER_DEG - 2.0, abs=1.0)
+    assert found.min_deg == pytest.approx(-400 / STEPS_PER_DEG + 2.0, abs=1.0)
+    assert bench.get("torque_enable") == 0
+    assert bench.limits() == (2000, 2200) and [bench.get(name) for name in names] == before
+    pushed = [float(line.split("pushed for ")[1].split()[0]) for line in bench.said if "pu" in line]
+    assert len(pushed) == 2 and max(pushed) <= 500.0
+
+
+def test_drive_that_a_killed_program_left_weak_is_full_again() -> None:
+    bench = Bench(EYE, 2100, STOPS)
+    bench.put("goal_pwm", 200)
+    calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert bench.get("goal_pwm") == bench.get("pwm_limit")
+
+
+def test_by_motion_the_person_says_which_way_it_went() -> None:
+    bench = Bench(EYE, 2100, STOPS)
+    bench.agreed = False
+    assert calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle").sign == -1
+
+
+def test_by_motion_zero_by_a_person() -> None:
+    bench = Bench(EYE, 2100, STOPS)
+    bench.script = [100]
+    found = calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "person")
+    assert found.zero_step == pytest.approx(2200, abs=15)
+
+
+def test_by_motion_narrow_limits_of_a_neck_servo_are_opened_and_put_back() -> None:
+    bench = Bench(NECK, 2100, STOPS)
+    bench.put("min_position_limit", 2000)
+    bench.put("max_position_limit", 2200)
+    found = calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert found.max_deg > 30.0 and bench.limits() == (2000, 2200)
+
+
+def test_by_motion_without_a_stop_before_the_seam_is_refused() -> None:
+    bench = Bench(EYE, 3900, (3000.0, 1e9))
+    with pytest.raises(CalibrationRefused, match="end of the servo's turn"):
+        calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert bench.get("torque_enable") == 0
+
+
+@each
+def test_by_motion_a_stop_that_is_asked_for_lets_go_at_once(joint: JointParams) -> None:
+    bench = Bench(joint, 2100, STOPS)
+    bench.why = "SIGINT"
+    with pytest.raises(CalibrationStopped, match="SIGINT"):
+        calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert bench.get("torque_enable") == 0
+    if joint is STS:
+        assert bench.get("torque_limit") == 1000
+    else:
+        assert bench.get("bus_watchdog") == 0
+
+
+def test_by_motion_is_slow_and_weak() -> None:
+    bench = Bench(EYE, 2100, STOPS)
+    bench.joint.enable_torque(GENTLY)
+    assert bench.get("goal_pwm") == round(0.3 * bench.get("pwm_limit"))
+    assert 0 < bench.get("profile_velocity") <= 2.0 * 15.0 * STEPS_PER_DEG / 15.6 + 1
+    assert bench.get("bus_watchdog") == 15
+    start, seen = bench.clock.now_s(), []
+    real = bench.joint.position
+
+    def position() -> tuple[int, float]:
+        seen.append(real())
+        return seen[-1]
+
+    bench.joint.position = position  # type: ignore[method-assign]
+    bench.joint.find_stop(GENTLY, 1)
+    way = [(p, t) for p, t in seen if t > start + 1.0]
+    speed = (way[60][0] - way[0][0]) / (way[60][1] - way[0][1]) / STEPS_PER_DEG
+    assert 10.0 < speed < 20.0
+    bench.servo.restore()
+
+
+def test_by_motion_a_servo_without_a_watchdog_is_said_to_be_one() -> None:
+    bench = Bench(STS, 2100, STOPS)
+    bench.joint.enable_torque(GENTLY)
+    assert bench.get("torque_limit") == 300
+    assert 0 < bench.get("goal_speed") <= 2.0 * 15.0 * STEPS_PER_DEG
+    assert "no watchdog" in bench.joint.alone and not Bench(EYE).joint.alone
+    bench.servo.restore()
+    calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
+    assert any("no watchdog" in line for line in bench.said)
+
+
+def test_limits_that_a_killed_program_left_open_are_narrow_again_after_a_restart() -> None:
+    bench = Bench(STS, 2100, STOPS)
+    bench.put("min_position_limit", 2000)
+    bench.put("max_position_limit", 2200)
+    bench.joint.enable_torque(GENTLY)
+    assert bench.get("min_position_limit") == 0
+    bench.restart()
+    assert bench.limits() == (2000, 2200)
+
+
+def test_a_servo_that_restarts_on_the_way_has_met_no_stop() -> None:
+    bench = Bench(STS, 2100, (1000.0, 3000.0))
+    bench.joint.enable_torque(GENTLY)
+    bench.chain.faults.command(f"brown-out {STS.id}")
+    with pytest.raises((ServoFault, BusLost)):
+        bench.joint.find_stop(GENTLY, 1)
+
+
+# --- refused
+
+
+@pytest.mark.parametrize(
+    ("joint", "register", "value", "says"),
+    [
+        (EYE, "homing_offset", 300, r"Homing Offset is 300 steps.*--clear-offset"),
+        (EYE, "operating_mode", 4, r"operating_mode is 4, not 3: gazerig doctor --fix"),
+        (EYE, "drive_mode", 1, r"drive_mode is 1, not 0"),
+        (STS, "operating_mode", 1, r"operating_mode is 1, not 0: gazerig doctor --fix"),
+        (STS, "phase", 0x1C, r"phase is 28, not 12: gazerig doctor --fix"),
+    ],
+)
+def test_a_servo_set_up_in_another_way_is_refused(
+    joint: JointParams, register: str, value: int, says: str
+) -> None:
+    bench = Bench(joint)
+    bench.put(register, value)
+    with pytest.raises(ServoMissing, match=says):
+        bench.servo.check()
+
+
+def test_a_wrong_model_is_named() -> None:
+    bench = Bench(EYE)
+    wrong = SingleServo("left_eye_pan", EYE.id, "xc330-m288", bench.port)
+    with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
+        wrong.check()
+
+
+@pytest.mark.parametrize(
+    ("joint", "fault", "says"),
+    [
+        (EYE, "overload {id}", "overload: .*gazerig reboot 1"),
+        (STS, "overheat {id}", "overheating: let it cool"),
+    ],
+)
+def test_a_servo_that_suffers_or_is_silent_is_named(
+    joint: JointParams, fault: str, says: str
+) -> None:
+    bench = Bench(joint)
+    bench.command(fault)
+    with pytest.raises(ServoFault, match=says):
+        bench.servo.check()
+    bench.command("lose {id}")
+    with pytest.raises(ServoMissing, match="does not answer"):
+        bench.servo.check()
+    with pytest.raises(BusLost, match="does not answer any more"):
+        bench.joint.position()
+
+
+def test_a_servo_that_answers_pings_alone_is_brought_to_speak() -> None:
+    bench = Bench(EYE)
+    bench.put("status_return_level", 0)
+    bench.servo.check()
+    assert bench.limits() == (0, 4095)
+
+
+def test_a_joint_that_a_hand_took_over_the_seam_is_not_driven() -> None:
+    bench = Bench(EYE, 4000)
+    bench.chain.here(1).turn(200)
+    with pytest.raises(ServoMissing, match="turned over the seam"):
+        bench.joint.enable_torque(GENTLY)
+    assert bench.get("torque_enable") == 0
+
+
+def test_a_joint_that_is_left_alone_stops_by_itself() -> None:
+    bench = Bench(EYE)
+    bench.joint.enable_torque(GENTLY)
+    bench.registers.write(1, "goal_position", 3000)
+    bench.clock.sleep_until(bench.clock.now_s() + 1.0)
+    stopped_at = bench.get("present_position")
+    assert bench.get("bus_watchdog") == 255
+    bench.clock.sleep_until(bench.clock.now_s() + 1.0)
+    assert bench.get("present_position") == pytest.approx(stopped_at, abs=3)
+    assert stopped_at < 2100 + 0.5 * 2.0 * 15.0 * STEPS_PER_DEG
+
+
+class Reader(Bench):
+    """Who turns a joint by hand and says the angles read off, those proposed where it is None."""
+
+    angles: list[float | None]
+
+    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        self.said.append(question)
+        live()
+        said = self.angles.pop(0)
+        return proposed if said is None else said
+
+    def steer(self, question: str, servo: HobbyMarker) -> None:
+        raise AssertionError("a servo that tells its place is turned by hand")
+
+
+def test_a_push_rod_on_a_smart_servo_is_measured_by_hand() -> None:
+    rod = replace(
+        STS, min_deg=-20.0, max_deg=20.0, transmission_points=((-25.0, 1800.0), (25.0, 2400.0))
+    )
+    bench = Reader(STS)
+    single = SingleJoint("left_eye_pan", rod, bench.servo, bench.clock, lambda: None)
+    bench.script = [0, 250, -490, 120, 240]
+    bench.angles = [22.0, -21.0, None, 10.0]
+    made = calibrate_by_marks(HandMarker(single, bench), bench, 1.0, 1)
+    assert [round(at) for _, at in made.transmission_points] == [1860, 1980, 2100, 2220, 2350]
+    assert [angle for angle, _ in made.transmission_points] == [-21.0, -10.5, 0.0, 10.0, 22.0]
+    assert (made.min_deg, made.max_deg) == (-20.0, 21.0)
+    assert any("turn left_eye_pan until it reads about step 1980" in line for line in bench.said)
+
+
+# --- A joint behind a push rod: places marked by eye over an emulated board, and their linkage
+
+
+MAKER = load_rig("maker")
+PAN, LID = MAKER.joints["eyes_pan"], MAKER.joints["left_lower_lid"]
+
+
+@given(
+    left=st.floats(6.0, 60.0),
+    right=st.floats(6.0, 60.0),
+    zero=st.integers(1200, 1800),
+    reach=st.integers(100, 600),
+    rising=st.booleans(),
+    margin=st.floats(0.0, 3.0),
+)
+def test_the_range_lies_inside_what_was_marked(
+    left: float, right: float, zero: int, reach: int, rising: bool, margin: float
+) -> None:
+    way = reach if rising else -reach
+    marked = [(0.0, float(zero)), (left, float(zero + way)), (-right, float(zero - way))]
+    made = fit_linkage("eyes_pan", marked, PAN, margin)
+    assert [at for _, at in made.transmission_points] == sorted(
+        (at for _, at in marked), reverse=not rising
+    )
+    assert -right - 0.051 + margin <= made.min_deg < 0.0 < made.max_deg <= left + 0.051 - margin
+    assert made.max_deg >= left - margin - 0.151 and made.min_deg <= margin - right + 0.151
+    joint = replace(PAN, **made._asdict())
+    assert joint.steps(0.0) == zero * 4
+    assert joint.made().rising == rising
+
+
+def test_a_lid_ends_where_it_was_marked_and_its_keys_are_its_own() -> None:
+    made = fit_linkage("left_lower_lid", [(20.0, 1250.0), (-9.0, 1600.0), (5.0, 1450.0)], LID, 2.0)
+    assert (made.min_deg, made.max_deg) == (-9.0, 20.0)
+    wanted = changes("left_lower_lid", LID, made, {"left_lower_lid": -12.0})
+    assert wanted == {
+        "joints.left_lower_lid.transmission_points": ((-9, 1600), (5, 1450), (20, 1250)),
+        "joints.left_lower_lid.min_deg": -9.0,
+        "joints.left_lower_lid.max_deg": 20.0,
+        "lid_joints.left_lower_shut_deg": -9.0,
+        "lid_joints.left_lower_open_deg": 20.0,
+        "park_deg.left_lower_lid": -9.0,
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "marked", "says"),
+    [
+        ("eyes_pan", [(0.0, 1500.0), (1.5, 1600.0), (-20.0, 1300.0)], "0 deg must be within"),
+        ("left_lower_lid", [(20.0, 1250.0), (3.0, 1600.0)], "call half open 0"),
+        ("eyes_pan", [(0.0, 1500.0), (4.0, 1600.0), (-4.0, 1300.0)], "only 4.0 deg"),
+        ("eyes_pan", [(0.0, 1500.0), (20.0, 1450.0), (-20.0, 1300.0)], "all rise or all fall"),
+        ("eyes_pan", [(0.0, 1500.0), (0.0, 1700.0), (-20.0, 1300.0)], "must be within|must rise"),
+        ("eyes_pan", [(0.0, 1500.0), (20.0, 2900.0), (-20.0, 1300.0)], "outside the servo's"),
+    ],
+)
+def test_what_makes_no_linkage_is_refused_with_the_rule(
+    name: str, marked: list[tuple[float, float]], says: str
+) -> None:
+    with pytest.raises(CalibrationRefused, match=says):
+        fit_linkage(name, marked, MAKER.joints[name], 2.0)
+
+
+def test_proposals_keep_the_shape_of_the_curve_and_meet_the_marks() -> None:
+    assert angle_now(PAN, 1500.0) == 0.0 and angle_now(PAN, 1776.0) == 20.0
+    one, other = (0.0, 1500.0), (40.0, 1776.0)
+    assert likely_angle(PAN, 1500.0, one, other) == 0.0
+    assert likely_angle(PAN, 1776.0, one, other) == 40.0
+    # What was 10 deg of 20 is 20 of 40 now.
+    assert likely_angle(PAN, 1634.0, one, other) == pytest.approx(20.0, abs=0.1)
+    assert likely_angle(PAN, 1634.0, (0.0, 1776.0), (-40.0, 1500.0)) == pytest.approx(-20, abs=0.1)
+
+
+def test_places_between_are_evenly_spread() -> None:
+    assert spread_between(1500.0, 1800.0, 2) == [1600.0, 1700.0]
+    assert spread_between(1800.0, 1500.0, 0) == []
+
+
+def test_a_smart_servo_behind_a_push_rod_is_measured_in_steps() -> None:
+    smart = JointParams(
+        1, "sts3215", -20.0, 20.0, 300.0, 20000.0, transmission_points=((-25, 1800), (25, 2300))
+    )
+    made = fit_linkage("eyes_pan", [(0.0, 2050.0), (22.0, 2300.0), (-21.0, 1790.0)], smart, 1.0)
+    joint = replace(smart, **made._asdict())
+    assert joint.steps(radians(-21.0)) == pytest.approx(1790.0)
+    assert (made.min_deg, made.max_deg) == (-20.0, 21.0)
+
+
+# --- measured by eye
+
+BOARD = MAKER.bus.maestro
+
+
+class LinkageBench:
+    """The maker's board, one of its servos, and a person with a script.
+
+    Answers: "+40" and "1480" steer, "" is Enter where it is steered and the proposed number
+    where one is asked for.
+    """
+
+    def __init__(self, name: str, *answers: str, pulses: tuple[float, float] = (500, 2500)) -> None:
+        self.clock = SimulatedClock()
+        self.board = build(emulated_lines(MAKER)[""], self.clock.now_s)
+        self.sent: list[bytes] = []
+        self.port = InProcessPort(self.board, self.sent.append, sleep_until=self.clock.sleep_until)
+        self.why: str | None = None
+        self.answers = list(answers)
+        self.said: list[str] = []
+        self.channel = MAKER.joints[name].id
+        self.hobby = HobbyServoHandle(
+            name, MAKER.joints[name], self.port, BOARD, self.clock, lambda: self.why, pulses
+        )
+        self.placer = HobbyMarker(self.hobby, self)
+
+    def place_us(self) -> float:
+        """Return where the shaft truly is."""
+        return cast(Any, self.board).here(self.channel).place_steps / 4
+
+    def pulse(self) -> int:
+        """Return the pulse that the board gives now."""
+        report = cast(Any, self.board).faults.reports()[self.channel]
+        position = report["position"]
+        assert isinstance(position, int)
+        return position
+
+    def measure(self, margin: float = 2.0, more: int = 0):
+        try:
+            return calibrate_by_marks(self.placer, self, margin, more)
+        finally:
+            self.hobby.disable()
+
+    # gazerig.features.bringup.calibration.linkage_calibration.Jogger
+
+    def tell(self, line: str) -> None:
+        self.said.append(line)
+
+    def wait(self, question: str, live: Callable[[], str]) -> None:
+        raise AssertionError(question)
+
+    def agrees(self, question: str, live: Callable[[], str]) -> bool:
+        raise AssertionError(question)
+
+    def steer(self, question: str, servo: HobbyMarker) -> None:
+        self.said.append(question)
+        while answer := self._next():
+            (servo.by if answer[0] in "+-" else servo.to)(float(answer))
+            servo.live()
+
+    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        self.said.append(question)
+        live()
+        answer = self._next()
+        return float(answer) if answer else proposed
+
+    def _next(self) -> str:
+        if not self.answers:
+            raise CalibrationStopped("stopped by you")
+        return self.answers.pop(0)
+
+
+def test_eyes_are_measured_and_their_pulses_end() -> None:
+    bench = LinkageBench("eyes_pan", "", "", "1800", "", "25", "1210", "", "-24")
+    made = bench.measure()
+    assert made.transmission_points == ((-24.0, 1210.0), (0.0, 1500.0), (25.0, 1800.0))
+    assert (made.min_deg, made.max_deg) == (-22.0, 23.0)
+    assert bench.pulse() == 0 and bench.place_us() == pytest.approx(1500.0, abs=6.0)
+    assert "move eyes_pan to its LEFT end, as far as it goes freely, then press Enter" in bench.said
+    assert any("Keep your fingers out" in line for line in bench.said)
+    assert any("cut the servo power" in line for line in bench.said)
+
+
+def test_places_between_are_gone_to_and_asked_for() -> None:
+    bench = LinkageBench("eyes_tilt", "", "", "1210", "", "", "1790", "", "", "-13.5", "", "")
+    made = bench.measure(more=1)
+    assert [at for _, at in made.transmission_points] == [1790.0, 1650.0, 1510.0, 1360.0, 1210.0]
+    assert made.transmission_points[1][0] == -13.5 and made.transmission_points[2] == (0.0, 1510.0)
+    # What is proposed is what the file says of that pulse.
+    assert made.transmission_points[-1][0] == pytest.approx(22.4, abs=0.2)
+
+
+def test_a_lid_is_left_shut_so_that_the_other_can_meet_it() -> None:
+    bench = LinkageBench("left_lower_lid", "", "1300", "", "20", "1600", "", "-9.5")
+    made = bench.measure()
+    assert (made.min_deg, made.max_deg) == (-9.5, 20.0)
+    assert bench.place_us() == pytest.approx(1600.0, abs=6.0) and bench.pulse() == 0
+    assert any("SHUT: where it meets the upper lid" in line for line in bench.said)
+
+
+def test_a_channel_that_gives_pulses_does_not_jump() -> None:
+    bench = LinkageBench("eyes_pan", "", "1550", "", "", "1450", "", "")
+    bench.port.setBaudRate(115_200)
+    bench.port.write(MaestroCodec(crc=BOARD.crc).target(0, 1534 * 4))
+    bench.clock.sleep_until(1.0)
+    before = bench.place_us()
+    bench.hobby.open()
+    assert bench.hobby.begin(2000.0) == 1534.0
+    bench.clock.sleep_until(2.0)
+    assert bench.place_us() == pytest.approx(before, abs=1.0)
+
+
+def test_it_moves_slowly_and_never_outside_what_was_asked() -> None:
+    bench = LinkageBench("eyes_pan", pulses=(1400.0, 1700.0))
+    bench.hobby.open()
+    bench.hobby.begin(1500.0)
+    bench.clock.sleep_until(bench.clock.now_s() + 0.5)
+    assert bench.hobby.aim(2400.0) == 1700.0
+    start_s, start_us = bench.clock.now_s(), bench.place_us()
+    while not bench.hobby.look():
+        way_us = bench.place_us() - start_us
+        assert way_us <= SPEED_US_S * (bench.clock.now_s() - start_s + 0.05)
+    assert bench.hobby.arrive() == 1700.0
+    assert bench.place_us() == pytest.approx(1700.0, abs=6.0)
+
+
+def test_a_key_that_is_held_down_runs_never_far_ahead() -> None:
+    bench = LinkageBench("eyes_pan")
+    bench.hobby.open()
+    bench.hobby.begin(1500.0)
+    for _ in range(40):
+        bench.placer.nudge(50.0)
+        bench.placer.live()
+        assert bench.hobby.place_us - bench.hobby.pulse_us <= LEAD_US + SPEED_US_S * 0.05
+    let_go_us = bench.hobby.pulse_us
+    assert bench.hobby.arrive() - let_go_us <= LEAD_US + 1.0
+
+
+def test_the_board_s_own_range_is_where_it_ends_and_is_named() -> None:
+    bench = LinkageBench("eyes_pan")
+    narrow = emulated_lines(MAKER)[""]
+    servos = tuple(
+        one._replace(max_steps=1700 * 4) if one.channel == 0 else one
+        for one in cast(tuple[Any, ...], narrow.servos)
+    )
+    bench.board = build(replace(narrow, servos=servos), bench.clock.now_s)  # type: ignore[arg-type]
+    bench.port = InProcessPort(bench.board, sleep_until=bench.clock.sleep_until)
+    bench.hobby = HobbyServoHandle(
+        "eyes_pan", MAKER.joints["eyes_pan"], bench.port, BOARD, bench.clock,
+        lambda: None, (500.0, 2500.0),
+    )  # fmt: skip
+    bench.hobby.open()
+    bench.hobby.begin(1600.0)
+    bench.hobby.aim(1900.0)
+    assert bench.hobby.arrive() == pytest.approx(1700.0, abs=1.0)
+    assert any("widen the range of its channel" in line for line in bench.hobby.events())
+    bench.hobby.aim(1650.0)
+    assert bench.hobby.arrive() == 1650.0
+
+
+@pytest.mark.parametrize("why", ["SIGINT", "q"])
+def test_whoever_ends_it_gets_a_limp_servo(why: str) -> None:
+    bench = LinkageBench("eyes_pan", "", "1700")
+    bench.answers += [""] if why == "SIGINT" else []
+    if why == "SIGINT":
+        bench.tell = lambda line: setattr(bench, "why", why)  # type: ignore[method-assign]
+    with pytest.raises(CalibrationStopped):
+        bench.measure()
+    assert bench.pulse() == 0
+
+
+def test_marks_that_go_back_are_refused_and_it_is_let_go() -> None:
+    bench = LinkageBench("eyes_pan", "", "", "1700", "", "20", "1600", "", "-20")
+    with pytest.raises(CalibrationRefused, match="all rise or all fall"):
+        bench.measure()
+    assert bench.pulse() == 0
+
+
+def test_a_board_that_falls_silent_or_is_not_there_is_named() -> None:
+    bench = LinkageBench("eyes_pan")
+    bench.hobby.open()
+    bench.hobby.begin(1500.0)
+    bench.port.faults.command("lose all")
+    with pytest.raises(BusLost, match="does not answer"):
+        bench.hobby.arrive()
+    silent = LinkageBench("eyes_pan")
+    silent.port.faults.command("lose all")
+    with pytest.raises(ServoMissing):
+        silent.hobby.open()

@@ -115,11 +115,18 @@ def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     assert not bench.chain[7].torque
 
 
-@each
-def test_nobody_is_there(kind):
+@pytest.mark.parametrize(
+    ("kind", "fault", "says"),
+    [
+        (DYNAMIXEL, "lose all", "no servo answers at any baud rate"),
+        (FEETECH, "lose all", "no servo answers at any baud rate"),
+        (DYNAMIXEL, "truncate all 8", "in pieces only"),
+    ],
+)
+def test_nobody_and_pieces_are_refused(kind, fault, says):
     bench = Bench(kind=kind)
-    bench.port.faults.command("lose all")
-    with pytest.raises(ServoMissing, match="no servo answers at any baud rate"):
+    bench.port.faults.command(fault)
+    with pytest.raises(ServoMissing, match=says):
         bench.find()
 
 
@@ -282,13 +289,6 @@ def test_a_servo_that_answers_pings_alone():
     servo.memory.set("status_return_level", 0)
     servo.status_level = 0
     assert bench.assign().now.id == 7
-
-
-def test_pieces_are_refused():
-    bench = Bench()
-    bench.port.faults.command("truncate all 8")
-    with pytest.raises(ServoMissing, match="in pieces only"):
-        bench.find()
 
 
 class StubbornPort(InProcessPort):

@@ -15,7 +15,7 @@ from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import chance, compare, differences_of
 from gazerig.features.lab.report.page import RunHeader
 from gazerig.features.lab.report.statistics import MeasuredValue, correct_p_values, mean, median
-from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run

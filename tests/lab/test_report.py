@@ -1,27 +1,44 @@
 """The report: human gaze passes, robotic gaze is outside, rare events are reported as too few."""
 
 import json
+import os
 import re
 from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
+from math import cos, radians, sin
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import cv2
 import numpy as np
 import pytest
+from command_line import typed
 from made_traces import EMPTY, run_of, verdicts
 from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.analysis.eye_tracker_csv import read_recording
+from gazerig.features.lab.analysis.reaction_finder import ReactionFinder
 from gazerig.features.lab.cli.report import app, page_file
-from gazerig.features.lab.report import face
+from gazerig.features.lab.report import blinks as blink_measures
+from gazerig.features.lab.report import eye_contact, face, landing, rests
 from gazerig.features.lab.report import report as build
-from gazerig.features.lab.report.compare import differences_of
-from gazerig.features.lab.report.compare_page import compare_page
+from gazerig.features.lab.report.compare import compare_page, differences_of
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
-from gazerig.features.lab.report.page import RunHeader, band_text, gauge, report_page
+from gazerig.features.lab.report.landing import planned_saccades
+from gazerig.features.lab.report.lid_closure import blinks_of
+from gazerig.features.lab.report.page import (
+    Figure,
+    RunHeader,
+    band_text,
+    files_of,
+    gauge,
+    report_page,
+    write_all,
+)
 from gazerig.features.lab.report.plotting import COLOURS, Shown, png
 from gazerig.features.lab.report.reference_walk import published_walk, rig_walk
 from gazerig.features.lab.report.report import DRAWINGS, findings_of, measure_run, report_of
@@ -33,16 +50,25 @@ from gazerig.features.lab.report.statistics import (
     median,
     number,
 )
-from gazerig.gaze.types import PARTS
+from gazerig.gaze.lids.lids import LidParams, Lids
+from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
+from gazerig.gaze.oculomotor.saccade import SaccadeParams
+from gazerig.gaze.types import PARTS, Bodies, Percept, Vec3
+from gazerig.robot.analysis import human_norms as bands
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis import norm_bands as bands
-from gazerig.robot.analysis.event_detector import FixationEvent
+from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
+from gazerig.robot.analysis.event_detector import (
+    Commanded,
+    EventDetector,
+    FixationEvent,
+    SaccadeEvent,
+)
+from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import run
+from gazerig.robot.control.loop import Tick, run
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
-
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
 """Half the ticks: a minute of them is what takes longest here."""
@@ -306,3 +332,448 @@ def test_the_command_takes_a_file_or_a_scene() -> None:
 
 
 # --- landings, rests, reactions
+
+
+# --- Files that a report reads and writes: nothing of the user's is lost
+
+
+def test_a_pipe_is_no_eye_tracker_recording(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    with pytest.raises(SetupError, match="is a named pipe, not a regular file"):
+        read_recording(pipe)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("report", "--scene", "visitor", "--out", "{}.html"),
+        ("compare", "a.mcap", "b.mcap", "--out", "{}.html"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_no_report_writes_over_a_file_of_yours(
+    words: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.html").write_text("precious")
+    assert typed(*(word.replace("{}", str(tmp_path / "mine")) for word in words)) != 0
+    assert "unexpected" not in capfd.readouterr().err
+    assert (tmp_path / "mine.html").read_text() == "precious"
+
+
+def test_a_report_leaves_the_summary_of_the_run_and_is_refused_before_any_work(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    run, summary = tmp_path / "x.mcap", tmp_path / "x.json"
+    words = ["run", "--mock", "--fast", "--seconds", "1", "--record", str(run)]
+    assert typed(*words, "--summary", str(summary)) == 0
+    figures = summary.read_bytes()
+    made = '<meta name="generator" content="gazerig">'
+    for page in (f"{made}a page", f"{made}a newer page"):
+        paths, data = write_all(tmp_path / "x.html", page, (), [{"key": 1}], "newer" in page)
+        assert summary.read_bytes() == figures and data.name == "x_measures.json" and not paths
+    with pytest.raises(SetupError, match="already exists"):
+        write_all(tmp_path / "x.html", "another page", (), [])
+    capfd.readouterr()
+    for reporting in (["report"], ["compare", str(run), "--out", str(tmp_path / "x.html")]):
+        assert typed(*reporting, str(run)) == 2
+        said = capfd.readouterr().err
+        assert "x.html already exists" in said and said.count("\n") == 1
+    assert (tmp_path / "x.html").read_text() == f"{made}a newer page"
+    assert typed("export", str(run), "--csv") == 0
+    assert typed("export", str(run), "--csv") == 2
+    assert typed("export", str(run), "--csv", "--force") == 0
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    (theirs / "participants.tsv").write_text("precious")
+    assert typed("export", str(run), "--bids", "--out", str(theirs)) == 2
+    assert (theirs / "participants.tsv").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    "name", ["notes.html", "notes_measures.json", "notes_figures/overview.png"]
+)
+@pytest.mark.parametrize("command", ["report", "compare"])
+def test_a_report_writes_over_nothing_that_no_report_has_made(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, command: str
+) -> None:
+    page, theirs = tmp_path / "notes.html", tmp_path / name
+    theirs.parent.mkdir(exist_ok=True)
+    theirs.write_text("somebody's own")
+    # Refused before any work: neither recording is there.
+    words = [command, "a.mcap", *(["b.mcap"] if command == "compare" else []), "--out", str(page)]
+    for force, text in (((), "already exists: name another file, or use --force"),
+                        (("--force",), "was not made by gazerig report or compare")):  # fmt: skip
+        assert typed(*words, *force) == 2
+        said = capfd.readouterr().err
+        assert said.count("\n") == 1 and str(theirs) in said and text in said
+        assert theirs.read_text() == "somebody's own"
+
+
+def test_a_report_writes_over_one_of_before_when_it_is_forced(tmp_path: Path) -> None:
+    run = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
+    about, findings = RunHeader("x"), findings_of(run)
+    drawing = DRAWINGS[0]
+    figure = Figure(drawing, png(drawing, [Shown("x", run, COLOURS[0])]), "nothing")
+    page = report_page(about, run, findings, [figure])
+    numbers: list[dict[str, object]] = [{"key": f.band.key} for f in findings]
+    out = tmp_path / "x.html"
+    write_all(out, page, [figure], numbers)
+    files = files_of(out, [drawing.key])
+    for file in files:
+        file.write_bytes(file.read_bytes() + b"old")
+    with pytest.raises(SetupError, match="already exists"):
+        write_all(out, page, [figure], numbers)
+    write_all(out, page, [figure], numbers, True)
+    assert len(files) == 3 and not any(file.read_bytes().endswith(b"old") for file in files)
+
+
+# --- Saccades and blinks found in traces whose truth is known, and before an independent judge
+
+
+SECONDS = 40.0
+STEP_DEG = 360.0 / 4096.0
+
+
+@pytest.fixture(scope="module")
+def ticks() -> list[Tick]:
+    made = assemble(load_rig("desk"), RunOptions(True, True, 0, "face-to-face"))
+    seen: list[Tick] = []
+    made.robot.start(made.clock)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s > SECONDS else None, seen.append)
+    made.robot.stop()
+    made.close()
+    return seen
+
+
+@pytest.fixture(scope="module")
+def gathered(ticks: list[Tick]) -> GazeTrace:
+    gathering = GazeTraceBuilder()
+    for tick in ticks:
+        gathering.update(tick)
+    return gathering.trace()
+
+
+def at(yaw_deg: float) -> Vec3:
+    return cos(radians(yaw_deg)), sin(radians(yaw_deg)), 0.0
+
+
+def jumps(yaw_deg: np.ndarray, rate_hz: float) -> list[Jump]:
+    finder = SaccadeFinder()
+    found = (finder.update(k / rate_hz, at(float(yaw))) for k, yaw in enumerate(yaw_deg))
+    return [jump for jump in found if jump is not None]
+
+
+def stepped(yaw_deg: np.ndarray) -> np.ndarray:
+    return np.round(yaw_deg / STEP_DEG) * STEP_DEG
+
+
+def trace(amplitudes: tuple[float, ...], rate_hz: float, slow_deg_s: float = 0.0) -> np.ndarray:
+    """Jump every half second, onto something that moves with ``slow_deg_s``."""
+    t = np.arange(0.0, 0.5 * len(amplitudes) + 0.5, 1.0 / rate_hz)
+    jump, yaw = Jumps(SaccadeParams(profile="min_jerk")), slow_deg_s * t
+    for n, size in enumerate(amplitudes):
+        gone = [jump.displacement_rad(radians(abs(size)), s - 0.25 - 0.5 * n) for s in t]
+        yaw = yaw + np.sign(size) * np.degrees(gone)
+    return yaw
+
+
+SIZES = (2.0, -3.0, 5.0, -8.0, 12.0, -20.0, 30.0, -30.0, 1.5, -10.0)
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 200.0, 250.0, 1000.0])
+def test_every_jump_is_found_with_its_size_time_and_speed(rate_hz: float) -> None:
+    found = jumps(stepped(trace(SIZES, rate_hz)), rate_hz)
+    assert len(found) == len(SIZES)
+    law = Jumps(SaccadeParams(profile="min_jerk"))
+    for n, (jump, size) in enumerate(zip(found, SIZES, strict=True)):
+        size = radians(abs(size))
+        assert np.radians(jump.amplitude_deg) == pytest.approx(size, rel=0.08, abs=0.002)
+        assert jump.onset_s == pytest.approx(0.25 + 0.5 * n, abs=0.012)
+        assert jump.duration_s == pytest.approx(law.duration_s(size), abs=0.016)
+        low = 0.8 if rate_hz == 100.0 else 0.92
+        peak = np.degrees(law.peak_speed_rad_s(size))
+        assert low * peak - 5.0 < jump.peak_deg_s < 1.1 * peak + 12.0
+        assert jump.peak_at == pytest.approx(0.5, abs=0.12)
+
+
+@pytest.mark.parametrize("slow_deg_s", [10.0, 25.0, 45.0])
+def test_following_is_no_saccade_and_hides_none(slow_deg_s: float) -> None:
+    assert len(jumps(stepped(trace((0.0,) * 4, 200.0, slow_deg_s)), 200.0)) <= 1  # its onset
+    found = jumps(stepped(trace((0.0, 0.0, 4.0, -6.0, 8.0), 200.0, slow_deg_s)), 200.0)
+    sizes = [jump.amplitude_deg for jump in found if jump.onset_s > 1.0]
+    moved = 0.05 * slow_deg_s
+    assert sizes == pytest.approx([4.0 + moved, 6.0 - moved, 8.0 + moved], abs=0.6)
+
+
+def test_an_early_peak_is_told_from_a_symmetric_one() -> None:
+    law = Jumps(SaccadeParams(profile="human"))
+    t = np.arange(0.0, 0.6, 0.005)
+    yaw = np.degrees([law.displacement_rad(radians(40.0), s - 0.25) for s in t])
+    (jump,) = jumps(yaw, 200.0)
+    assert jump.peak_at < 0.46
+
+
+def test_noise_and_a_gap_make_no_saccade() -> None:
+    noise = np.random.default_rng(1).normal(0.0, 0.03, 2000)
+    assert jumps(noise, 200.0) == []
+    finder = SaccadeFinder()
+    times = [*np.arange(0.0, 1.0, 0.005), *np.arange(1.2, 2.0, 0.005)]
+    assert not any(finder.update(t, at(0.0 if t < 1.1 else 15.0)) for t in times)
+
+
+def test_an_eye_that_swings_back_has_landed_where_it_turned() -> None:
+    t = np.arange(0.0, 1.0, 0.005)
+    law = Jumps(SaccadeParams(profile="min_jerk"))
+    yaw = np.degrees([law.displacement_rad(radians(10.0), s - 0.25) for s in t])
+    since = np.maximum(0.0, t - 0.30)
+    yaw = yaw + 2.0 * np.sin(2 * np.pi * since / 0.09) * np.exp(-since / 0.03) * (t > 0.30)
+    first = jumps(yaw, 200.0)[0]
+    assert first.amplitude_deg == pytest.approx(11.0, abs=1.2)
+    assert first.duration_s < 0.085
+
+
+def blinks(openings: list[tuple[float, float, float]]) -> list[BlinkEvent]:
+    finder = BlinkFinder()
+    return [blink for row in openings if (blink := finder.update(*row)) is not None]
+
+
+def test_a_blink_is_found_with_its_phases() -> None:
+    lids = Lids(LidParams(), np.random.default_rng(0))
+    t = np.arange(0.0, 3.0, 0.005)
+    rows = [(s, o := 0.8 * (1.0 - lids.closure(s - 1.0)), o) for s in t]
+    (blink,) = blinks(rows)
+    assert blink.onset_s == pytest.approx(1.0, abs=0.01)
+    assert blink.depth == pytest.approx(1.0, abs=0.01)
+    # a phase is what is faster than a twentieth of its peak: the very ends are not
+    assert 0.060 < blink.close_s < 0.076
+    assert 0.120 < blink.open_s < 0.176
+    assert 0.035 <= blink.hold_s < 0.060
+    assert blink.close_peak_1_s / blink.open_peak_1_s == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_wink_a_droop_and_a_glance_down_are_no_blinks() -> None:
+    t = np.arange(0.0, 4.0, 0.005)
+    lids = Lids(LidParams(), np.random.default_rng(0))
+    assert blinks([(s, 0.8 * (1.0 - lids.closure(s - 1.0)), 0.8) for s in t]) == []
+    down = [(s, o := 0.8 if s < 1.0 else 0.3, o) for s in t]
+    assert blinks(down) == []
+    shallow = [(s, o := 0.8 * (1.0 - 0.4 * lids.closure(s - 1.0)), o) for s in t]
+    assert blinks(shallow) == []
+
+
+def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: GazeTrace) -> None:
+    asked = ticks[-1].gaze
+    found = [s for s in gathered.saccades if s.commanded is not None]
+    # Corrections and small shifts within a part are hardly faster than what is no saccade.
+    assert len(found) == pytest.approx(asked.saccades, rel=0.15)
+    large = np.count_nonzero(planned_saccades(gathered)[:, 2] >= 1.0)
+    assert np.count_nonzero([s.amplitude_deg >= 1.0 for s in found]) == pytest.approx(
+        large, rel=0.04
+    )
+    assert len(gathered.fixations) == pytest.approx(asked.fixations, rel=0.06)
+    assert abs(len(gathered.blinks) - asked.blinks) <= 2
+    late_s = [s.onset_s - s.commanded.onset_s for s in found if s.commanded]
+    assert 0.0 < np.median(late_s) < 0.03  # the servos' lag
+    ratio = [s.amplitude_deg / s.commanded.amplitude_deg for s in found if s.commanded]
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.08)
+    parts = [f.part == f.wanted for f in gathered.fixations if f.wanted is not None]
+    assert np.mean(parts) > 0.95
+    assert all(f.duration_s > 0.03 for f in gathered.fixations)
+
+
+def test_an_independent_judge_finds_the_same_saccades(gathered: GazeTrace) -> None:
+    pymovements = pytest.importorskip("pymovements")
+    t = 1e3 * gathered.column("t")
+    ms = np.arange(int(t[0]) + 1, int(t[-1]))
+    gaze = [np.interp(ms, t, gathered.column(name)) for name in ("gaze_yaw", "gaze_pitch")]
+    screen = pymovements.Experiment(1920, 1080, 60, 34, 65, "center", 1000)
+    recording = pymovements.gaze.from_numpy(time=ms, position=np.stack(gaze), experiment=screen)
+    recording.pos2vel("savitzky_golay", window_length=21, degree=2)
+    recording.detect(
+        "microsaccades", minimum_duration=15, threshold=(30.0, 30.0), threshold_factor=1.0
+    )
+    theirs = recording.events.frame["onset"].to_numpy()
+    ours = np.array([1e3 * s.onset_s for s in gathered.saccades if s.amplitude_deg >= 1.0])
+    assert len(ours) > 80
+    apart = np.abs(theirs[None] - ours[:, None])
+    assert np.mean(apart.min(axis=1) <= 15.0) >= 0.95
+    assert np.mean(apart.min(axis=0) <= 15.0) >= 0.93
+    # and it is the onsets that agree
+    assert np.mean(np.abs(apart - 60.0).min(axis=1) <= 5.0) < 0.4
+
+
+def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> None:
+    missing = [
+        tick._replace(joints=tick.joints._replace(missing=("left_eye_pan",))) for tick in ticks
+    ]
+    events = EventDetector()
+    found = [event for tick in missing[:4000] for event in events.update(tick)]
+    assert not any(isinstance(event, SaccadeEvent | FixationEvent) for event in found)
+    events = EventDetector()
+    stopped = [tick._replace(stopped="somebody did") for tick in ticks[:4000]]
+    assert [event for tick in stopped for event in events.update(tick)] == []
+
+
+def test_events_come_soon(ticks: list[Tick]) -> None:
+    events = EventDetector()
+    late_s = []
+    for tick in ticks:
+        late_s += [tick.t_s - e.end_s for e in events.update(tick) if isinstance(e, SaccadeEvent)]
+    assert len(late_s) > 80
+    assert max(late_s) < 0.2 and np.median(late_s) < 0.03
+
+
+# --- Measures of landings, rests, gains, blinks and reactions, from synthetic traces
+
+
+def flown(
+    jumps: list[tuple[float, float, float]], goal: float = 12.0, over: float = 0.0
+) -> GazeTrace:
+    """Make a run of planned saccades to a goal, onset in s, and from and to in deg of yaw.
+
+    over: how far the gaze swings beyond in flight, in deg
+    """
+    t = np.arange(0.0, 3.0, 0.005)
+    rows = np.zeros((len(t), len(TraceRow._fields)))
+    column = {name: at for at, name in enumerate(TraceRow._fields)}
+    rows[:, column["t"]], rows[:, column["target_yaw"]] = t, goal
+    gaze, events = np.full(len(t), jumps[0][1]), []
+    for onset, start, end in jumps:
+        s = np.clip((t - onset) / 0.05, 0.0, 1.0)
+        gaze += (end - start) * s * s * (3.0 - 2.0 * s)
+        gaze += over * np.exp(-(((t - onset - 0.06) / 0.008) ** 2))
+        rows[(t >= onset) & (t < onset + 0.05), column["phase"]] = 1.0
+        size = abs(end - start)
+        events.append(
+            SaccadeEvent(onset, 0.05, size, 300.0, 0.4, Commanded(onset, 0.05, size, 300.0))
+        )
+    rows[:, column["gaze_yaw"]] = gaze
+    return GazeTrace(rows, tuple(events), (), ())
+
+
+def test_a_landing_is_short_and_corrected_or_beyond() -> None:
+    short = landing.landings(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
+    assert short[0] == pytest.approx((11.0 / 12.0, 1.0), abs=0.01) and len(short) == 1
+    late = landing.landings(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
+    assert late[0, 1] == 0.0
+    assert landing.overshoots(flown([(0.5, 0.0, 12.0)])) == pytest.approx([0.0], abs=0.01)
+    assert landing.overshoots(flown([(0.5, 0.0, 12.0)], over=1.8)) == pytest.approx(
+        [0.15], abs=0.03
+    )
+
+
+def test_an_eye_at_the_end_of_its_range_has_not_landed() -> None:
+    run = flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)])
+    rows = run.rows.copy()
+    rows[80:200, TraceRow._fields.index("eye_limited")] = 1.0
+    assert len(landing.landings(run)) == 1
+    assert len(landing.landings(replace(run, rows=rows))) == 0
+
+
+def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
+    dice = np.random.default_rng(2)
+    smooth = [dice.lognormal(-1.4, 0.45, 600) for _ in range(40)]
+    found = [rests.spike(each) for each in smooth]
+    assert abs(np.mean(found)) < 0.005 and max(found) < 0.04  # chance makes none
+    assert all(rests.spike(np.maximum(each, 0.2)) > 0.2 for each in smooth)
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(0.97, "pass"), (1.2, "outside")])
+def test_the_highest_gain_knows_how_uncertain_it_is(gain: float, verdict: str) -> None:
+    """A face sways at all frequencies below 1 Hz; what the gaze adds is noise."""
+    dice = np.random.default_rng(5)
+    t = np.arange(0.0, 300.0, 0.02)
+    f = dice.uniform(0.05, 1.0, 40)
+    phases = dice.uniform(0.0, 2.0 * np.pi, 40)
+    target = np.sin(2.0 * np.pi * np.outer(t, f) + phases).sum(axis=1)
+    speed = (2.0 * np.pi * f * np.cos(2.0 * np.pi * np.outer(t, f) + phases)).sum(axis=1)
+    rows = np.zeros((len(t), len(TraceRow._fields)))
+    noise = np.convolve(dice.standard_normal(len(t)), np.ones(50) / 4.0, "same")
+    for name, values in (("t", t), ("target_yaw", target), ("target_yaw_rate", speed),
+                         ("gaze_yaw", gain * target + noise)):  # fmt: skip
+        rows[:, TraceRow._fields.index(name)] = values
+    most = verdicts(GazeTrace(rows, (), (), ()))["pursuit_most"]
+    assert most.value > gain + 0.01  # the largest of many is beyond the truth
+    assert most.low95 < gain + 0.02 and most.high95 - most.low95 > 0.03
+    assert most.verdict == verdict
+
+
+def looks_at(*looks_s: tuple[float, float]) -> GazeTrace:
+    """Make a run of 30 s in which the gaze is on the face at these times."""
+    t = np.arange(0.0, 30.0, 0.01)
+    rows = np.full((len(t), len(TraceRow._fields)), np.nan)
+    rows[:, TraceRow._fields.index("t")] = t
+    on = np.any([(t >= begin) & (t < end) for begin, end in looks_s], axis=0)
+    for name in ("face_y", "face_z"):
+        rows[:, TraceRow._fields.index(name)] = np.where(on, 0.0, 1.0)
+    return GazeTrace(rows, (), (), ())
+
+
+@pytest.mark.parametrize("cut", [(0.0, 6.0), (22.0, 31.0)], ids=["begins", "ends"])
+def test_a_look_that_the_run_cuts_off_is_no_whole_bout(cut: tuple[float, float]) -> None:
+    """Its full length is unknown; only a lower bound is known."""
+    found = {m.key: m for m in eye_contact.measures(looks_at((10.0, 12.0), (15.0, 19.0), cut))}
+    for key in ("bout_none", "bout_talk", "bout_listen"):
+        assert sorted(found[key].rows) == pytest.approx([2.0, 4.0], abs=0.02)
+    assert found["longest_look"].rows.max() == pytest.approx(min(cut[1], 30.0) - cut[0], abs=0.02)
+
+
+def test_a_blink_that_comes_with_a_glance_begins_when_it_does() -> None:
+    """The lids go down with the eyes at 1.0 s, and shut .1 s later; they stay low."""
+    t = np.arange(0.0, 20.0, 0.005)
+    lids = Lids(LidParams(), np.random.default_rng(0))
+    pitch = np.where(t % 4.0 < 1.0, 10.0, -10.0)
+    pitch = np.convolve(np.pad(pitch, 5, "edge"), np.ones(11) / 11.0, "valid")
+    rest = 0.55 + 0.025 * pitch
+    shut = np.array([lids.closure(s % 4.0 - 1.1) for s in t])
+    found = blinks_of(t, rest * (1.0 - shut), pitch)
+    assert [b.onset_s % 4.0 for b in found] == pytest.approx([1.1] * 5, abs=0.01)
+    assert all(b.depth > 0.95 for b in found)
+    assert blinks_of(t, rest, pitch) == ()  # a glance down is none
+    assert blinks_of(t, np.full(len(t), np.nan), pitch) == ()
+
+
+def test_a_shift_of_eyes_that_are_shut_brings_no_blink() -> None:
+    run = run_of([(40.0, 120.0, 400.0, 0.3)] * 40)
+    with_each = tuple(BlinkEvent(0.4 * n + 0.03, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0)
+                      for n in range(0, 40, 4))  # fmt: skip
+    trials = blink_measures.evoked_blinks(replace(run, blinks=with_each))
+    # The next shift comes .4 s later, .07 s after the lids are open again: no trial.
+    assert len(trials) == 30 and trials[:, 1].sum() == 10
+
+
+def test_blinks_that_begin_with_saccades_are_told_from_others() -> None:
+    run = run_of([(5.0, 40.0, 200.0, 0.45)] * 40)
+    for late_s, share in ((0.0, 1.0), (0.05, 0.0)):
+        shuts = tuple(
+            BlinkEvent(0.4 * n + late_s, 0.08, 0.04, 0.19, 0.9, 20.0, 10.0) for n in range(20)
+        )
+        seen = verdicts(replace(run, blinks=shuts))
+        assert seen["blink_tied"].value == share
+        assert seen["blink_partial"].value == 1.0 and seen["blink_partial"].verdict == "outside"
+
+
+def test_reactions_begin_with_the_first_frame_and_are_told_from_choices() -> None:
+    def tick(t_s: float, ids: tuple[int, ...], on: int, saccades: int) -> Tick:
+        n = len(ids)
+        zero = np.zeros((n, 3))
+        seen = Bodies(ids, ("hand",) * n, zero, zero, zero, np.zeros(n))
+        return cast(
+            Tick,
+            SimpleNamespace(
+                t_s=t_s, percept=Percept(t_s - 0.06, seen), stopped="",
+                target=SimpleNamespace(kind="hand", id=on),
+                gaze=SimpleNamespace(saccades=saccades),
+            ),
+        )  # fmt: skip
+
+    finder = ReactionFinder()
+    assert finder.update(tick(1.0, (1,), 1, 0)) is None
+    assert finder.update(tick(1.1, (1,), 1, 1)) is None  # was there from the beginning
+    assert finder.update(tick(2.0, (1, 2), 1, 1)) is None
+    found = finder.update(tick(2.2, (1, 2), 2, 2))
+    assert found is not None and found.latency_s == pytest.approx(0.26)
+    assert finder.update(tick(2.5, (1, 2), 2, 3)) is None  # no longer new
+    assert finder.update(tick(3.0, (1, 2, 3), 2, 3)) is None
+    assert finder.update(tick(4.5, (1, 2, 3), 3, 4)) is None  # a choice

@@ -6,8 +6,10 @@ import os
 import signal
 import subprocess
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from math import dist
 from pathlib import Path
 
 import cv2
@@ -16,14 +18,25 @@ import pytest
 from branch import Branch, fresh_start, gazerig
 from child_processes import running
 from command_line import Invoked, invoked
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from gazerig.config.load import shipped
+from gazerig.config.load import ConfigError, shipped
+from gazerig.config.parameters import changed
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.process import child_process
 from gazerig.features.lab.simulated_run import simulate
-from gazerig.features.lab.sweep.axes import Axis, Point, grid, latin_hypercube
+from gazerig.features.lab.sweep.axes import (
+    Axis,
+    Point,
+    axes_of,
+    check_points,
+    grid,
+    latin_hypercube,
+)
+from gazerig.features.lab.sweep.fit import counted_measures, fit, search, snippet_of, trial_of
 from gazerig.features.lab.sweep.outcome import (
     OUTSIDE,
     Outcome,
@@ -32,15 +45,15 @@ from gazerig.features.lab.sweep.outcome import (
     rows_of,
     write_tables,
 )
-from gazerig.features.lab.sweep.response import most_responsive
-from gazerig.features.lab.sweep.response_figure import response_png
-from gazerig.features.lab.sweep.run_store import RUNS, run_store
+from gazerig.features.lab.sweep.response_figure import most_responsive, response_png
+from gazerig.features.lab.sweep.sweep import RUNS, run_store
 from gazerig.features.lab.sweep.worker import figures_at
 from gazerig.features.lab.sweep.worker_pool import Job, SweepInterrupted, WorkerPool
+from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.cli.tune import read_value
 
 pytestmark = pytest.mark.usefixtures("branched_children")
-
 RIG, DESK = load_rig("desk"), shipped("rigs", "desk")
 COMFORT = "gaze.head.comfort_deg"
 LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
@@ -373,3 +386,292 @@ def test_what_cannot_be_run_is_refused_before_a_folder_is_made(
     done = swept(tmp_path / "out", *words)
     assert done.code == 2 and text in done.err
     assert not (tmp_path / "out").exists()
+
+
+BLINKING = "gaze.lids.blinks_per_min"
+LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
+
+
+# --- What --set takes, what is refused before anything runs, and the points that come of it
+
+
+def read(*settings: str) -> list[Axis]:
+    return axes_of(RIG, settings, read_value)
+
+
+def test_steps_lists_and_ranges_are_read() -> None:
+    steps, words, flags, reach = read(
+        f"{COMFORT}=4:16:7",
+        "gaze.saccade.profile=min_jerk, main_sequence",
+        "gaze.head.literal_reach=true,false",
+        f"{BLINKING}=8..30.5",
+    )
+    assert steps.values == (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0) and steps.unit == "deg"
+    assert words.values == ("min_jerk", "main_sequence") and flags.values == (True, False)
+    assert reach.is_range and (reach.low, reach.high, reach.whole) == (8.0, 30.5, False)
+    assert reach.label == f"{BLINKING}, 1/min" and words.label == "gaze.saccade.profile"
+
+
+def test_lists_can_be_levels() -> None:
+    (axis,) = read("joints.neck_yaw.gains=[400, 0, 0],[800, 0, 0]")
+    assert axis.values == ((400, 0, 0), (800, 0, 0))
+
+
+def test_whole_numbers_stay_whole() -> None:
+    (axis,) = read("webcam.width_px=640:1280:3")
+    assert axis.values == (640, 960, 1280) and all(isinstance(v, int) for v in axis.values)
+    with pytest.raises(SetupError, match="640.5 is no whole number"):
+        read("webcam.width_px=640:641:3")
+    with pytest.raises(ConfigError, match="640.5 has a fraction|wanted a whole number"):
+        read("webcam.width_px=640.5:700")
+
+
+@pytest.mark.parametrize(
+    ("setting", "error", "text"),
+    [
+        ("gaze.head.comfrt_deg=4:16:7", ConfigError, "unknown key 'comfrt_deg'; did you mean"),
+        (f"{COMFORT}=4:160", ConfigError, "160.0 is above 90 (unit deg)"),
+        (
+            "gaze.saccade.profile=1:3:3",
+            SetupError,
+            "profile=human,main_sequence,min_jerk,literal_frame",
+        ),
+        (f"{COMFORT}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
+        (f"{COMFORT}=", SetupError, "not KEY=VALUES"),
+        (f"{COMFORT}=9:4:3", SetupError, "9 is not below 4"),
+        (f"{COMFORT}=4:9:1", SetupError, "1 steps; wanted 2 to"),
+        (f"{COMFORT}=4,5,4", SetupError, "a value is given twice"),
+        (f"{COMFORT}=[4", SetupError, "not valid YAML"),
+        ("gaze.head=4:9:2", SetupError, "is no single value; name one, for example gaze.head."),
+        ("profile=robot,mitake", SetupError, "it acts while files are read; give --profile"),
+    ],
+)
+def test_what_cannot_be_a_setting_is_refused(
+    setting: str, error: type[Exception], text: str
+) -> None:
+    with pytest.raises(error) as refused:
+        read(setting)
+    assert text in str(refused.value)
+
+
+def test_a_key_stands_once_and_all_faults_are_told() -> None:
+    with pytest.raises(SetupError, match="is given twice"):
+        read(f"{COMFORT}=4,5", f"{COMFORT}=6,7")
+    with pytest.raises(ConfigError) as refused:
+        read("gaze.hed.comfort_deg=4,5", f"{BLINKING}=1:99")
+    assert "did you mean 'head'" in str(refused.value) and "above 60" in str(refused.value)
+
+
+def test_a_grid_has_every_combination_the_last_axis_fastest() -> None:
+    points = grid(read(f"{COMFORT}=4,6", f"{BLINKING}=10:30:3"))
+    assert [tuple(point.values()) for point in points] == [
+        (4, 10.0), (4, 20.0), (4, 30.0), (6, 10.0), (6, 20.0), (6, 30.0)
+    ]  # fmt: skip
+    with pytest.raises(SetupError, match="needs --samples N or --fit; for a grid write .*:STEPS"):
+        grid(read(f"{COMFORT}=4:16"))
+    with pytest.raises(SetupError, match="at most 100000"):
+        grid(read(f"{COMFORT}=4:16:1000", f"{BLINKING}=1:60:1000"))
+
+
+def test_values_that_the_rig_allows_nowhere_are_refused_before_anything_runs() -> None:
+    axes = read(f"{COMFORT}=4,x,-3,95", f"{BLINKING}=10,20")
+    with pytest.raises(ConfigError) as refused:
+        check_points(RIG, axes, grid(axes))
+    assert str(refused.value).splitlines() == [
+        f"{COMFORT}: 'x' is text, wanted a number, 0 to 90 deg",
+        f"{COMFORT}: -3 is below 0 (unit deg)",
+        f"{COMFORT}: 95 is above 90 (unit deg)",
+    ]
+
+
+def test_a_rule_between_two_parameters_refuses_only_what_no_point_allows() -> None:
+    axes = read(f"{LOW}=0.2,1.5", f"{HIGH}=1.0,2.0")
+    points = grid(axes)
+    check_points(RIG, axes, points)  # 1.5 and 1.0 exclude each other: their runs report it
+    axes = read(f"{LOW}=2.5,3.0", f"{HIGH}=1.0,2.0")
+    with pytest.raises(ConfigError, match="max_salience must be above min_salience"):
+        check_points(RIG, axes, grid(axes))
+
+
+OTHER_AXES = (
+    Axis("a", (), -2.0, 5.0), Axis("b", (), 1.0, 6.0, whole=True), Axis("c", ("x", "y", "z")),
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(2, 60), st.integers(0, 2**32))
+def test_a_latin_hypercube_falls_once_into_each_part_of_every_axis(n: int, seed: int) -> None:
+    points = latin_hypercube(OTHER_AXES, n, seed)
+    assert len(points) == n and points == latin_hypercube(OTHER_AXES, n, seed)
+    parts = sorted(int((float(str(point["a"])) + 2.0) / 7.0 * n * (1 - 1e-6)) for point in points)
+    near = [abs(part - k) <= 1 for k, part in enumerate(parts)]  # six digits are kept
+    assert all(near) and len(set(parts)) >= n - 1
+    assert all(-2.0 <= float(str(point["a"])) <= 5.0 for point in points)
+    whole = Counter(point["b"] for point in points)
+    assert set(whole) <= set(range(1, 7)) and all(isinstance(b, int) for b in whole)
+    assert all(abs(whole[b] - n / 6) < 2 for b in range(1, 7))
+    levels = Counter(point["c"] for point in points)
+    assert all(abs(levels[c] - n / 3) < 2 for c in "xyz")
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(0.0, 1.0), st.sampled_from(OTHER_AXES))
+def test_a_share_of_an_axis_is_a_value_of_it_and_back(share: float, axis: Axis) -> None:
+    value = axis.at(share)
+    assert axis.at(axis.share(value)) == value
+    assert 0.0 <= axis.share(value) <= 1.0
+
+
+def test_points_are_changes_of_a_rig() -> None:
+    (point,) = latin_hypercube(read(f"{COMFORT}=4:16"), 2, 0)[:1]
+    assert changed(RIG, point).gaze.head.comfort_deg == point[COMFORT]
+
+
+FITTED = (
+    Axis("gaze.lids.blinks_per_min", (), 1.0, 60.0),
+    Axis("gaze.lids.close_ms", (), 30.0, 300.0),
+    Axis("gaze.saccade.profile", ("min_jerk", "main_sequence", "literal_frame")),
+)
+# --- Fitting: what counts as outside, the search, and the YAML that a run takes
+
+
+START: Point = dict(zip((axis.key for axis in FITTED), (50.0, 250.0, "literal_frame"), strict=True))
+KEYS = ("blink_rate", "blink_close", "skew")
+
+
+def outcome(point: Point, seed: int, values: Sequence[float | None]) -> Outcome:
+    """Return a run with three measures, None where too few events were found."""
+    figures: dict[str, float | str | None] = {}
+    for key, value in zip(KEYS, values, strict=True):
+        band = BY_KEY[key]
+        inside = value is not None and band.low <= value <= band.high
+        word = "too few events" if value is None else "pass" if inside else "outside"
+        figures |= {f"report.{key}": value, f"verdict.{key}": word}
+    return Outcome(point, seed, figures)
+
+
+def blinking(points: Sequence[Point]) -> list[list[Outcome]]:
+    """Run points in a world in which each measure is its parameter; two seeds."""
+    found = []
+    for point in points:
+        rate, close, profile = point.values()
+        assert isinstance(rate, float) and isinstance(close, float)
+        skew = BY_KEY["skew"].low if profile == "main_sequence" else BY_KEY["skew"].high + 1.0
+        found.append([outcome(point, seed, (rate + seed, close, skew)) for seed in (0, 1)])
+    return found
+
+
+def test_a_search_puts_the_measures_inside_their_bands() -> None:
+    found = fit(blinking, FITTED, START, 96, 1)
+    assert found.counted and set(found.counted) == set(KEYS)
+    assert found.start.point == START and found.start.outside == 3.0
+    assert found.best.outside == 0.0 and found.best.score == 0.0
+    assert found.best.point["gaze.saccade.profile"] == "main_sequence"
+    assert 60 <= len(found.trials) <= 98
+
+
+def test_the_same_search_asks_for_the_same_points() -> None:
+    assert fit(blinking, FITTED, START, 24, 1) == fit(blinking, FITTED, START, 24, 1)
+    other = fit(blinking, FITTED, START, 24, 2)
+    assert [one.point for one in other.trials] != [
+        one.point for one in fit(blinking, FITTED, START, 24, 1).trials
+    ]
+
+
+def test_no_point_is_run_twice() -> None:
+    asked: list[str] = []
+
+    def run(points: Sequence[Point]) -> list[list[Outcome]]:
+        asked.extend(json.dumps(point) for point in points)
+        return [
+            [outcome(p, 0, (50.0, 80.0, {"min_jerk": 1.0}.get(str(p[FITTED[2].key]), 0.0)))]
+            for p in points
+        ]
+
+    fit(run, FITTED[2:], {FITTED[2].key: "min_jerk"}, 30, 0)
+    assert len(asked) == len(set(asked)) == 3
+
+
+def test_the_search_beats_chance_and_takes_the_start_along() -> None:
+    """A bowl in three dimensions: of 96 points by chance the nearest is about 0.13 off."""
+    bowl, begun = (0.2, 0.7, 0.4), {"a": 0.5, "b": 0.5, "c": 0.5}
+    axes = [Axis(key, (), 0.0, 1.0) for key in "abc"]
+    nearest = []
+    for seed in range(6):
+        found: list[float] = []
+
+        def scores(points: Sequence[Point], found: list[float] = found) -> list[float]:
+            assert found or points[0] == begun
+            found += [dist(bowl, [float(str(x)) for x in p.values()]) for p in points]
+            return found[-len(points) :]
+
+        search(scores, axes, begun, 96, seed)
+        assert len(found) == 96
+        nearest.append(min(found))
+    assert sum(nearest) / len(nearest) < 0.05
+
+
+def test_measures_count_if_half_of_the_runs_can_judge_them() -> None:
+    runs = [outcome(START, 0, (17.0, None, 0.3)), outcome(START, 1, (40.0, None, None))]
+    assert set(counted_measures(runs)) == {"blink_rate", "skew"}
+    with pytest.raises(SetupError, match="too short: no measure has enough events"):
+        counted_measures([outcome(START, 0, (None, None, None))])
+    with pytest.raises(SetupError, match="own values cannot be run: it failed"):
+        counted_measures([Outcome(START, 0, {}, "it failed")])
+
+
+def test_what_can_no_longer_be_judged_is_outside_and_a_failure_worst_of_all() -> None:
+    band = BY_KEY["blink_rate"]
+    just = band.high + 0.25 * (band.high - band.low)
+    trial = trial_of(START, [outcome(START, 0, (just, 80.0, None))], KEYS)
+    assert trial.score == pytest.approx(1.5) and trial.outside == 2.0
+    failed = trial_of(
+        START, [outcome(START, 0, (17.0, 80.0, 0.3)), Outcome(START, 1, {}, "x")], KEYS
+    )
+    assert failed.score > len(KEYS) and failed.failed == "x"
+
+
+def test_the_best_point_is_yaml_that_a_run_takes(tmp_path: Path) -> None:
+    file = tmp_path / "best.yaml"
+    point: Point = {"gaze.lids.close_ms": 90.5, "gaze.saccade.profile": "main_sequence"}
+    file.write_text(snippet_of(RunOptions(character="shy"), point), encoding="utf-8")
+    made, shy = load_rig("desk", str(file)), load_rig("desk", "shy")
+    assert made.gaze.lids.close_ms == 90.5 and made.gaze.saccade.profile == "main_sequence"
+    assert made.gaze.attention == shy.gaze.attention and shy != load_rig("desk")
+    file.write_text(snippet_of(RunOptions(), point), encoding="utf-8")
+    assert file.read_text(encoding="utf-8") == (
+        "gaze:\n  lids:\n    close_ms: 90.5\n  saccade:\n    profile: main_sequence\n"
+    )
+
+
+def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path: Path) -> None:
+    out, key, jerky = tmp_path / "fit", "gaze.saccade.profile", tmp_path / "jerky.yaml"
+    jerky.write_text("gaze: {saccade: {profile: literal_frame}, lids: {hold_ms: 50}}\n")
+    words = (
+        *("sweep", "--fit", "--out", str(out), "--seconds", "16", "--bus", "ideal", "--jobs", "1"),
+        *("--set", f"{key}=literal_frame,min_jerk", "--seeds", "1", "--samples", "16"),
+        *("--character", str(jerky)),
+    )
+    done = invoked(*words)
+    assert done.code == 0, done.err
+    assert "measures count, 2 points tried; outside: " in done.err
+    assert f"{key}: literal_frame -> min_jerk" in done.err
+    assert f"to run it: gazerig run desk --character {out}/best.yaml" in done.err
+    best = load_rig("desk", str(out / "best.yaml")).gaze
+    assert (best.saccade.profile, best.lids.hold_ms) == ("min_jerk", 50.0)
+    rows = (out / "table.csv").read_text(encoding="utf-8").splitlines()
+    assert [row.split(",")[0] for row in rows] == [key, "literal_frame", "min_jerk"]
+    runs = out / "runs.jsonl"
+    runs.write_text("".join(f"{line}\n" for line in runs.read_text().splitlines()[:1]))
+    again = invoked(*words)
+    assert again.code == 0 and again.err.splitlines() == done.err.splitlines()
+    assert (out / "table.csv").read_text(encoding="utf-8").splitlines() == rows
+
+
+def test_levels_and_ends_of_a_fit_are_checked_before_anything_runs(tmp_path: Path) -> None:
+    words = ("sweep", "--fit", "--out", str(tmp_path / "fit"), "--bus", "ideal")
+    done = invoked(*words, "--set", "gaze.lids.close_ms=50,5000")
+    assert done.code == 2 and "gaze.lids.close_ms: 5000 is above 500 (unit ms)" in done.err
+    done = invoked(*words, "--set", "gaze.lids.close_ms=5:90")
+    assert done.code == 2 and "gaze.lids.close_ms: 5.0 is below 30 (unit ms)" in done.err
+    assert not (tmp_path / "fit").exists()

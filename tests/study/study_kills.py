@@ -41,8 +41,6 @@ plan: {participants: 2}
 privacy: {contact: someone@example.org}
 """
 _GONE = (urllib.error.URLError, ConnectionError, TimeoutError, OSError)
-
-
 Page = tuple[str, ...]
 """The answers of a page in order."""
 

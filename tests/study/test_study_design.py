@@ -1,21 +1,37 @@
 """``gazerig study design``: a study checked, stated before it begins, and what to type next."""
 
+import json
 import re
-from itertools import combinations
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import combinations, permutations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import typed
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gazerig.config.parameters import changed
 from gazerig.config.schema import Rig
-from gazerig.config.shipped import shipped_names
+from gazerig.config.shipped import SHIPPED, shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.cli.design import EXAMPLE, notes, state
 from gazerig.features.study.data_folder import StudyData
+from gazerig.features.study.design import Condition, StudyDesign, Trials
+from gazerig.features.study.order import (
+    PAIR,
+    balanced_group_size,
+    block_trials,
+    orders,
+    practice,
+    williams,
+)
 from gazerig.features.study.run.study_check import checked_study
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.shipped import HOME
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
@@ -195,3 +211,187 @@ def _desired(rig: Rig, asked: RunOptions) -> list[tuple[float, ...]]:
     slower = changed(rig, {"loop.rate_hz": 100.0})
     simulate(slower, asked, watch=lambda tick: found.append(tick.desired_rad))
     return found
+
+
+# --- Orders of trials: each condition in each place, after each other one, as often as all others
+
+
+def design_of(n: int, **trials: object) -> StudyDesign:
+    conditions: Mapping[str, Condition] = {f"c{i}": Condition() for i in range(n)}
+    return StudyDesign("t", conditions, ("q",), trials=Trials(**trials))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+def test_williams_balances_places_and_what_comes_before(n: int) -> None:
+    table = williams(n)
+    assert len(table) == (n if n % 2 == 0 else 2 * n)
+    places = Counter((i, one) for row in table for i, one in enumerate(row))
+    assert set(places.values()) == {len(table) // n} and len(places) == n * n
+    follows = Counter(pair for row in table for pair in zip(row, row[1:], strict=False))
+    assert set(follows) == set(permutations(range(n), 2))
+    assert set(follows.values()) == {1 if n % 2 == 0 else 2}
+
+
+def test_the_squares_of_four_are_those_of_williams_construction() -> None:
+    assert williams(4) == ((0, 1, 3, 2), (1, 2, 0, 3), (2, 3, 1, 0), (3, 0, 2, 1))
+    assert williams(1) == ((0,),)
+    with pytest.raises(ValueError, match="at least one"):
+        williams(0)
+
+
+@given(st.integers(2, 6), st.integers(1, 4), st.integers(0, 2**31 - 1), st.sampled_from([1, 2, 3]))
+@settings(deadline=None, max_examples=60)
+def test_multiples_of_the_rows_are_balanced_to_the_last_cell(
+    n: int, repetitions: int, seed: int, times: int
+) -> None:
+    design = design_of(n, repetitions=repetitions, seed=seed)
+    every = [orders(design, p) for p in range(1, times * balanced_group_size(design) + 1)]
+    for k in range(repetitions):
+        blocks = [order[k * n : (k + 1) * n] for order in every]
+        assert all(sorted(block) == sorted(design.conditions) for block in blocks)
+        places = Counter((i, one) for block in blocks for i, one in enumerate(block))
+        follows = Counter(p for block in blocks for p in zip(block, block[1:], strict=False))
+        assert len(set(places.values())) == 1 and len(places) == n * n
+        assert len(set(follows.values())) == 1 and len(follows) == n * (n - 1)
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 6])
+def test_no_condition_is_shown_twice_in_a_row_across_blocks(n: int) -> None:
+    for order in ("williams", "random"):
+        design = design_of(n, repetitions=4, order=order)
+        for participant in range(1, 30):
+            trials = orders(design, participant)
+            assert all(a != b for a, b in zip(trials, trials[1:], strict=False))
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+def test_pairs_are_seen_both_ways_round_equally_often_in_every_place(n: int) -> None:
+    design = replace(design_of(n), task="pairwise")
+    assert balanced_group_size(design) == n * (n - 1)
+    every = [orders(design, p) for p in range(1, balanced_group_size(design) + 1)]
+    cells = Counter((i, one) for order in every for i, one in enumerate(order))
+    pairs = len(block_trials(design))
+    assert len(cells) == pairs * pairs * 2 and set(cells.values()) == {1}
+    for order in every:
+        unordered = [frozenset(one.split(PAIR)) for one in order]
+        assert len(set(unordered)) == pairs
+    if n > 2:  # nobody could learn that the first is always the same one
+        assert all(len({one in block_trials(design) for one in order}) == 2 for order in every)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_repeated_pairs_stay_balanced_and_one_pair_is_turned(n: int) -> None:
+    design = replace(design_of(n, repetitions=3), task="pairwise")
+    every = [orders(design, p) for p in range(1, balanced_group_size(design) + 1)]
+    pairs = len(block_trials(design))
+    for k in range(3):
+        cells = Counter((i, o[k * pairs + i]) for o in every for i in range(pairs))
+        assert set(cells.values()) == {1} and len(cells) == 2 * pairs * pairs
+    for order in every:
+        for one, two in zip(order, order[1:], strict=False):
+            assert one != two and (n == 2 or set(one.split(PAIR)) != set(two.split(PAIR)))
+
+
+def test_the_participant_and_the_seed_decide_and_nothing_else() -> None:
+    design = design_of(5, order="random", seed=4)
+    assert orders(design, 3) == orders(design, 3)
+    assert len({orders(design, p) for p in range(1, 40)}) > 20
+    assert orders(design_of(5, order="random", seed=5), 3) != orders(design, 3)
+    assert balanced_group_size(design) == 1
+    squares = {orders(design_of(4, seed=seed), 1) for seed in range(30)}
+    assert len(squares) > 5, "which condition has which letter is drawn by the seed"
+    with pytest.raises(ValueError, match="counted from 1"):
+        orders(design, 0)
+
+
+def test_practice_shows_what_counts_later_and_is_not_the_first_trial_for_all() -> None:
+    design = design_of(3, practice=5)
+    drawn = practice(design, 1)
+    assert len(drawn) == 5 and set(drawn) == set(design.conditions)
+    assert drawn == practice(design, 1)
+    assert len({practice(design, p)[0] for p in range(1, 20)}) == 3
+    assert practice(design_of(3, practice=0), 1) == ()
+
+
+# --- A study's hash is of what it says, and of nothing else
+
+
+PORT = re.compile(r"port: \S+")
+TEXT = (HOME / "studies" / "nakamoto_1.yaml").read_text(encoding="utf-8")
+
+
+def study_of(folder: Path, text: str) -> LoadedStudy:
+    folder.mkdir(exist_ok=True)
+    (folder / "s.yaml").write_text(text, encoding="utf-8")
+    return load_study(str(folder / "s.yaml"))
+
+
+def test_comments_format_defaults_and_folders_change_no_hash(tmp_path: Path) -> None:
+    original = load_study("nakamoto_1")
+    lines = [line for line in TEXT.splitlines() if not line.startswith("#")]
+    rewritten = (
+        "\n".join(lines).replace("  on: film\n", "").replace("seconds: 30 ", "seconds: 30.0 ")
+    )
+    assert "language" not in rewritten
+    again = study_of(tmp_path / "a", "# mine\n" + rewritten + "\nlanguage: en\n")
+    assert again.canonical == original.canonical and again.sha256 == original.sha256
+    assert len(again.sha256) == 64
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("scanpath: simple", "scanpath: markov"),
+        ("seconds: 30", "seconds: 31"),
+        ("participants: 9", "participants: 10"),
+        ("order: random", "order: random\n  seed: 1"),
+        ("also: [chi_square, rank_sum]", "also: [chi_square]"),
+        ("what counts is your impression", "what counts is your impression of it"),
+        ("label: face centre", "label: the face centre"),
+    ],
+)
+def test_every_value_changes_the_hash(tmp_path: Path, old: str, new: str) -> None:
+    assert old in TEXT
+    changed = study_of(tmp_path, TEXT.replace(old, new))
+    assert changed.sha256 != load_study("nakamoto_1").sha256
+
+
+def test_a_value_of_the_rig_that_is_seen_changes_the_hash_and_a_port_does_not(
+    tmp_path: Path,
+) -> None:
+    rig = (SHIPPED / "rigs" / "expressive.yaml").read_text(encoding="utf-8")
+    text = TEXT.replace("rig: expressive", "rig: ./r.yaml")
+
+    def sha256(params_text: str) -> str:
+        (tmp_path / "r.yaml").write_text(params_text, encoding="utf-8")
+        return study_of(tmp_path, text).sha256
+
+    assert sha256(rig) == load_study("nakamoto_1").sha256
+    assert sha256(PORT.sub("port: /dev/ttyUSB7", rig, 1)) == sha256(rig)
+    assert sha256(rig.replace("blend_s: 0.6", "blend_s: 0.7")) != sha256(rig)
+
+
+def test_films_and_the_order_of_items_are_part_of_it(tmp_path: Path) -> None:
+    film = TEXT.replace("profile: nakamoto\n    scanpath: simple", "film: a.webm")
+    (tmp_path / "a.webm").write_bytes(b"one")
+    one = study_of(tmp_path, film).sha256
+    (tmp_path / "a.webm").write_bytes(b"two")
+    assert study_of(tmp_path, film).sha256 != one
+    items = ["x: {low: {en: a}, high: {en: b}}", "y: {low: {en: a}, high: {en: b}}"]
+    found = set()
+    for order in (items, items[::-1]):
+        asked = "title: t\nsource: s\nlicence: l\nitems:\n  " + "\n  ".join(order)
+        (tmp_path / "q.yaml").write_text(asked)
+        found.add(study_of(tmp_path, TEXT.replace("[free_text]", "[./q.yaml]")).sha256)
+    assert len(found) == 2
+
+
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
+def test_the_canonical_text_is_json_with_everything_written_out(name: str) -> None:
+    study = load_study(name)
+    stated = json.loads(study.canonical)
+    assert stated["design"]["order"] == list(study.design.conditions)
+    assert stated["design"]["exclusion"]["repeats"] == 2
+    for key in study.design.conditions:
+        assert "gaze.scanpath.model" in stated["design"]["conditions"][key]["values"]
+    assert set(stated["questionnaires"]) == set(study.questionnaires)

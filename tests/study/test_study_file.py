@@ -1,16 +1,24 @@
 """Studies and questionnaires are read and checked as rigs are: file, line, key, rule and cure."""
 
 import json
+import re
+from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 from textwrap import dedent, indent
+from typing import Any
 
 import pytest
 from command_line import typed
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from outside_package import install, on_path
 from recorded_run import record
+from ruamel.yaml import YAML
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
+from gazerig.features.study.pages.study_files import FOLDER
 from gazerig.features.study.run.study_check import checked_study
 from gazerig.features.study.run.study_file import load_questionnaire, load_study
 from gazerig.features.study.shipped import HOME
@@ -392,3 +400,101 @@ def test_what_takes_the_head_s_place_needs_films(shown: str, tmp_path: Path) -> 
     text = conditions(f"a: {{}}\nb: {{{shown}}}", "presentation: {on: head}\n")
     said = faults(tmp_path, text)
     assert any("the head itself is shown; write presentation.on: film" in one for one in said)
+
+
+# --- Whatever stands in a study's file by mistake is told with file and line, or it is right
+
+
+WRONG: tuple[object, ...] = (
+    *(
+        None,
+        0,
+        -1,
+        1e30,
+        float("nan"),
+        True,
+        "",
+        "a|b",
+        "../x.yaml",
+        "x.webm",
+        ".mcap",
+        "~",
+        "wait",
+    ),
+    *("film", "head", "pairwise", "choice", "friedman", [], {}, [[]], {"a": {}}, ["rosas"]),
+    *(
+        {"gaze": 3},
+        {"gaze.top_down.rules": {}},
+        {"joints.neck_yaw": None},
+        {"": 1},
+        "x" * 300,
+        "=",
+        "gaze=x",
+    ),
+)
+"""What may stand anywhere in a file by mistake."""
+DESIGN = YAML(typ="safe").load((HOME / "studies" / "nakamoto_2.yaml").read_text("utf-8"))
+PLACES = (
+    *(("title",), ("task",), ("welcome",), ("conditions",), ("conditions", "simple"), ("plan",)),
+    *(("translations",), ("translations", "de"), ("translations", "ja", "welcome")),
+    *(("conditions", "random", key) for key in ("params", "recording", "film", "factors", "rig")),
+    *(("conditions", "random", key) for key in ("profile", "scanpath", "behaviour", "label")),
+    *(("presentation", key) for key in ("on", "rig", "scene", "world")),
+    *(("trials", key) for key in ("seconds", "order", "repetitions")),
+    *(("questionnaires",), ("after",), ("objective",), ("plan", "participants")),
+    *(("hypotheses",), ("hypotheses", 0, "measure"), ("hypotheses", 1, "than")),
+    ("hypotheses", 0, "better"),
+    *(("hypotheses", 0, "test"), ("hypotheses", 0, "also"), ("privacy",), ("nonsense",)),
+)
+
+
+@given(st.lists(st.tuples(st.sampled_from(PLACES), st.sampled_from(WRONG)), min_size=1, max_size=3))
+@settings(
+    deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_whatever_stands_in_a_study_is_right_or_told_with_file_and_line(
+    tmp_path: Path, changes: list[tuple[tuple[str | int, ...], object]]
+) -> None:
+    design = deepcopy(DESIGN)
+    for (*over, last), value in changes:
+        # Where an earlier change has taken the place away, there is nothing to spoil.
+        with suppress(LookupError, TypeError):
+            held: Any = design
+            for step in over:
+                held = held[step]
+            held[last] = deepcopy(value)
+    file = tmp_path / "s.yaml"
+    with file.open("w", encoding="utf-8") as out:
+        YAML(typ="safe").dump(design, out)
+    try:
+        assert len(checked_study(str(file)).sha256) == 64
+    except ConfigError as error:
+        assert all(fault.file == str(file) and fault.line for fault in error.faults)
+
+
+# --- The texts of a study's pages: in every language, and each of them said somewhere
+
+
+def test_every_text_is_there_in_every_language_with_the_same_places() -> None:
+    texts = json.loads((FOLDER / "texts.json").read_text(encoding="utf-8"))
+    assert set(texts) == {"en", "ja", "de"}
+    places = {
+        language: {key: sorted(re.findall(r"\{\w+\}", text)) for key, text in said.items()}
+        for language, said in texts.items()
+    }
+    assert places["ja"] == places["en"] == places["de"]
+    assert all(text.strip() for said in texts.values() for text in said.values())
+
+
+def test_the_scripts_say_texts_that_are_there_and_no_text_is_left_over() -> None:
+    texts = json.loads((FOLDER / "texts.json").read_text(encoding="utf-8"))["en"]
+    scripts = "".join(path.read_text(encoding="utf-8") for path in FOLDER.glob("*.js"))
+    asked = set(re.findall(r'(?:say|button|tell)\("([\w.]+)"', scripts))
+    assert asked <= set(texts)
+    patterns = [re.escape(one) for one in re.findall(r'"([\w.]+)"', scripts)]
+    patterns += [
+        re.sub(r"\\\$\\\{.*?\\\}", r"\\w*", re.escape(one))
+        for one in re.findall(r"`([\w.]+\$\{[^`]*)`", scripts)
+    ]
+    left = {key for key in texts if not any(re.fullmatch(one, key) for one in patterns)}
+    assert not left

@@ -1,19 +1,35 @@
 """A participant's session: its screens, and that it goes on where it was cut off."""
 
+import errno
+import json
+import os
 from dataclasses import replace
 from itertools import pairwise
-from math import nan
+from math import isnan, nan
 from pathlib import Path
 
 import pytest
 from study_runs import UTC, run_of, screens, step
 
 from gazerig.config.shipped import shipped_names
+from gazerig.drivers.errors import SetupError
 from gazerig.features.study.answers import LONGEST_TEXT, WrongAnswer
-from gazerig.features.study.journal import read
+from gazerig.features.study.data_folder import StudyData, code_of
+from gazerig.features.study.journal import FILE, Journal, WriteFailed, encode_records, read
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.presenter import HeadLost, PresentationData
-from gazerig.features.study.records import Closed, ItemAnswered, TrialBegan, TrialEnded
+from gazerig.features.study.records import (
+    Closed,
+    Consented,
+    ItemAnswered,
+    Measured,
+    Opened,
+    Record,
+    TrialBegan,
+    TrialEnded,
+)
+from gazerig.features.study.run.participant import open_journal
+from gazerig.features.study.run.simulated_session import simulate_study
 from gazerig.features.study.run.study_file import LoadedStudy, load_questionnaire, load_study
 from gazerig.features.study.screens import (
     ConsentScreen,
@@ -27,6 +43,7 @@ from gazerig.features.study.screens import (
 )
 from gazerig.features.study.session import INTERRUPTED, ShownTrial
 from gazerig.features.study.shipped import HOME
+from gazerig.features.study.simulation import Population
 
 
 def rating(**trials: float) -> LoadedStudy:
@@ -400,3 +417,226 @@ def test_a_response_time_on_a_page_of_an_earlier_program_is_not_known(tmp_path: 
     answered = [one.ms for one in journal.records if isinstance(one, ItemAnswered)]
     assert answered == pytest.approx([nan, nan], nan_ok=True)
     journal.close()
+
+
+# --- The journal of a participant: on disk before anybody goes on, whole or not at all
+
+
+ALL: tuple[Record, ...] = (
+    Opened("P001", "ab" * 32, ("a", "b|c"), "0.1", UTC),
+    Consented(True, False, True, UTC),
+    TrialBegan(-1, 0, "a", UTC),
+    TrialEnded(-1, 0, "head_lost", 3.5, UTC, 1, "run-01.mcap", "servo 3", 1.0, 4.5),
+    ItemAnswered(0, "b|c", "choice", "alive", "first", 812.5, UTC),
+    ItemAnswered(None, "", "free_text", "what", 'schön\n"ja" 目', 1.0, UTC),
+    Measured(0, "b", {"first_look_s": 1.5}, 1, 2),
+    Closed("finished", "", UTC),
+)
+
+
+def test_all_kinds_of_records_come_back(tmp_path: Path) -> None:
+    with Journal(tmp_path) as journal:
+        for one in ALL:
+            journal.write((one,))
+        assert journal.records == ALL
+    assert read(tmp_path) == ALL
+    with Journal(tmp_path) as journal:
+        assert journal.records == ALL and journal.torn is None
+
+
+def test_what_is_not_a_number_comes_back_as_that(tmp_path: Path) -> None:
+    with Journal(tmp_path) as journal:
+        journal.write((Measured(0, "a", {"x": nan}), TrialEnded(0, 0, "interrupted", nan, UTC)))
+    measured, ended = read(tmp_path)
+    assert isinstance(measured, Measured) and isnan(measured.values["x"])
+    assert isinstance(ended, TrialEnded) and isnan(ended.seconds) and isnan(ended.from_s)
+
+
+def test_a_step_is_there_whole_or_not_at_all_wherever_it_was_cut(tmp_path: Path) -> None:
+    """As after a crash or a lost power: the file ends at any byte of the last line."""
+    whole, step = encode_records(ALL[:3]), encode_records(ALL[3:5])
+    for cut in range(len(step)):
+        folder = tmp_path / str(cut)
+        folder.mkdir()
+        (folder / FILE).write_bytes(whole + step[:cut])
+        assert read(folder) == ALL[:3]
+        with Journal(folder) as journal:
+            assert journal.records == ALL[:3]
+            assert (journal.torn is None) == (cut == 0)
+            if journal.torn is not None:
+                assert journal.torn.read_bytes() == step[:cut]
+            journal.write(ALL[3:5])
+        assert read(folder) == ALL[:5]
+
+
+def test_a_damaged_line_is_named(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(
+        encode_records(ALL[:1]) + b'[{"kind": "Rumour"}]\n' + encode_records(ALL[1:2])
+    )
+    with pytest.raises(SetupError, match=rf"{FILE}:2: no records of a session"):
+        Journal(tmp_path)
+    with pytest.raises(SetupError, match=rf"{FILE}:2:"):
+        read(tmp_path)
+
+
+def test_two_sessions_of_one_participant_are_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "P007"
+    with Journal(folder), pytest.raises(SetupError, match="P007 has a session already"):
+        Journal(folder)
+    with Journal(folder) as journal:
+        journal.write(ALL[:1])
+
+
+def test_a_full_disk_keeps_nothing_by_halves_and_may_be_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Journal(tmp_path) as journal:
+        journal.write(ALL[:2])
+        there, room = os.write, [60]
+
+        def full(fd: int, data: bytes) -> int:
+            if not room[0]:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            part = data[: room[0]]
+            room[0] -= len(part)
+            return there(fd, part)
+
+        monkeypatch.setattr(os, "write", full)
+        with pytest.raises(WriteFailed, match="not kept: No space left on device"):
+            journal.write(ALL[2:5])
+        assert journal.records == ALL[:2] == read(tmp_path)
+        monkeypatch.setattr(os, "write", there)
+        journal.write(ALL[2:5])
+    assert read(tmp_path) == ALL[:5]
+
+
+def test_no_journal_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(SetupError, match="No such file"):
+        read(tmp_path / "P009")
+
+
+def test_only_the_owner_may_read_it(tmp_path: Path) -> None:
+    with Journal(tmp_path):
+        assert (tmp_path / FILE).stat().st_mode & 0o077 == 0
+
+
+# --- The data of a study: one design, participants without names, one command that deletes one
+
+
+@pytest.fixture(scope="module")
+def study() -> LoadedStudy:
+    return load_study("nakamoto_1")
+
+
+def edited(study: LoadedStudy) -> LoadedStudy:
+    trials = replace(study.design.trials, seconds=31.0)
+    return replace(study, design=replace(study.design, trials=trials))
+
+
+def simulated(study: LoadedStudy, folder: Path, count: int = 3, seed: int = 0) -> StudyData:
+    data = StudyData(folder)
+    simulate_study(study, data, count, Population(seed=seed))
+    return data
+
+
+def test_simulated_participants_finish_and_the_same_seed_gives_the_same_journals(
+    study: LoadedStudy, tmp_path: Path
+) -> None:
+    one = simulated(study, tmp_path / "a")
+    again, other = simulated(study, tmp_path / "b"), simulated(study, tmp_path / "c", seed=1)
+    assert one.numbers() == (1, 2, 3)
+    texts = [
+        [(data.participant(n) / FILE).read_bytes() for n in (1, 2, 3)]
+        for data in (one, again, other)
+    ]
+    assert texts[0] == texts[1] != texts[2]
+    for number in one.numbers():
+        records = read(one.participant(number))
+        assert isinstance(records[0], Opened) and records[0].simulated
+        assert isinstance(records[-1], Closed) and records[-1].how == "finished"
+        assert sum(isinstance(record, ItemAnswered) for record in records) == 2 * 2 + 1
+
+
+def test_simulated_ones_are_not_put_beside_others(study: LoadedStudy, tmp_path: Path) -> None:
+    data = simulated(study, tmp_path)
+    with pytest.raises(SetupError, match="has data of participants: .* --data NEW_FOLDER"):
+        simulate_study(study, data, 1, Population())
+
+
+def test_a_design_edited_after_the_first_participant_is_refused(
+    study: LoadedStudy, tmp_path: Path
+) -> None:
+    data = simulated(study, tmp_path)
+    assert data.claim(study.name, study.canonical) == study.sha256
+    changed = edited(study)
+    with pytest.raises(SetupError, match=f"{study.sha256[:12]}; this one is {changed.sha256[:12]}"):
+        data.claim(changed.name, changed.canonical)
+    StudyData(tmp_path / "new").claim(changed.name, changed.canonical)
+    with pytest.raises(SetupError, match="was begun with another design"):
+        open_journal(changed, data, 1, changed.sha256)
+
+
+def test_what_is_said_of_the_design_cannot_be_changed_unseen(
+    study: LoadedStudy, tmp_path: Path
+) -> None:
+    data = StudyData(tmp_path)
+    data.claim(study.name, study.canonical)
+    path = tmp_path / "design.json"
+    stated = json.loads(path.read_text(encoding="utf-8"))
+    stated["design"]["design"]["trials"]["seconds"] = 5.0
+    path.write_text(json.dumps(stated), encoding="utf-8")
+    with pytest.raises(SetupError, match="was changed: its design does not have the hash"):
+        data.sha256()
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(SetupError, match="cannot be read"):
+        data.sha256()
+    with pytest.raises(SetupError, match="has no data of a study"):
+        StudyData(tmp_path / "nowhere").sha256()
+
+
+def test_deleting_a_participant_leaves_nothing_but_the_code(
+    study: LoadedStudy, tmp_path: Path
+) -> None:
+    data = simulated(study, tmp_path)
+    folder = data.participant(2)
+    (folder / "run-01.mcap").write_bytes(b"joints")
+    for made in ("report/index.html", "bids/sub-P002/beh/a.tsv"):
+        (tmp_path / made).parent.mkdir(parents=True)
+        (tmp_path / made).write_text("P002")
+    with Journal(folder), pytest.raises(SetupError, match="P002 has a session already"):
+        data.delete(2)
+    assert data.delete(2) == 5
+    assert not folder.exists() and not (tmp_path / "report").exists()
+    left = [one for one in tmp_path.rglob("*") if one.is_file()]
+    assert [one.name for one in left if b"P002" in one.read_bytes()] == ["deleted.txt"]
+    assert data.deleted() == ("P002",) and data.numbers() == (1, 3)
+    with pytest.raises(SetupError, match="has nothing of P002; there is P001, P003"):
+        data.delete(2)
+    with pytest.raises(SetupError, match="the data of P002 were deleted on request"):
+        open_journal(study, data, 2, study.sha256)
+
+
+def test_a_participant_with_a_damaged_journal_can_be_deleted(
+    study: LoadedStudy, tmp_path: Path
+) -> None:
+    data = simulated(study, tmp_path)
+    (data.participant(2) / FILE).write_bytes(b"nonsense\n")
+    with pytest.raises(SetupError, match="damaged"):
+        open_journal(study, data, 2, study.sha256)
+    assert data.delete(2) and data.numbers() == (1, 3)
+
+
+def test_participants_have_numbers_and_no_names() -> None:
+    assert [code_of(7), code_of(1234)] == ["P007", "P1234"]
+    for number in (0, -1, 1_000_000):
+        with pytest.raises(SetupError, match="a whole number from 1 to 999999; no names"):
+            code_of(number)
+
+
+def test_the_secret_stays_and_is_the_owners_alone(tmp_path: Path) -> None:
+    data = StudyData(tmp_path)
+    assert data.secret() == data.secret() and len(data.secret()) == 32
+    assert (tmp_path / "secret").stat().st_mode & 0o077 == 0
+    (tmp_path / "secret").write_text("what")
+    with pytest.raises(SetupError, match="secret cannot be read"):
+        data.secret()

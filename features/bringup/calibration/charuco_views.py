@@ -11,15 +11,20 @@ both are given.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asin, degrees, hypot
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_output import output_file
+from gazerig.drivers.types import ImageArray
 from gazerig.params import Bounds
-from gazerig.robot.model.charuco_board import LEAST_CORNERS, SeenBoard
+from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
 
 Floats = NDArray[np.float64]
 
@@ -177,3 +182,81 @@ class ViewCollector:
         self._held.append(how)
         self.views.append(seen)
         return ""
+
+
+# --- The board on paper: a page in true size, with a ruler to check what the printer did
+
+
+PAPERS_MM: dict[str, tuple[float, float]] = {"a4": (297.0, 210.0), "letter": (279.4, 215.9)}
+"""Width and height of the paper laid crosswise."""
+
+RULER_MM = 100
+"""Length of the ruler on the page."""
+
+# A whole number of pixels a millimetre keeps squares and marker modules exact.
+_PX_PER_MM = 12
+_DPI = _PX_PER_MM * 25.4
+# No printer reaches the edge; the strip below the board holds ruler and text.
+_EDGE_MM, _STRIP_MM = 5.0, 13.0
+_BLACK = 0
+
+
+def page(board: CharucoBoard, paper: str) -> ImageArray:
+    """Draw the page: (h, w) grey, 12 px a millimetre.
+
+    Raises:
+        SetupError: no such paper, or the board is too large for it.
+    """
+    if paper not in PAPERS_MM:
+        raise SetupError(f"paper {paper!r}: unknown; there is {', '.join(PAPERS_MM)}")
+    wide_mm, high_mm = PAPERS_MM[paper]
+    par = board.params
+    board_mm = (par.columns * par.square_mm, par.rows * par.square_mm)
+    room_mm = (wide_mm - 2 * _EDGE_MM, high_mm - 2 * _EDGE_MM - _STRIP_MM)
+    if board_mm[0] > room_mm[0] or board_mm[1] > room_mm[1]:
+        raise SetupError(
+            f"a board of {board_mm[0]:.0f} x {board_mm[1]:.0f} mm does not fit on {paper}, which "
+            f"has room for {room_mm[0]:.0f} x {room_mm[1]:.0f} mm: take smaller or fewer squares"
+        )
+    sheet = np.full((round(high_mm * _PX_PER_MM), round(wide_mm * _PX_PER_MM)), 255, np.uint8)
+    drawn = board.image(_PX_PER_MM)
+    left = (sheet.shape[1] - drawn.shape[1]) // 2
+    top = round((_EDGE_MM + (room_mm[1] - board_mm[1]) / 2) * _PX_PER_MM)
+    sheet[top : top + drawn.shape[0], left : left + drawn.shape[1]] = drawn
+    below = round((high_mm - _EDGE_MM - _STRIP_MM + 3.0) * _PX_PER_MM)
+    # A line of 100 mm with a mark every 10 mm; its length is that between outer edges.
+    mm = _PX_PER_MM
+    sheet[below : below + 3, left : left + RULER_MM * mm] = _BLACK
+    for at_mm in range(0, RULER_MM + 1, 10):
+        high = (4 if at_mm % 50 == 0 else 2) * mm
+        start = left + at_mm * mm - (3 if at_mm == RULER_MM else 0)
+        sheet[below : below + high, start : start + 3] = _BLACK
+    lines = (
+        f"The line on the left is {RULER_MM} mm long: measure it.",
+        "Print at 100 %, not 'fit to page'. Glue it on something flat and stiff.",
+        f"ChArUco board {par.columns} x {par.rows}, squares {par.square_mm:g} mm, "
+        f"markers {par.marker_mm:g} mm.",
+    )
+    for number, line in enumerate(lines):
+        at = (left + (RULER_MM + 6) * mm, below + round((1.6 + 3.9 * number) * mm))
+        cv2.putText(sheet, line, at, cv2.FONT_HERSHEY_SIMPLEX, 1.1, _BLACK, 3, cv2.LINE_8)
+    return sheet
+
+
+def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) -> None:
+    """Write the page as PDF or PNG, by the name's ending; either prints in true size.
+
+    Raises:
+        SetupError: see ``page``, or the ending is another one.
+            Or it already exists and not forced, or cannot be written.
+    """
+    if out.suffix.lower() not in (".pdf", ".png"):
+        raise SetupError(f"{out}: a page is written as .pdf or .png; choose such a name")
+    image = Image.fromarray(page(board, paper))
+    with output_file(out, force) as file:
+        if out.suffix.lower() == ".pdf":
+            # Two grey values compressed without loss: a JPEG inside would blur the corners.
+            image = image.convert("1", dither=Image.Dither.NONE)
+            image.save(file, format="PDF", resolution=_DPI)
+        else:
+            image.save(file, format="PNG", dpi=(_DPI, _DPI))

@@ -103,30 +103,10 @@ LEAD_US = 50.0
 """A quarter of a second at its slow speed: the time until it stops after a key is released."""
 
 
-class JoggableJoint(Protocol):
-    """A servo as a person moves it; pulse widths in us."""
-
-    def by(self, us: float) -> None:
-        """Move the joint by this much."""
-        ...
-
-    def nudge(self, us: float) -> None:
-        """Move the joint by this much, never far ahead of it: for a key that is held down."""
-        ...
-
-    def to(self, us: float) -> None:
-        """Move the joint to a pulse width."""
-        ...
-
-    def live(self) -> str:
-        """Update the joint; return its position as text."""
-        ...
-
-
 class Jogger(Operator, Protocol):
     """A person who moves a servo by small steps, and reads angles off."""
 
-    def steer(self, question: str, servo: JoggableJoint) -> None:
+    def steer(self, question: str, servo: "HobbyMarker") -> None:
         """Return when the servo has the desired position.
 
         Raises:

@@ -1,10 +1,12 @@
 """Keys of a terminal, words of a script or buttons of the page, which steer a calibration."""
 
+from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
 from queue import Empty, Full, Queue
-from typing import Protocol, Self, cast, get_args
+from typing import Self, cast, get_args
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.calibration.face_calibration import Key
+from gazerig.features.bringup.calibration.face_steering import Key
 from gazerig.features.bringup.cli.prompts import Lines
 from gazerig.robot.cli.key_input import TerminalInput, split_keys
 
@@ -52,23 +54,18 @@ def key_and_count(line: str) -> tuple[Key, int]:
     return _WORDS[word], int(number)
 
 
-class Keys(Protocol):
+class Keys(AbstractContextManager["Keys"], ABC):
     """Where keys come from, one by one, for as long as the block lasts."""
-
-    def __enter__(self) -> Self:
-        """Begin."""
-        ...
 
     def __exit__(self, *raised: object) -> None:
         """End."""
-        ...
 
+    @abstractmethod
     def next(self, ready: bool) -> Key | None:
         """Return the next key, None without one; ``ready``: the last one has taken effect."""
-        ...
 
 
-class TerminalKeys(TerminalInput):
+class TerminalKeys(TerminalInput, Keys):
     """Keys of standard input one by one."""
 
     def __init__(self) -> None:
@@ -85,19 +82,12 @@ class TerminalKeys(TerminalInput):
         return self._ready.pop(0) if self._ready else None
 
 
-class LineKeys:
+class LineKeys(Keys):
     """Keys from lines of a file or a pipe, each after the eyes have finished the one before."""
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
         self._ready: list[Key] = []
-
-    def __enter__(self) -> Self:
-        """Need nothing."""
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        """Leave nothing behind."""
 
     def next(self, ready: bool) -> Key | None:
         """Return the next key if the eyes are ready for it.
@@ -122,7 +112,7 @@ class LineKeys:
         return self._ready.pop(0)
 
 
-class PageKeys:
+class PageKeys(Keys):
     """Keys pressed as buttons of the page, side by side with those of another source."""
 
     def __init__(self, others: Keys) -> None:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from math import isfinite
 
-from gazerig.features.bringup.calibration.linkage_calibration import JoggableJoint
+from gazerig.features.bringup.calibration.linkage_calibration import HobbyMarker
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import TerminalKeys
 from gazerig.features.bringup.cli.prompts import LOOK_S, TerminalPerson
@@ -27,7 +27,7 @@ class TerminalJogger(TerminalPerson):
     Keys of a terminal act as they are pressed, lines of a file or a pipe one by one.
     """
 
-    def steer(self, question: str, servo: JoggableJoint) -> None:
+    def steer(self, question: str, servo: HobbyMarker) -> None:
         """Return when the servo has the desired position; see Jogger."""
         say(question)
         if self._lines.is_scripted or not sys.stdin.isatty():

@@ -36,7 +36,7 @@ from gazerig.features.bringup.cli.ports import (
     refuse_packages,
     rig_ports,
 )
-from gazerig.features.bringup.doctor.port import name_ports
+from gazerig.features.bringup.doctor.run import name_ports
 from gazerig.features.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.suggestions import completed

@@ -33,7 +33,7 @@ from gazerig.features.bringup.calibration.camera_procedure import (
     neck_angles,
     neck_steps,
 )
-from gazerig.features.bringup.calibration.charuco_page import RULER_MM, write_page
+from gazerig.features.bringup.calibration.charuco_views import RULER_MM, write_page
 from gazerig.features.bringup.calibration.field_of_view import SIZE_SPREAD, estimate_field
 from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
 from gazerig.features.bringup.cli.calibrate.oak import (

@@ -14,13 +14,13 @@ from rich.table import Table
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.bringup.calibration.face_calibration import (
+from gazerig.features.bringup.calibration.face_steering import (
     PART_NAMES_TEXT,
     FaceCalibration,
+    FaceSteering,
     changes,
     initial_calibration,
 )
-from gazerig.features.bringup.calibration.face_steering import FaceSteering
 from gazerig.features.bringup.calibration.smart_servo_access import CalibrationStopped
 from gazerig.features.bringup.cli.calibration_keys import (
     BUTTONS,
