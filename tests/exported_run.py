@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
+from fakes.runs import play
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.robot.recording.gaze_angles import GazeAngles, collect_gaze_angles
 from gazerig.robot.recording.gaze_labels import (
     LabelledInterval,
@@ -23,13 +24,7 @@ def seen(scene: str, seconds: float) -> list[Tick]:
     """Run a simulated head and give its ticks."""
     made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene=scene))
     ticks: list[Tick] = []
-    made.robot.start(made.clock)
-    try:
-        run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None,
-            ticks.append)  # fmt: skip
-    finally:
-        made.robot.stop()
-        made.close()
+    play(made, seconds, ticks.append)
     return ticks
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from command_line import invoked
 from expressive_rig import faults
+from fakes.runs import ticks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -223,11 +224,7 @@ def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
         write(steps)
 
     made.robot.body.bus.write = noted  # type: ignore[method-assign,assignment]
-    last: list[float] = []
-    for _ in range(500):
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        tick = made.robot.tick(made.clock.now_s(), 0.005)
-        last = [degrees(angle) for angle in tick.joints.position_rad]
+    last = [degrees(angle) for angle in ticks(made, 500)[-1].joints.position_rad]
     at = dict(zip(rig.names, last, strict=True))
     assert at["neck_pitch"] == pytest.approx(20.0, abs=0.4)
     assert at["neck_roll"] == pytest.approx(-15.0, abs=0.4)
@@ -275,11 +272,8 @@ def test_a_lost_servo_of_a_pair_makes_both_joints_stale() -> None:
         return Feedback._make((*columns, whole.rearmed, (k,)))
 
     made.robot.body.bus.read = silent  # type: ignore[method-assign,assignment]
-    for n in range(60):
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        tick = made.robot.tick(made.clock.now_s(), 0.005)
-        if n == 0:
-            assert tick.joints.missing == ("neck_pitch", "neck_roll")
+    first, *_, tick = ticks(made, 60)
+    assert first.joints.missing == ("neck_pitch", "neck_roll")
     held = {reason.partition(":")[0] for reason in tick.guard_result.reasons}
     assert {"neck_pitch", "neck_roll"} <= held
     assert inf > min(tick.joints.measured_s) > -inf
@@ -358,9 +352,7 @@ def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints() -> None:
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
     made.robot.start(made.clock)
     made.robot.command(Jog((("neck_pitch", radians(10.0)), ("neck_roll", radians(8.0))), stay=True))
-    for _ in range(400):
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        tick = made.robot.tick(made.clock.now_s(), 0.005)
+    tick = ticks(made, 400)[-1]
     at = dict(zip(rig.names, map(degrees, tick.joints.position_rad), strict=True))
     assert (at["neck_pitch"], at["neck_roll"]) == pytest.approx((10.0, 8.0), abs=0.3)
     made.close()

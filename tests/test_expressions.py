@@ -7,6 +7,7 @@ from random import Random
 
 import pytest
 from expressive_rig import expressive_rig, faults, started
+from fakes.runs import ticks
 
 from gazerig.gaze.gesture.expression import Expressions
 from gazerig.gaze.gesture.level import HOLD_S, LevelParams, LevelRange, Levels
@@ -15,8 +16,7 @@ from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.rig_limits import pose_offset
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.command_checks import check
-from gazerig.robot.model.command_json import as_json, as_recorded, from_json, from_recording
+from gazerig.robot.model.command_json import as_json, as_recorded, check, from_json, from_recording
 from gazerig.robot.model.commands import Ask, Command, Express, SetLevel
 from gazerig.robot.model.reply import CommandReply
 
@@ -28,15 +28,6 @@ def made() -> Iterator[Assembly]:
     made = started()
     yield made
     made.close()
-
-
-def ticks(made: Assembly, number: int) -> list[Tick]:
-    """Run ticks at 200 Hz."""
-    done = []
-    for _ in range(number):
-        made.clock.sleep_until(made.clock.now_s() + DT)
-        done.append(made.robot.tick(made.clock.now_s(), DT))
-    return done
 
 
 def desired_deg(made: Assembly, tick: Tick) -> dict[str, float]:

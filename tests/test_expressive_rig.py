@@ -7,19 +7,17 @@ from pathlib import Path
 import pytest
 from command_line import answers_in, invoked
 from expressive_rig import started
+from fakes.runs import record, ticks
 
 from gazerig.config.load import shipped
 from gazerig.config.parameters import changed, parameters
-from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Command, Express, SetLevel, Value
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunInfo
 
 pytestmark = pytest.mark.usefixtures("ideal_servos", "branched_children")
 
@@ -40,29 +38,13 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecording, li
 
     rig = load_rig("expressive")
     path = tmp_path_factory.mktemp("face") / "face.mcap"
-    info = RunInfo(
-        rig="expressive", profile=rig.profile, character=None, config_yaml=params_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=3, rate_hz=rig.loop.rate_hz,
-        started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
-    )  # fmt: skip
-    recorder = Recorder(path, info, patient=True)
-    recorder.open()
-    options = RunOptions(mock=True, fast=True, seed=3, scene="visitor")
-    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
-    seen: list[Tick] = []
 
-    def watch(tick: Tick) -> None:
-        recorder.record(tick)
-        seen.append(tick)
-        for command in ASKED.get(len(seen), ()):
+    def ask(number: int, made: Assembly) -> None:
+        for command in ASKED.get(number, ()):
             made.robot.command(command)
 
-    made.robot.start(made.clock)
-    stop = recorder.wrap_stop(lambda s: "seconds" if s >= 2.0 - 1e-9 else None)
-    run(made.robot, made.clock, lambda: made.loop, stop, watch)
-    made.robot.stop()
-    recorder.close("seconds", made.sent_digest())
-    made.close()
+    options = RunOptions(rig="expressive", mock=True, fast=True, seed=3, scene="visitor")
+    seen = record(path, rig, 2.0, options, ask)
     return RunRecording(path), seen
 
 
@@ -149,9 +131,7 @@ def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
     made: Assembly = started(changed(rig, {"guard.collisions": (pair,), **low}))
     made.robot.command(Express("sulky"))
     worst = -90.0
-    for _ in range(600):
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        tick = made.robot.tick(made.clock.now_s(), 0.005)
+    for tick in ticks(made, 600):
         at = dict(zip(NAMES, map(degrees, tick.guard_result.command_rad), strict=True))
         if at["neck_pitch"] < -5.0:
             worst = max(worst, at["jaw"])
@@ -163,12 +143,9 @@ def test_a_blink_shuts_the_lids_of_a_sad_face(recorded: tuple[RunRecording, list
     made = started(load_rig("expressive"))
     made.robot.command(Express("sad"))
     lid, widest, narrowest = NAMES.index("left_upper_lid"), -90.0, 90.0
-    for k in range(3000):
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        tick = made.robot.tick(made.clock.now_s(), 0.005)
-        if k > 200:
-            angle = degrees(tick.desired_rad[lid])
-            widest, narrowest = max(widest, angle), min(narrowest, angle)
+    for tick in ticks(made, 3000)[201:]:
+        angle = degrees(tick.desired_rad[lid])
+        widest, narrowest = max(widest, angle), min(narrowest, angle)
     made.close()
     assert narrowest == pytest.approx(-25.0, abs=0.5)  # shut
     assert widest < 20.0 - 13.0  # open, less nearly all of the 14 deg
@@ -178,9 +155,7 @@ def test_the_jaw_moves_on_while_a_stale_frame_holds_the_neck() -> None:
     made = started(load_rig("expressive"))
     made.live.parts.camera.latest = lambda t_s: None  # type: ignore[assignment,method-assign]
     made.robot.command(Express("surprised"))
-    for _ in range(600):
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        tick = made.robot.tick(made.clock.now_s(), 0.005)
+    tick = ticks(made, 600)[-1]
     made.close()
     held = [reason for reason in tick.guard_result.reasons if "stale frame" in reason]
     assert {reason.partition(":")[0] for reason in held} <= {"neck_yaw", "neck_pitch"} and held
@@ -197,8 +172,7 @@ def test_an_expression_tuned_while_it_is_in_force_moves_without_a_jump() -> None
             made.robot.command(
                 made.live.prepare(rig, changed(rig, {"expressions.happy.jaw": 10.0}))
             )
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        now = degrees(made.robot.tick(made.clock.now_s(), 0.005).desired_rad[jaw])
+        now = degrees(ticks(made, 1)[0].desired_rad[jaw])
         largest, last = max(largest, abs(now - last)), now
     made.close()
     assert last == pytest.approx(10.0)

@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from fakes.runs import play
 from film_gaze import gaze_point, in_picture
 from numpy.typing import NDArray
 
@@ -20,7 +21,7 @@ from gazerig.gaze.angles import angle_between
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 SECONDS, BEGIN_S, RATE_HZ = 18.0, 1.0, 10.0
@@ -56,18 +57,8 @@ def ticks(ideal_servos: None) -> tuple[Assembly, list[Tick]]:
     )
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, video=FILM))
     seen: list[Tick] = []
-    made.robot.start(made.clock)
-    try:
-        run(
-            made.robot,
-            made.clock,
-            made.loop,
-            lambda seconds: "seconds" if seconds >= SECONDS else None,
-            lambda tick: seen.append(tick._replace(detections=None)),  # pictures are large
-        )
-    finally:
-        made.robot.stop()
-        made.close()
+    # Pictures are large.
+    play(made, SECONDS, lambda tick: seen.append(tick._replace(detections=None)))
     return made, seen
 
 

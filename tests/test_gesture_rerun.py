@@ -1,22 +1,16 @@
 """A recorded run with gestures is done again to the same bytes, without the gestures' files."""
 
-import itertools
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from fakes.runs import VISIT, record
 
 from gazerig.config.schema import load_rig, load_rules
-from gazerig.robot.app.assemble import Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.run_rig import run_info
-from gazerig.robot.app.session import shut_down
-from gazerig.robot.control.loop import run
-from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Play
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.recorder import Recorder
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -41,27 +35,14 @@ def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
             ),
         ),
     )
-    options = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
     path = tmp_path / "run.mcap"
-    recorder = Recorder(path, run_info(rig, options), patient=True)
-    recorder.open()
-    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
-    events: list[str] = []
 
-    numbers = itertools.count(1)
-
-    def watch(tick: Tick) -> None:
-        recorder.record(tick)
-        events.extend(tick.events)
-        if (play := PLAYS.get(next(numbers))) is not None:
+    def ask(number: int, made: Assembly) -> None:
+        if (play := PLAYS.get(number)) is not None:
             made.robot.command(play)
 
-    made.robot.start(made.clock)
-    stop = recorder.wrap_stop(lambda s: "seconds" if s >= 3.5 else None)
-    count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
-    shut_down(made, count, lambda line: None)
-    recorder.close(count.stopped_by, made.sent_digest())
-    made.close()
+    ticks = record(path, rig, 3.5, VISIT, ask)
+    events = [line for tick in ticks for line in tick.events]
     told = [line for line in events if line.startswith("gesture")]
     assert any("rule wait: nod" in line for line in told)
     assert any("mine takes 0.7 s" in line for line in told) and len(told) == 4

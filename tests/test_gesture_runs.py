@@ -4,6 +4,7 @@ from math import degrees
 
 import numpy as np
 import pytest
+from fakes.runs import ticks
 
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
@@ -11,21 +12,13 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import LookAt, Play
-from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.reply import CommandReply
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 DT = 0.005
 POINT = (1.0, 0.0, 0.25)
-
-
-def ticks(made: Assembly, number: int) -> list[Tick]:
-    done = []
-    for _ in range(number):
-        made.clock.sleep_until(made.clock.now_s() + DT)
-        done.append(made.robot.tick(made.clock.now_s(), DT))
-    return done
 
 
 def played(made: Assembly, gesture: str) -> tuple[CommandReply, list[Tick]]:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from desk import LIDS
 from expressive_rig import faults
+from fakes.runs import ticks
 
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate, sub
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
-from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Express, Jog, LookAt
@@ -75,14 +76,6 @@ def test_poses_between_ticks_have_the_lower_neck_between() -> None:
     assert np.allclose(R, wanted) and p == pytest.approx(at)
 
 
-def run(made: Assembly, ticks: int) -> list[Tick]:
-    done = []
-    for _ in range(ticks):
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        done.append(made.robot.tick(made.clock.now_s(), 0.005))
-    return done
-
-
 def error_deg(tick: Tick) -> float:
     pose = tick.pose
     lines = (line_of_sight(pose, left=side) for side in (True, False))
@@ -99,9 +92,9 @@ def test_the_eyes_stay_on_their_point_while_the_head_bows() -> None:
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
     made.robot.start(made.clock)
     made.robot.command(LookAt(TARGET, stay=True))
-    still = error_deg(run(made, 600)[-1])
+    still = error_deg(ticks(made, 600)[-1])
     made.robot.command(Express("bow"))
-    moving = run(made, 300)
+    moving = ticks(made, 300)
     made.close()
     bowed = dict(zip(rig.names, map(degrees, moving[-1].joints.position_rad), strict=True))
     assert bowed["lower_neck_pitch"] == pytest.approx(-20.0, abs=0.5)
@@ -115,9 +108,9 @@ def test_what_a_look_will_come_to_counts_the_bent_lower_neck() -> None:
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
     made.robot.start(made.clock)
     made.robot.command(Express("bow"))
-    run(made, 400)
+    ticks(made, 400)
     ticket = made.robot.command(LookAt(TARGET, stay=True))
-    run(made, 1)
+    ticks(made, 1)
     reply = ticket.wait(0.0)
     made.close()
     assert reply is not None and reply.error_deg < 0.5, reply
@@ -130,7 +123,7 @@ def test_people_stay_where_they_are_when_the_lower_neck_turns_the_camera() -> No
     made.robot.start(made.clock)
     made.robot.command(Jog((("lower_neck_yaw", radians(15.0)),), stay=True))
     errors = []
-    for tick in run(made, 700):
+    for tick in ticks(made, 700):
         if tick.percept is None or not tick.percept.faces or made.scene is None:
             continue
         seen = tick.percept.faces[0].p_world_m

@@ -9,26 +9,25 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from fakes.runs import VISIT, record
 from stand_in import StandIn
 
 from gazerig.config.load import load
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Percept
-from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import Resimulation, rerun
-from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.playback_devices import PlaybackBody
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
+from gazerig.robot.recording.run_info import RunEnd, as_text
 from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.tick_record import (
     BodyRecord,
@@ -65,33 +64,14 @@ def recorded(
 ) -> list[Tick]:
     """Record a simulated run as ``gazerig run --fast --record`` does; give its ticks."""
     rig = load_rig("desk", character)
-    info = RunInfo(
-        rig="desk", profile=rig.profile, character=character, config_yaml=params_text(rig),
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=5, rate_hz=rig.loop.rate_hz,
-        started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
-    )  # fmt: skip
-    recorder = Recorder(path, info, patient=True)
-    recorder.open()
-    options = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
-    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
-    robot = made.robot
-    seen: list[Tick] = []
 
-    def watch(tick: Tick) -> None:
-        recorder.record(tick)
-        seen.append(tick)
-        at(len(seen), made)
-        for order in (asked or {}).get(len(seen), ()):
-            robot.command(order)
+    def each(number: int, made: Assembly) -> None:
+        at(number, made)
+        for order in (asked or {}).get(number, ()):
+            made.robot.command(order)
 
-    made.clock.sleep_until(start_s)
-    robot.start(made.clock)
-    stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
-    count = run(robot, made.clock, lambda: made.loop, stop, watch)
-    shut_down(made, count, lambda line: None)
-    recorder.close(count.stopped_by, made.sent_digest())
-    made.close()
-    return seen
+    options = replace(VISIT, rig="desk", character=character)
+    return record(path, rig, seconds, options, each, start_s=start_s)
 
 
 class Once(NamedTuple):

@@ -1,12 +1,12 @@
 """What people are shown of a running rig: nothing of it is lost between two snapshots."""
 
-from collections.abc import Callable
 from functools import cache
 from math import degrees, radians
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
+from fakes.runs import play
 from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
@@ -16,7 +16,7 @@ from gazerig.robot.analysis.event_detector import EventDetector, FixationEvent, 
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, pack, unpack
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
@@ -33,11 +33,7 @@ def visit(name: str = "desk", last_s: float = 8.0) -> tuple[Rig, Assembly, tuple
     rig = load_rig(name)
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="face-to-face"))
     ticks: list[Tick] = []
-    made.robot.start(made.clock)
-    over: Callable[[float], str | None] = lambda s: "over" if s >= last_s else None  # noqa: E731
-    run(made.robot, made.clock, made.loop, over, ticks.append)
-    made.robot.stop()
-    made.close()
+    play(made, last_s, ticks.append)
     return rig, made, tuple(ticks)
 
 

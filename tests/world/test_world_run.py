@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
 
+from fakes.runs import ticks
 from rendering import why_not
 
 import gazerig
@@ -54,9 +55,7 @@ def test_the_servos_move_joints_that_weigh_something() -> None:
     made = assemble(load_rig("desk"), FAST)
     try:
         made.robot.start(made.clock)
-        for _ in range(60):
-            made.clock.sleep_until(made.clock.now_s() + 0.005)
-            tick = made.robot.tick(made.clock.now_s(), 0.005)
+        tick = ticks(made, 60)[-1]
         camera = made.robot.camera
         assert isinstance(camera, SceneCamera)
         R, _ = camera._head_pose(0.0)
@@ -79,8 +78,7 @@ def test_without_a_renderer_it_goes_on_and_says_why(monkeypatch: pytest.MonkeyPa
     try:
         assert isinstance(made.robot.camera, SceneCamera)
         made.robot.start(made.clock)
-        made.clock.sleep_until(made.clock.now_s() + 0.005)
-        tick = made.robot.tick(made.clock.now_s(), 0.005)
+        (tick,) = ticks(made, 1)
         assert any("egl: it is missing; detections are computed" in one for one in tick.events)
         made.robot.stop()
     finally:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fakes.runs import play
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.features.world.run.run_world import rig_in_world
@@ -13,7 +14,6 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines, place_of
-from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build
 
@@ -112,13 +112,7 @@ class WorldRun:
 
     def play(self, seconds: float, watch: Callable[[Tick], None]) -> None:
         """Run for a time."""
-        made = self.made
-        made.robot.start(made.clock)
-        try:
-            run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)
-        finally:
-            made.robot.stop()
-            made.close()
+        play(self.made, seconds, watch)
 
 
 def world_run(name: str, monkeypatch: pytest.MonkeyPatch, scene: str = "visitor") -> WorldRun:

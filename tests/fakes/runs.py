@@ -1,0 +1,73 @@
+"""Simulated runs of whole robots: started, ticked, recorded and let go."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from gazerig.config.schema import Rig
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_rig import run_info
+from gazerig.robot.app.session import shut_down
+from gazerig.robot.control.loop import LoopCount, run
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo
+
+VISIT = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
+
+
+def ticks(made: Assembly, number: int, dt_s: float = 0.005) -> list[Tick]:
+    """Tick on in simulated time, 200 times a second; return the ticks."""
+    done = []
+    for _ in range(number):
+        made.clock.sleep_until(made.clock.now_s() + dt_s)
+        done.append(made.robot.tick(made.clock.now_s(), dt_s))
+    return done
+
+
+def play(
+    made: Assembly, seconds: float, watch: Callable[[Tick], None] = lambda tick: None
+) -> LoopCount:
+    """Start a robot, run its loop for a time, stop it and close it."""
+    made.robot.start(made.clock)
+    try:
+        return run(
+            made.robot,
+            made.clock,
+            lambda: made.loop,
+            lambda s: "over" if s >= seconds - 1e-9 else None,
+            watch,
+        )
+    finally:
+        made.robot.stop()
+        made.close()
+
+
+def record(
+    path: Path,
+    rig: Rig,
+    seconds: float,
+    options: RunOptions = VISIT,
+    at: Callable[[int, Assembly], None] = lambda n, made: None,
+    info: RunInfo | None = None,
+    start_s: float = 0.0,
+) -> list[Tick]:
+    """Record a run as ``gazerig run --fast --record`` does; ``at``: called after each tick."""
+    recorder = Recorder(path, info or run_info(rig, options), patient=True)
+    recorder.open()
+    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
+    seen: list[Tick] = []
+
+    def watch(tick: Tick) -> None:
+        recorder.record(tick)
+        seen.append(tick)
+        at(len(seen), made)
+
+    made.clock.sleep_until(start_s)
+    made.robot.start(made.clock)
+    stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
+    count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
+    shut_down(made, count, lambda line: None)
+    recorder.close(count.stopped_by, made.sent_digest())
+    made.close()
+    return seen
