@@ -53,7 +53,14 @@ def fit(
     params = FitParams(smoothing=smoothing)
     try:
         fitted = fit_walk(fixations, params, np.random.default_rng(seed))
-        _walk(fitted)
+        means = tuple(mean.value for mean in fitted.dwell_mean_s)
+        sds = tuple(sd.value for sd in fitted.dwell_sd_s)
+        if min(means) < 0.001 or max((*means, *sds)) > 60.0:
+            raise ValueError(
+                f"dwell times of {min(means):g} to {max(means):g} s are no dwells on a face:"
+                " check the unit of the times"
+            )
+        Walk(PARTS, _matrix(fitted), means, sds, fitted.start)
     except ValueError as error:
         raise SetupError(f"{recording}: {error}") from None
     text = walk_yaml(fitted, params, (_one_line(recording.name), *notes, f"seed {seed}"))
@@ -134,18 +141,6 @@ def _fixations(
         f" {params.dispersion * usual_side(parts):g} (width plus height),"
         f" {params.shortest_ms:g} ms or longer",
     )
-
-
-def _walk(fitted: WalkFit) -> Walk:
-    """Build the walk of the YAML, so that a walk that ``run`` would refuse is not written."""
-    means = tuple(mean.value for mean in fitted.dwell_mean_s)
-    sds = tuple(sd.value for sd in fitted.dwell_sd_s)
-    if min(means) < 0.001 or max((*means, *sds)) > 60.0:
-        raise ValueError(
-            f"dwell times of {min(means):g} to {max(means):g} s are no dwells on a face:"
-            " check the unit of the times"
-        )
-    return Walk(PARTS, _matrix(fitted), means, sds, fitted.start)
 
 
 def _matrix(fitted: WalkFit) -> tuple[tuple[float, ...], ...]:

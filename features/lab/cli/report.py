@@ -1,7 +1,6 @@
 """The commands ``gazerig report`` and ``gazerig compare``: how human the gaze of a run was."""
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from gazerig.features.lab.report.gaze_trace import GazeTrace
     from gazerig.features.lab.report.heads import MutualGazeReport
     from gazerig.features.lab.report.page import RunHeader
-    from gazerig.features.lab.report.statistics import MeasureResult
     from gazerig.gaze.scanpath.scanpath import Walk
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.recording.read import RunRecording
@@ -64,18 +62,29 @@ def report(
 ) -> None:
     """Report how human a run's gaze was: gazerig report run.mcap, then open report.html."""
     with clear_errors():
-        file, rig = _source(file, scene, bus, other)
+        rig = DEFAULT_RIG
+        if scene is not None and file is not None and file.suffix != ".mcap":
+            rig, file = str(file), None
+        if (file is None) == (scene is None):
+            raise SetupError("report takes either a recording or --scene NAME")
+        if file is not None and bus is not None:
+            raise SetupError("--bus needs --scene: a recording already has its bus")
+        if file is None and other is not None:
+            raise SetupError("--with takes the recording of another head: give both recordings")
         # Drawing and models are heavy; `--help` does not import them.
-        from gazerig.features.lab.report.files import files_of, refuse_foreign
-        from gazerig.features.lab.report.page import banner
-        from gazerig.features.lab.report.report import FIGURE_KEYS, report_of
+        from gazerig.features.lab.report.page import banner, files_of, refuse_foreign
+        from gazerig.features.lab.report.report import FIGURE_KEYS, read, report_of
+        from gazerig.robot.recording.read import RunRecording, used
 
         default = Path(f"report-{scene}.html") if file is None else file.with_suffix(".html")
         target = page_file(out or default)
         refuse_foreign(files_of(target, FIGURE_KEYS), force)
         with progress_bar() as tell:
             if file is not None:
-                about, run = _read_run(file, file.stem, tell)
+                recording = RunRecording(file)
+                about = _recording_header(recording, file.stem)
+                with used(file):
+                    run = read(recording.ticks(), about, tell)
             else:
                 from gazerig.robot.app.options import RunOptions
 
@@ -89,28 +98,20 @@ def report(
             made = report_of(run, about, target, tell, force, gaze)
         if text := banner(run.joints):
             say(text)
-        _print_findings(made.findings)
+        for finding in made.findings:
+            if finding.verdict == "outside":
+                band = finding.band
+                unit = "" if band.unit in ("", "share") else f" {band.unit}"
+                say(
+                    f"outside: {band.title}: {finding.value:.3g}, people {band.low:g} to "
+                    f"{band.high:g}{unit} ({finding.measured.events} events)"
+                )
+        counts = Counter(finding.verdict for finding in made.findings)
+        say(
+            f"{counts['pass']} pass, {counts['outside']} outside, "
+            f"{counts['too few events']} with too few events"
+        )
         say(f"{made.page}: the whole report; {len(made.figures)} figures in the folder next to it")
-
-
-def _source(
-    file: Path | None, scene: str | None, bus: str | None, other: Path | None
-) -> tuple[Path | None, str]:
-    """Return the recording, or None for a scene, and the rig of that scene.
-
-    Raises:
-        SetupError: an option needs a recording or a scene.
-    """
-    rig = DEFAULT_RIG
-    if scene is not None and file is not None and file.suffix != ".mcap":
-        rig, file = str(file), None
-    if (file is None) == (scene is None):
-        raise SetupError("report takes either a recording or --scene NAME")
-    if file is not None and bus is not None:
-        raise SetupError("--bus needs --scene: a recording already has its bus")
-    if file is None and other is not None:
-        raise SetupError("--with takes the recording of another head: give both recordings")
-    return file, rig
 
 
 @app.command()
@@ -126,7 +127,7 @@ def compare(
     with clear_errors():
         from gazerig.features.lab.report.compare import LEVEL
         from gazerig.features.lab.report.compare import compare as comparing
-        from gazerig.features.lab.report.files import files_of, refuse_foreign
+        from gazerig.features.lab.report.page import files_of, refuse_foreign
         from gazerig.features.lab.report.report import FIGURE_KEYS
         from gazerig.robot.recording.read import RunRecording, used
 
@@ -152,17 +153,6 @@ def compare(
                 say(f"{a.band.title}: {a.value:.3g} and {b.value:.3g}{unit}{shape}")
         count = sum(d.word == "more than chance" for d in made.differences)
         say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
-
-
-def _read_run(file: Path, name: str, tell: Steps) -> "tuple[RunHeader, GazeTrace]":
-    """Read a recorded run."""
-    from gazerig.features.lab.report.report import read
-    from gazerig.robot.recording.read import RunRecording, used
-
-    recording = RunRecording(file)
-    about = _recording_header(recording, name)
-    with used(file):
-        return about, read(recording.ticks(), about, tell)
 
 
 def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
@@ -279,23 +269,6 @@ def _run_header(
         ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.transition_matrix}"),
     )
     return RunHeader(name, (*facts, *shown), frozenset(styles), rig_walk(gaze.scanpath, walk))
-
-
-def _print_findings(findings: "Sequence[MeasureResult]") -> None:
-    """Print the measures outside their bands, and the counts of all verdicts."""
-    for finding in findings:
-        if finding.verdict == "outside":
-            band = finding.band
-            unit = "" if band.unit in ("", "share") else f" {band.unit}"
-            say(
-                f"outside: {band.title}: {finding.value:.3g}, people {band.low:g} to "
-                f"{band.high:g}{unit} ({finding.measured.events} events)"
-            )
-    counts = Counter(finding.verdict for finding in findings)
-    say(
-        f"{counts['pass']} pass, {counts['outside']} outside, "
-        f"{counts['too few events']} with too few events"
-    )
 
 
 def _names(first: Path, second: Path) -> tuple[str, str]:

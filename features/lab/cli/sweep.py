@@ -122,7 +122,10 @@ def sweep(
         if fit:
             outcomes = _search_best(spec, folder, jobs, shown)
         else:
-            outcomes = _run_points(spec, points, folder, jobs, shown)
+            with _running_sweep(spec, folder, jobs) as (work, runs):
+                outcomes = work.run(points, runs)
+            _write(spec, folder, outcomes, shown)
+            _say_failures(outcomes)
     if all(one.failed for one in outcomes):
         raise typer.Exit(FAULT)
 
@@ -163,18 +166,6 @@ def _plan_runs(
     how = "fit" if fit else "samples"
     search = {how: number, "seed": seeds[0]} if number is not None else {}
     return SweepSpec(rig, asked, tuple(axes), tuple(seeds), search), points
-
-
-def _run_points(
-    spec: "SweepSpec", points: "Sequence[Point]", folder: Path, jobs: int | None,
-    shown: Sequence[str],
-) -> "list[Outcome]":  # fmt: skip
-    """Run all points, and write table and picture."""
-    with _running_sweep(spec, folder, jobs) as (work, runs):
-        outcomes = work.run(points, runs)
-    _write(spec, folder, outcomes, shown)
-    _say_failures(outcomes)
-    return outcomes
 
 
 def _search_best(

@@ -12,37 +12,63 @@ import warnings
 from collections.abc import Iterable, Sequence
 from math import isfinite, nan
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gazerig.features.lab.report.compare_page import (
-    MeasureDifference,
-    Word,
-    compare_page,
-    mixed_basis_warning,
-)
-from gazerig.features.lab.report.files import write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.page import RunHeader
+from gazerig.features.lab.report.page import (
+    Figure,
+    RunHeader,
+    TextLine,
+    banner,
+    left_out,
+    line_of,
+    render,
+    with_unit,
+    write_all,
+)
 from gazerig.features.lab.report.plotting import COLOURS, Shown
 from gazerig.features.lab.report.report import Progress, draw_figures, measure_run, read
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,
+    MeasureResult,
     bootstrap,
     correct_p_values,
     figure,
     figures,
     judge,
+    number,
     unbiased_interval,
 )
-from gazerig.robot.analysis.human_norms import BY_KEY
+from gazerig.robot.analysis.human_norms import BY_KEY, GROUPS
 from gazerig.robot.control.tick import Tick
 
 LEVEL = 0.05
 _DRAWS, _AT_ONCE = 2000, 100
 _SEED = 20060401
 COMPARING = "comparing"
+
+
+Word = Literal["more than chance", "may be chance", "too few events"]
+
+
+class MeasureDifference(NamedTuple):
+    """One measure of two runs.
+
+    difference: b - a; low95, high95: its interval, nan if unknown
+    chance: p value of the difference, corrected; chance_shape: the same for the whole distribution,
+        nan if the measure has none
+    """
+
+    a: MeasureResult
+    b: MeasureResult
+    difference: float
+    low95: float
+    high95: float
+    chance: float
+    chance_shape: float
+    word: Word
 
 
 class Comparison(NamedTuple):
@@ -101,7 +127,18 @@ def differences_of(
     out = []
     for m, n in pairs:
         p, shape = both.get(m.key, nan), both.get(f"{m.key} shape", nan)
-        out.append(_difference(m, n, p, shape, rng))
+        first, second = judge(m, BY_KEY[m.key]), judge(n, BY_KEY[m.key])
+        if not isfinite(p):
+            nothing = (nan, nan, nan, nan, nan)
+            out.append(MeasureDifference(first, second, *nothing, "too few events"))
+            continue
+        value = second.value - first.value
+        of_b, of_a = bootstrap(n, rng), bootstrap(m, rng)
+        count = min(len(of_a), len(of_b))
+        low, high = unbiased_interval(of_b[:count] - of_a[:count], value)
+        differs = p < LEVEL or (isfinite(shape) and shape < LEVEL)
+        word: Word = "more than chance" if differs else "may be chance"
+        out.append(MeasureDifference(first, second, value, low, high, p, shape, word))
     return tuple(out)
 
 
@@ -131,22 +168,6 @@ def chance_of_shape(a: MeasuredValue, b: MeasuredValue) -> float:
         return float(stats.ks_2samp(a.rows, b.rows).pvalue)
 
 
-def _difference(
-    a: MeasuredValue, b: MeasuredValue, p: float, shape: float, rng: np.random.Generator
-) -> MeasureDifference:
-    band = BY_KEY[a.key]
-    ours, theirs = judge(a, band), judge(b, band)
-    if not isfinite(p):
-        return MeasureDifference(ours, theirs, nan, nan, nan, nan, nan, "too few events")
-    value = theirs.value - ours.value
-    of_b, of_a = bootstrap(b, rng), bootstrap(a, rng)
-    n = min(len(of_a), len(of_b))
-    low, high = unbiased_interval(of_b[:n] - of_a[:n], value)
-    differs = p < LEVEL or (isfinite(shape) and shape < LEVEL)
-    word: Word = "more than chance" if differs else "may be chance"
-    return MeasureDifference(ours, theirs, value, low, high, p, shape, word)
-
-
 def _numbers(d: MeasureDifference, runs: Sequence[GazeTrace]) -> dict[str, object]:
     values = {
         "a": d.a.value, "b": d.b.value, "difference": d.difference, "low95": d.low95,
@@ -158,3 +179,121 @@ def _numbers(d: MeasureDifference, runs: Sequence[GazeTrace]) -> dict[str, objec
             "events": events, "verdicts": [d.a.verdict, d.b.verdict],
             "word": d.word,
             "basis": [run.joints.basis(d.a.band.group) for run in runs]}  # fmt: skip
+
+
+class ComparedRow(NamedTuple):
+    """One row of the page's table, ready to print."""
+
+    a: TextLine
+    b: TextLine
+    events: str
+    difference: str
+    interval: str
+    chance: str
+    word: str
+    css: str
+
+
+_CLASSES = {"more than chance": "more", "may be chance": "same", "too few events": "few"}
+
+
+def _row(difference: MeasureDifference, abouts: tuple[RunHeader, RunHeader]) -> ComparedRow:
+    a, b = difference.a, difference.b
+    known = isfinite(difference.difference)
+    chances = [f"p {_p(difference.chance)}"] if known else []
+    if isfinite(difference.chance_shape):
+        chances.append(f"distribution p {_p(difference.chance_shape)}")
+    return ComparedRow(
+        line_of(a, abouts[0].styles),
+        line_of(b, abouts[1].styles),
+        f"{a.measured.events} and {b.measured.events}",
+        with_unit(difference.difference, a.band.unit) if known else "",
+        f"{number(difference.low95)} to {number(difference.high95)}" if known else "",
+        "; ".join(chances),
+        difference.word,
+        _CLASSES[difference.word],
+    )
+
+
+def _p(chance: float) -> str:
+    return "< .001" if chance < 0.001 else f"{chance:.3f}"
+
+
+class ComparedSection(NamedTuple):
+    """One section of the page."""
+
+    name: str
+    rows: tuple[ComparedRow, ...]
+    figures: tuple[Figure, ...]
+    left_out: tuple[str, ...]
+    basis: tuple[str, ...]
+
+
+def compare_page(
+    abouts: tuple[RunHeader, RunHeader],
+    runs: Sequence[GazeTrace],
+    differences: Sequence[MeasureDifference],
+    figures: Sequence[Figure],
+) -> str:
+    """Return the page as HTML that needs no other file."""
+    sections = tuple(
+        ComparedSection(
+            group,
+            tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
+            tuple(p for p in figures if p.drawing.group == group),
+            _left_out(abouts, runs, group),
+            tuple(run.joints.basis(group) for run in runs),
+        )
+        for group in GROUPS
+    )
+    facts = [dict(about.facts) for about in abouts]
+    names = dict.fromkeys((*facts[0], *facts[1]))
+    lengths = [
+        f"{run.seconds:.1f} s, {len(run.saccades)} saccades, {len(run.blinks)} blinks"
+        for run in runs
+    ]
+    return render(
+        "compare.html", abouts=abouts, sections=sections,
+        facts=[("length", *lengths), *((name, *(of.get(name, "") for of in facts)) for name in names)],
+        differing=[d.a.band.title for d in differences if d.word == "more than chance"],
+        counts={word: sum(d.word == word for d in differences) for word in _CLASSES},
+        banners=banners(abouts, runs),
+    )  # fmt: skip
+
+
+def banners(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> tuple[str, ...]:
+    """Return the warnings at the top: runs that were not measured, or differ in that."""
+    messages = [
+        f"{about.name}: {text}"
+        for about, run in zip(abouts, runs, strict=True)
+        if (text := banner(run.joints))
+    ]
+    return (*messages, *filter(None, (mixed_basis_warning(abouts, runs),)))
+
+
+def mixed_basis_warning(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> str:
+    """Return a warning if one run is measured and the other estimated, "" otherwise."""
+    first, second = (run.joints.whole_basis for run in runs)
+    if first == second:
+        return ""
+    return (
+        f"{abouts[0].name} is {first} and {abouts[1].name} is {second}: differences may "
+        "come from the servos' feedback, not from the gaze"
+    )
+
+
+def _left_out(
+    abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace], group: str
+) -> tuple[str, ...]:
+    """Return the reasons for missing measures of a section, and the run of each reason."""
+    each = [dict.fromkeys(left_out(run.joints, group)) for run in runs]
+    both = [why for why in each[0] if why in each[1]]
+    return (
+        *both,
+        *(
+            f"{about.name}: {why}"
+            for about, reasons in zip(abouts, each, strict=True)
+            for why in reasons
+            if why not in both
+        ),
+    )

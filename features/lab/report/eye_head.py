@@ -73,19 +73,13 @@ def gaze_shifts(run: GazeTrace) -> list[Shift]:
         aside = float(np.median(goal[landing]) - head[window.start])
         sign = 1.0 if aside >= 0.0 else -1.0
         turned = sign * float(head[window.stop - 1] - head[window.start])
-        out.append(_shift(run, saccade.onset_s, sign, abs(aside), turned, sign * speed))
+        onset_s = saccade.onset_s
+        around = run.between(onset_s - _BEFORE_S, onset_s + _AFTER_S)
+        fast, near = sign * speed[around], t[around]
+        moving = np.flatnonzero((fast > _STARTS_DEG_S) & (near < onset_s + _SOON_S))
+        after = float(near[moving[0]] - onset_s) if len(moving) and turned >= _MOVES_DEG else nan
+        out.append(Shift(abs(aside), turned, after, float(fast.max())))
     return out
-
-
-def _shift(
-    run: GazeTrace, onset_s: float, sign: float, aside: float, turned: float, speed: Floats
-) -> Shift:
-    """Return a shift with the start and the speed of the head."""
-    window = run.between(onset_s - _BEFORE_S, onset_s + _AFTER_S)
-    t, fast = run.column("t")[window], speed[window]
-    moving = np.flatnonzero((fast > _STARTS_DEG_S) & (t < onset_s + _SOON_S))
-    after = float(t[moving[0]] - onset_s) if len(moving) and turned >= _MOVES_DEG else nan
-    return Shift(aside, turned, after, float(fast.max()))
 
 
 def stretches(mask: NDArray[np.bool_], t_s: Floats, shift: Floats, least_s: float) -> list[slice]:

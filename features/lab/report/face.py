@@ -129,6 +129,10 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     forbidden = never[moves[:, 0].astype(int), moves[:, 1].astype(int)].astype(float)
     lengths = np.array([visit.end_s - visit.start_s for visit in seen])
     meant = [(float(f.part is not None), f.duration_s) for f in run.fixations if f.kind == "face"]
+    rows = axes(run)
+    vergence = rows[:, 6]
+    good = (vergence >= -2.5) & (vergence <= 4.5)
+    within = np.maximum(rows[:, 4], rows[:, 5]) <= 0.5 * human.CONE_DEG
     return [
         MeasuredValue("on_parts", np.array(meant).reshape(-1, 2), _weighted_mean),
         MeasuredValue("part_share", parts, _share_difference),
@@ -137,17 +141,6 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("never_taken", forbidden, mean),
         MeasuredValue("transitions", moves, _transition_difference),
         MeasuredValue("heat", points(run), _heat_correlation),
-        *_axes(run),
-    ]
-
-
-def _axes(run: GazeTrace) -> list[MeasuredValue]:
-    """Measure the directions of both eyes, one row a fixation on a face."""
-    rows = axes(run)
-    vergence = rows[:, 6]
-    good = (vergence >= -2.5) & (vergence <= 4.5)
-    within = np.maximum(rows[:, 4], rows[:, 5]) <= 0.5 * human.CONE_DEG
-    return [
         MeasuredValue("left_mm", np.hypot(rows[:, 0], rows[:, 1]), median),
         MeasuredValue("right_mm", np.hypot(rows[:, 2], rows[:, 3]), median),
         MeasuredValue("in_cone", within.astype(float), mean),

@@ -164,14 +164,14 @@ def _pupils(figure: Figure, runs: Sequence[Shown]) -> None:
                 axes.add_patch(Circle((0, 0), radius, fill=False, ec=HUMAN, lw=1.0))
                 axes.text(0.0, radius, f"{text}", ha="center", va="bottom", fontsize=8,
                           color=HUMAN)  # fmt: skip
-            _spot(axes, rows[:, 2 * side : 2 * side + 2], shown.colour)
+            _scatter(axes, rows[:, 2 * side : 2 * side + 2], shown.colour)
             half = 1e3 * distance * np.tan(np.radians(3.2))
             axes.set_xlim(-half, half)
             axes.set_ylim(-half, half)
             axes.set_aspect("equal")
 
 
-def _spot(axes: Axes, points: Floats, colour: str) -> None:
+def _scatter(axes: Axes, points: Floats, colour: str) -> None:
     """Draw the points of one axis, their mean, and the ellipse of two standard deviations."""
     if len(points) < 3:
         axes.text(0, 0, "too few", ha="center", color=HUMAN)

@@ -233,7 +233,11 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
         R = face[0].R_world_face
         ahead = R[0][0], R[1][0], R[2][0]
         off_deg = degrees(angle_between(ahead, sub(head, face[0].p_world_m)))
-        gaze_at = _on_plane(face[0], since_s, head, way)
+        # Where the gaze meets the plane of the face, (y, z) from the nose.
+        moved = scale(face[0].v_world_m_s, since_s)
+        centre = add(add(face[0].p_world_m, moved), scale(ahead, PLANE_M))
+        if dot(way, sub(centre, head)) > 0.0:
+            gaze_at = on_face(head, way, centre, R) or gaze_at
         if target.kind == "face":
             on_left = on_face(left, sight_left, point, R) or on_left
             on_right = on_face(right, sight_right, point, R) or on_right
@@ -283,13 +287,3 @@ def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
     centre = add(found.p_world_m, scale(found.v_world_m_s, since_s))
     seen = beside_m(way, sub(centre, tick.pose.p_world_head_m)) <= NEAR_FACE_M
     return (found, captured_s), seen
-
-
-def _on_plane(face: Face, since_s: float, head: Vec3, way: Vec3) -> tuple[float, float]:
-    """Return the gaze's intersection with the face's plane, (y, z) from the nose, nan if none."""
-    R = face.R_world_face
-    out = scale((R[0][0], R[1][0], R[2][0]), PLANE_M)
-    centre = add(add(face.p_world_m, scale(face.v_world_m_s, since_s)), out)
-    if dot(way, sub(centre, head)) <= 0.0:
-        return nan, nan
-    return on_face(head, way, centre, R) or (nan, nan)

@@ -10,7 +10,6 @@ from gazerig.features.lab.report.plotting import COLOURS, Figure, label, png_of
 from gazerig.features.lab.report.statistics import number
 from gazerig.robot.analysis.mutual_gaze import (
     HeadPlace,
-    Mask,
     MutualGazeTrace,
     MutualLooks,
     bridged,
@@ -148,21 +147,21 @@ def _timeline(figure: Figure, looks: MutualLooks, names: tuple[str, str]) -> Non
     first, second = bridged(looks.t_s, looks.first), bridged(looks.t_s, looks.second)
     rows = ((first, COLOURS[0]), (first & second, _BOTH_GREEN), (second, COLOURS[1]))
     for row, (mask, colour) in enumerate(rows):
-        axes.broken_barh(_spans(looks, mask), (row - 0.36, 0.72), facecolors=colour, lw=0)
+        t_s = looks.t_s
+        axes.broken_barh(
+            [
+                (float(t_s[begin] - t_s[0]), float(t_s[min(end, len(t_s) - 1)] - t_s[begin]))
+                for begin, end in zip(*edges(mask), strict=True)
+            ],
+            (row - 0.36, 0.72),
+            facecolors=colour,
+            lw=0,
+        )
     axes.set_yticks(range(3), [f"{names[0]} looks", "both", f"{names[1]} looks"])
     axes.set_ylim(2.5, -0.5)
     axes.set_xlim(0.0, float(looks.t_s[-1] - looks.t_s[0]))
     axes.grid(False)
     label(axes, "s", "")
-
-
-def _spans(looks: MutualLooks, mask: Mask) -> list[tuple[float, float]]:
-    """Return start and length of each time with a true mask, seconds since the beginning."""
-    t_s = looks.t_s
-    return [
-        (float(t_s[begin] - t_s[0]), float(t_s[min(end, len(t_s) - 1)] - t_s[begin]))
-        for begin, end in zip(*edges(mask), strict=True)
-    ]
 
 
 def _text(value: object, unit: str) -> str:

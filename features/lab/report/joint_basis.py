@@ -61,12 +61,6 @@ _BLINKS = (
 )  # fmt: skip
 
 
-def _eyes_estimated(joints: JointBasis) -> bool:
-    return any("eye" in name for name in joints.estimated) and all(
-        name in joints.estimated for name in joints.names if "eye" in name
-    )
-
-
 _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     (
         (*_HEAD_PART, "head_roll", "vor"),
@@ -100,7 +94,10 @@ _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     ),
     (
         ("unasked",),
-        _eyes_estimated,
+        lambda joints: (
+            any("eye" in name for name in joints.estimated)
+            and all(name in joints.estimated for name in joints.names if "eye" in name)
+        ),
         "Saccades without a command are left out: an estimated eye follows its command, whatever "
         "the real eye does.",
     ),

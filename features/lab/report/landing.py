@@ -79,19 +79,13 @@ def landings(run: GazeTrace) -> Floats:
         if far < FAR_DEG:
             continue
         share = float((np.median(gaze[landed], axis=0) - gaze[first]) @ way) / far**2
-        rows.append((share, float(_is_corrected(jumps, number, t, shift))))
+        corrected = 0.0
+        if number + 1 < len(jumps):
+            next_s = jumps[number + 1, 0]
+            same = shift[np.searchsorted(t, next_s)] == shift[np.searchsorted(t, onset_s)]
+            corrected = float(same and _CORRECTION_S[0] <= next_s - end_s <= _CORRECTION_S[1])
+        rows.append((share, corrected))
     return np.array(rows).reshape(-1, 2)
-
-
-def _is_corrected(jumps: Floats, number: int, t: Floats, shift: Floats) -> bool:
-    """Return whether the next saccade follows soon and has the same target."""
-    if number + 1 >= len(jumps):
-        return False
-    after_s = jumps[number + 1, 0] - jumps[number, 1]
-    same = shift[np.searchsorted(t, jumps[number + 1, 0])] == shift[
-        np.searchsorted(t, jumps[number, 0])
-    ]  # fmt: skip
-    return bool(same and _CORRECTION_S[0] <= after_s <= _CORRECTION_S[1])
 
 
 def measures(run: GazeTrace) -> list[MeasuredValue]:

@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import Any, Literal, NamedTuple
 
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.reference_walk import ReferenceWalk
 

@@ -20,10 +20,9 @@ from gazerig.features.lab.report import (
     rests,
     saccades,
 )
-from gazerig.features.lab.report.files import write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.heads import MutualGazeReport
-from gazerig.features.lab.report.page import Figure, RunHeader, report_page
+from gazerig.features.lab.report.page import Figure, RunHeader, report_page, write_all
 from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, basis_text, png
 from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judge
 from gazerig.robot.analysis.human_norms import BY_KEY, applies

@@ -52,13 +52,16 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     every = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG]
     unasked = np.array([s.commanded is None for s in every], dtype=float)
     onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
+    ends = np.array([s.end_s for s in run.saccades if s.commanded is not None])
+    pauses = onsets[1:] - ends[:-1]
+    pauses = pauses[pauses < _PAUSE_S]
     skew = seen[:, 3] - human.peak_at(seen[:, 0])
     return [
         *(_share_inside(seen, asked, *curves) for curves in _CURVES),
         MeasuredValue("skew", skew, median),
         MeasuredValue("below_15", (seen[:, 0] < 15.0).astype(float), mean),
         MeasuredValue("rate", np.diff(onsets), one_over_mean),
-        MeasuredValue("too_soon", (_pauses(run) < _SOON_S).astype(float), mean),
+        MeasuredValue("too_soon", (pauses < _SOON_S).astype(float), mean),
         MeasuredValue("unasked", unasked, mean),
         MeasuredValue("rest_error", rest_errors(run), median),
     ]
@@ -86,15 +89,6 @@ def _share_inside(
         return fits.astype(float)
 
     return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
-
-
-def _pauses(run: GazeTrace) -> Floats:
-    """Return seconds from the end of each saccade to the next, for those that follow soon."""
-    asked = [s for s in run.saccades if s.commanded is not None]
-    ends = np.array([s.end_s for s in asked])
-    onsets = np.array([s.onset_s for s in asked])
-    pauses = onsets[1:] - ends[:-1]
-    return np.asarray(pauses[pauses < _PAUSE_S])
 
 
 def rest_errors(run: GazeTrace) -> Floats:

@@ -116,30 +116,20 @@ def axes_of(rig: Rig, settings: Sequence[str], read: Callable[[str, str], Value]
             raise SetupError(f"--set {setting}: not KEY=VALUES; values are {_FORMS}")
         if any(axis.key == key for axis in axes):
             raise SetupError(f"--set {key}: is given twice; give all values in one option")
+        if key in _OPTIONS:
+            raise SetupError(f"--set {key}: it acts while files are read; give {_OPTIONS[key]}")
         try:
-            axes.append(_axis(rig, _param(rig, known, key), text.strip(), read))
+            if key not in known:
+                held = value_of(rig, key)
+                inside = [one for one in known if one.startswith(f"{key}.")]
+                near = f"for example {inside[0]}" if inside else f"it is {held!r}"
+                raise SetupError(f"--set {key}: is no single value; name one, {near}")
+            axes.append(_axis(rig, known[key], text.strip(), read))
         except ConfigError as error:
             faults += error.faults
     if faults:
         raise ConfigError(faults)
     return axes
-
-
-def _param(rig: Rig, known: Mapping[str, Parameter], key: str) -> Parameter:
-    """Return the parameter at a key.
-
-    Raises:
-        ConfigError: there is none; the message names similar keys.
-        SetupError: the key acts only while files are read.
-    """
-    if key in _OPTIONS:
-        raise SetupError(f"--set {key}: it acts while files are read; give {_OPTIONS[key]}")
-    if key in known:
-        return known[key]
-    held = value_of(rig, key)
-    inside = [one for one in known if one.startswith(f"{key}.")]
-    near = f"for example {inside[0]}" if inside else f"it is {held!r}"
-    raise SetupError(f"--set {key}: is no single value; name one, {near}")
 
 
 def _axis(rig: Rig, param: Parameter, text: str, read: Callable[[str, str], Value]) -> Axis:
@@ -150,7 +140,17 @@ def _axis(rig: Rig, param: Parameter, text: str, read: Callable[[str, str], Valu
         SetupError: the text has none of the forms.
     """
     if spaced := _SPACED.fullmatch(text):
-        return _even_axis(param, text, *_ends(param, text, spaced), int(spaced[3]))
+        low, high = _ends(param, text, spaced)
+        steps = int(spaced[3])
+        if not 2 <= steps <= MAX_POINTS:
+            raise SetupError(f"--set {param.key}={text}: {steps} steps; wanted 2 to {MAX_POINTS}")
+        values = tuple(float(f"{x:.9g}") for x in np.linspace(low, high, steps))
+        if param.kind != "whole":
+            return Axis(param.key, values, unit=param.unit)
+        uneven = next((x for x in values if not x.is_integer()), None)
+        if uneven is not None:
+            raise SetupError(f"--set {param.key}={text}: {uneven:g} is no whole number")
+        return Axis(param.key, tuple(map(int, values)), unit=param.unit)
     if ends := _RANGE.fullmatch(text):
         low, high = _ends(param, text, ends)
         faults = [f for end in (low, high) for f in _out_of_bounds(rig, param, end)]
@@ -176,19 +176,6 @@ def _ends(param: Parameter, text: str, found: re.Match[str]) -> tuple[float, flo
     if not low < high:
         raise SetupError(f"--set {param.key}={text}: {low:g} is not below {high:g}")
     return low, high
-
-
-def _even_axis(param: Parameter, text: str, low: float, high: float, steps: int) -> Axis:
-    """Return the axis of ``steps`` values at equal distances."""
-    if not 2 <= steps <= MAX_POINTS:
-        raise SetupError(f"--set {param.key}={text}: {steps} steps; wanted 2 to {MAX_POINTS}")
-    values = tuple(float(f"{x:.9g}") for x in np.linspace(low, high, steps))
-    if param.kind != "whole":
-        return Axis(param.key, values, unit=param.unit)
-    uneven = next((x for x in values if not x.is_integer()), None)
-    if uneven is not None:
-        raise SetupError(f"--set {param.key}={text}: {uneven:g} is no whole number")
-    return Axis(param.key, tuple(map(int, values)), unit=param.unit)
 
 
 def _out_of_bounds(rig: Rig, param: Parameter, end: float) -> Sequence[ConfigFault]:

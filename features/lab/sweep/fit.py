@@ -151,17 +151,16 @@ def trial_of(point: Point, outcomes: Sequence[Outcome], counted: Sequence[str]) 
     failed = next((one.failed for one in outcomes if one.failed), "")
     if failed:
         return Trial(point, len(counted) + 1.0, float(len(counted)), failed)
-    rows = [[_measure_grade(one, key) for key in counted] for one in outcomes]
-    score = sum(map(sum, rows)) / len(rows)
-    return Trial(point, score, sum(x > 0.0 for row in rows for x in row) / len(rows))
-
-
-def _measure_grade(outcome: Outcome, key: str) -> float:
-    """Return the grade of a measure outside its band, 1 if too few events are left."""
-    verdict, value = outcome.figures.get(f"{VERDICT}{key}"), outcome.figures.get(f"{REPORT}{key}")
-    if verdict not in _JUDGED or not isinstance(value, int | float):
-        return 1.0
-    return grade(value, BY_KEY[key].low, BY_KEY[key].high) if verdict == "outside" else 0.0
+    grades = []
+    for one in outcomes:
+        for key in counted:
+            verdict, value = one.figures.get(f"{VERDICT}{key}"), one.figures.get(f"{REPORT}{key}")
+            if verdict not in _JUDGED or not isinstance(value, int | float):
+                grades.append(1.0)  # too few events are left
+            elif verdict == "outside":
+                grades.append(grade(value, BY_KEY[key].low, BY_KEY[key].high))
+    n = len(outcomes)
+    return Trial(point, sum(grades) / n, sum(x > 0.0 for x in grades) / n)
 
 
 def _key(point: Point) -> str:

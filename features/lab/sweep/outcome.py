@@ -112,7 +112,10 @@ def rows_of(outcomes: Sequence[Outcome]) -> tuple[list[str], list[list[Any]]]:
     figures = columns_of(outcomes)
     rows = [
         [
-            *(_cell(one.point.get(key)) for key in keys),
+            *(
+                json.dumps(v) if isinstance(v, list | tuple | dict) else v  # lists as JSON
+                for v in map(one.point.get, keys)
+            ),
             one.seed,
             one.failed,
             *(one.figures.get(name) for name in figures),
@@ -154,8 +157,3 @@ def _column(values: list[Any]) -> list[Any]:
     if len(kinds) > 1:
         return [None if value is None else str(value) for value in values]
     return values
-
-
-def _cell(value: object) -> object:
-    """Return a parameter's value as one cell: lists as JSON."""
-    return json.dumps(value) if isinstance(value, list | tuple | dict) else value

@@ -1,22 +1,131 @@
-"""Runs at points times seeds on all processors; each is written to the disk when it ends."""
+"""Runs at points times seeds on all processors; each is written to the disk when it ends.
+
+In the folder of a sweep, ``arguments.json`` contains everything that affects the runs, and
+``runs.jsonl`` one line for each finished run. A second sweep with the same arguments continues an
+interrupted one.
+"""
 
 import contextlib
+import fcntl
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import gazerig
+from gazerig.config.export import abbreviated
 from gazerig.config.parameters import plain
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import gestures_text, params_text, walk_text
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.lab.sweep.axes import Axis, Point
 from gazerig.features.lab.sweep.outcome import Outcome
-from gazerig.features.lab.sweep.run_store import RunStore, run_store
 from gazerig.features.lab.sweep.worker_pool import Job, Simulation, WorkerPool, processors
 from gazerig.robot.app.options import RunOptions
 
 Progress = Callable[[int, int], None]
 """Receives the number of finished runs, and of all runs."""
+
+ARGUMENTS, RUNS = "arguments.json", "runs.jsonl"
+_SHOWN = 4
+
+Arguments = Mapping[str, object]
+"""Name -> JSON value; nested mappings are compared key by key."""
+
+
+class RunStore:
+    """Finished runs on the disk, by point and seed.
+
+    Args:
+        folder: the folder of the sweep.
+        file: ``RUNS`` in it, open for appending and locked.
+    """
+
+    def __init__(self, folder: Path, file: BinaryIO) -> None:
+        self.folder, self._file = folder, file
+        self._found = dict[str, Outcome]()
+        self._file.seek(0)
+        whole = 0
+        for line in self._file:
+            try:
+                point, seed, figures, failed = json.loads(line)
+            except ValueError:
+                break
+            whole += len(line)
+            self._found[_key(point, seed)] = Outcome(point, seed, figures, failed)
+        self._file.truncate(whole)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def get(self, point: Point, seed: int) -> Outcome | None:
+        """Return a finished run, None if there is none."""
+        return self._found.get(_key(point, seed))
+
+    def add(self, outcome: Outcome) -> None:
+        """Write a finished run."""
+        self._found[_key(outcome.point, outcome.seed)] = outcome
+        # No fsync for each run: a power loss may lose runs, an end of the program does not.
+        self._file.write(json.dumps(list(outcome[:4])).encode() + b"\n")
+        self._file.flush()
+
+
+@contextlib.contextmanager
+def run_store(folder: Path, arguments: Arguments) -> Iterator[RunStore]:
+    """Open the folder of a sweep, a new one or one with the same arguments.
+
+    Raises:
+        SetupError: the folder contains a sweep with other arguments or other files, another program
+            writes in it, or it cannot be written.
+    """
+    make_folder(folder)
+    path = folder / ARGUMENTS
+    text = json.dumps(arguments, indent=1) + "\n"
+    if path.exists():
+        try:
+            then = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise SetupError(f"{path} is not readable ({error}): give another --out") from None
+        if not isinstance(then, dict):
+            raise SetupError(f"{path} is no sweep's: give another --out")
+        if found := list(_differences(then, json.loads(text))):
+            more = f"; {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+            raise SetupError(
+                f"{folder} holds a sweep with other arguments: {'; '.join(found[:_SHOWN])}{more}; "
+                "repeat those, or give another folder with --out"
+            )
+    elif any(folder.iterdir()):
+        raise SetupError(f"{folder} holds other files: give an empty folder with --out")
+    try:
+        file = (folder / RUNS).open("a+b")
+    except OSError as error:
+        raise SetupError(f"cannot write {folder / RUNS} ({error.strerror})") from error
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise SetupError(
+                f"another gazerig sweep writes in {folder}: give another --out"
+            ) from None
+        if not path.exists():
+            write_file(path, text)
+        yield RunStore(folder, file)
+
+
+def _differences(then: object, now: object, key: str = "") -> Iterator[str]:
+    """Yield the differences of two JSON values, as text."""
+    if isinstance(then, dict) and isinstance(now, dict):
+        for name in {**then, **now}:
+            below = f"{key}.{name}" if key else str(name)
+            yield from _differences(then.get(name), now.get(name), below)
+    elif then != now:
+        yield f"{key} was {abbreviated(then)}, is now {abbreviated(now)}"
+
+
+def _key(point: Point, seed: int) -> str:
+    return json.dumps([point, seed])
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,10 @@ class WorkerPool:
             while waiting or busy:
                 if self._stopped() is not None:
                     raise SweepInterrupted
-                for worker in self._idle(busy, len(waiting)):
+                while len(self._workers) < min(self._jobs, len(busy) + len(waiting)):
+                    self._workers.append(self._start())
+                idle = [worker for worker in self._workers if worker not in busy]
+                for worker in idle[: len(waiting)]:
                     busy[worker] = number = waiting.pop()
                     worker.send(json.dumps([number, *runs[number]]).encode() + b"\n")
                     selector.register(worker.answers, selectors.EVENT_READ, worker)
@@ -130,12 +133,6 @@ class WorkerPool:
                     selector.unregister(key.fileobj)
                     number = busy.pop(key.data)
                     yield number, self._answer(key.data, *runs[number])
-
-    def _idle(self, busy: dict[_Worker, int], wanted: int) -> list[_Worker]:
-        """Return processes without a run, as many as are wanted and allowed."""
-        while len(self._workers) < min(self._jobs, len(busy) + wanted):
-            self._workers.append(self._start())
-        return [worker for worker in self._workers if worker not in busy][:wanted]
 
     def _start(self) -> _Worker:
         stderr = tempfile.TemporaryFile()  # noqa: SIM115  # closed with its process
