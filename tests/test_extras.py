@@ -9,7 +9,7 @@ import pytest
 from features_there import needs_all_features
 from light_python import LightPython
 
-from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.errors import extra_hint
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.affine import affine_residual, fit_affine_warp, patch_motion
 from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.lucas_kanade import (
+    affine_residual,
+    fit_affine_warp,
+    patch_motion,
+)
 from gazerig.drivers.vision.motion.params import MotionParams
 
 WIDTH, HEIGHT, FOCAL, DT_S = 320, 240, 233.0, 1 / 30

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from recorded_run import info_for
 
-from gazerig.drivers.files.mcap_file import MAGIC
+from gazerig.drivers.files.file_input import MAGIC
 from gazerig.drivers.process.passed_image import copied, receive
 from gazerig.robot.control.tick_stream import encode
 from gazerig.robot.model.clock import SimulatedClock

@@ -160,7 +160,9 @@ class FrameRateMonitor:
         before_s, self._before_s = self._before_s, captured_s
         if before_s is None or captured_s <= before_s:
             return ""
-        if away_s <= _PROMPT * (captured_s - before_s) and self._prompt(away_s):
+        if away_s <= _PROMPT * (captured_s - before_s) and (
+            self._stated_hz == 0.0 or away_s <= _PROMPT / self._stated_hz
+        ):
             self._intervals_s.append(captured_s - before_s)
         rate_hz = self.measured_hz
         if rate_hz is None or self._stated_hz == 0.0:
@@ -175,7 +177,3 @@ class FrameRateMonitor:
             f"{self._name} states {self._stated_hz:g} frames a second and delivers {rate_hz:.1f}: "
             "the times of its frames are measured; more light makes many cameras faster"
         )
-
-    def _prompt(self, away_s: float) -> bool:
-        """Return whether the reader was back before a frame could be missed."""
-        return self._stated_hz == 0.0 or away_s <= _PROMPT / self._stated_hz

@@ -69,7 +69,9 @@ def depth_at(
     valid = np.sort(seen[np.isfinite(seen) & (seen >= _NEAREST_M)])
     if not valid.size:
         return _NOTHING
-    layer = _nearest_layer(valid)
+    # The nearest run of distances without a gap.
+    layers = np.split(valid, np.flatnonzero(np.diff(valid) > _GAP * valid[:-1]) + 1)
+    layer = next((one for one in layers if one.size >= _LEAST_SHARE * valid.size), valid)
     distance_m = float(np.median(layer))
     spread_m = _SIGMAS * float(np.median(np.abs(layer - distance_m)))
     return DepthReading(distance_m, spread_m, layer.size / seen.size)
@@ -102,13 +104,3 @@ def resize_depth(depth_m: Depth, width_px: int, height_px: int) -> Depth:
     found = np.asarray(cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST), np.float32)
     found.setflags(write=False)
     return found
-
-
-def _nearest_layer(valid_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the nearest run of sorted distances without a gap."""
-    gaps = np.flatnonzero(np.diff(valid_m) > _GAP * valid_m[:-1]) + 1
-    layers = np.split(valid_m, gaps)
-    for layer in layers:
-        if layer.size >= _LEAST_SHARE * valid_m.size:
-            return layer
-    return valid_m

@@ -17,7 +17,7 @@ from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_timestamps import VideoPacing, VideoTimestamps
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.files.mcap_file import MAGIC, open_mcap
+from gazerig.drivers.files.file_input import MAGIC, open_mcap
 
 _HEAD = 9  # bytes of a record before its content: kind and length
 _LARGEST = 1 << 30  # bytes of a message; more is damage

@@ -42,7 +42,13 @@ class RecordingWriter:
         """
         self._path = path
         self._jpeg_quality = jpeg_quality
-        self._file = _create(path, over)
+        refuse_existing(path, force=over)
+        try:
+            self._file: IO[bytes] = path.open("wb" if over else "xb")
+        except OSError as error:
+            raise CameraError(
+                f"cannot write {path} ({error.strerror}): name another file"
+            ) from error
         self._writer = Writer(
             self._file,
             compression=CompressionType.NONE,
@@ -50,10 +56,11 @@ class RecordingWriter:
             use_chunking=False,
         )
         self._writer.start(profile=PROFILE, library="gazerig")
-        self._channels = {
-            topic: self._writer.register_channel(topic, "json", self._schema(topic))
-            for topic in SCHEMAS
-        }
+        self._channels: dict[str, int] = {}
+        for topic, (name, schema) in SCHEMAS.items():
+            text = json.dumps(schema).encode("ascii")
+            number = self._writer.register_schema(name, "jsonschema", text)
+            self._channels[topic] = self._writer.register_channel(topic, "json", number)
         self._writer.add_metadata("gazerig", about)
         self._file.flush()
         self._synced_ns = 0
@@ -89,21 +96,6 @@ class RecordingWriter:
                 self._writer.finish()  # type: ignore[no-untyped-call]
             finally:
                 self._file.close()
-
-    def _schema(self, topic: str) -> int:
-        """Declare the schema of a topic."""
-        name, schema = SCHEMAS[topic]
-        text = json.dumps(schema).encode("ascii")
-        return int(self._writer.register_schema(name, "jsonschema", text))
-
-
-def _create(path: Path, over: bool) -> IO[bytes]:
-    """Create the file."""
-    refuse_existing(path, force=over)
-    try:
-        return path.open("wb" if over else "xb")
-    except OSError as error:
-        raise CameraError(f"cannot write {path} ({error.strerror}): name another file") from error
 
 
 _ENCODERS = 2  # PNG of colour and depth takes most of a frame's time; OpenCV frees the GIL

@@ -260,18 +260,10 @@ def indirect_blocks(model: DynamixelModel, firmware: int) -> tuple[IndirectBlock
 
 def registers_of(model: DynamixelModel) -> tuple[DynamixelRegister, ...]:
     """Return a model's registers with its initial values and ranges (no indirect windows)."""
-    fitted = (_fit(register, model) for register in _BASE)
-    return tuple(register for register in fitted if register is not None)
-
-
-def _fit(register: DynamixelRegister, model: DynamixelModel) -> DynamixelRegister | None:
-    """Return the model's version of a register, None if it has none."""
-    name = register.name
-    if model.current_limit is None and name in ("current_limit", "goal_current"):
-        return None
-    if model.family == "x430" and name == "pwm_slope":
-        return None
-    initial = {
+    absent = {"pwm_slope"} if model.family == "x430" else set[str]()
+    if model.current_limit is None:
+        absent |= {"current_limit", "goal_current"}
+    initial: dict[str, int | None] = {
         "model_number": model.number,
         "temperature_limit": model.temperature_limit,
         "max_voltage_limit": model.max_voltage,
@@ -281,17 +273,23 @@ def _fit(register: DynamixelRegister, model: DynamixelModel) -> DynamixelRegiste
         "pwm_slope": 255 if model.name.startswith("xc330-t") else 140,
         "shutdown": model.shutdown,
         **dict(zip(GAINS, model.gains, strict=True)),
-    }.get(name, register.initial)
+    }
     small = model.family == "x330"
-    low, high = {
+    ranges = {
         "baud_rate": (0, 6 if small else 7),
         "protocol_type": (2, 22) if small else (1, 2),
         "max_voltage_limit": (_lowest_voltage(model), model.max_voltage),
         "min_voltage_limit": (_lowest_voltage(model), model.max_voltage),
         "current_limit": (0, model.current_limit or 0),
         "velocity_limit": (0, 2047 if small else 1023),
-    }.get(name, (register.low, register.high))
-    return register._replace(initial=initial, low=low, high=high)
+    }
+    fitted = []
+    for one in _BASE:
+        if one.name not in absent:
+            low, high = ranges.get(one.name, (one.low, one.high))
+            first = initial.get(one.name, one.initial)
+            fitted.append(one._replace(initial=first, low=low, high=high))
+    return tuple(fitted)
 
 
 def _lowest_voltage(model: DynamixelModel) -> int:

@@ -166,32 +166,18 @@ def read_plan(
 ) -> ReadPlan:
     """Return the read plan for servos with this firmware; None: not known yet."""
     alone = WindowSchedule(_ALONE, _ALONE)
-    block = _common_block(setups, firmware) if params.indirect_block else None
-    fast = params.fast_sync_read and _all_fast(setups, firmware)
-    packets = FastSyncRead if fast else None
-    if block is None:
+    known = [(MODELS[s.model], firmware[s.id]) for s in setups] if firmware else []
+    fast = bool(known) and all(version >= FAST_READ_SINCE[m.family] for m, version in known)
+    packets = FastSyncRead if params.fast_sync_read and fast else None
+    blocks = [indirect_blocks(model, version)[0] for model, version in known]
+    # All servos must have the indirect block at the same address.
+    same = len({(one.address_base, one.data_base) for one in blocks}) == 1
+    if not params.indirect_block or not same:
         return ReadPlan(direct_windows(), alone, alone, packets, covered=False)
+    block = blocks[0]
     data = struct.pack(f"<{len(INDIRECT_MAP)}H", *INDIRECT_MAP)
     layout = AddressMap(block.address_base, data)
     return ReadPlan(indirect_windows(block), alone, alone, packets, block=layout)
-
-
-def _all_fast(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> bool:
-    """Return whether all servos support fast sync read."""
-    if not firmware:
-        return False
-    return all(firmware[s.id] >= FAST_READ_SINCE[MODELS[s.model].family] for s in setups)
-
-
-def _common_block(
-    setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None
-) -> IndirectBlock | None:
-    """Return the indirect block that all servos have at the same address, None if there is none."""
-    if not firmware:
-        return None
-    blocks = [indirect_blocks(MODELS[s.model], firmware[s.id])[0] for s in setups]
-    same = len({(block.address_base, block.data_base) for block in blocks}) == 1
-    return blocks[0] if same else None
 
 
 def direct_windows() -> WindowSchedule:

@@ -118,7 +118,10 @@ def port_users(device: str, host: Host | None = None) -> tuple[str, ...]:
     found = []
     for process in sorted((host or Host()).processes.glob("[0-9]*")):
         if process.name != own and real in _open_files(process):
-            found.append(f"{_program(process)} (process {process.name})")
+            program = "a program"
+            with contextlib.suppress(OSError, ValueError):
+                program = (process / "comm").read_text(encoding="utf-8").strip()
+            found.append(f"{program} (process {process.name})")
     return tuple(found)
 
 
@@ -130,13 +133,6 @@ def _open_files(process: Path) -> Iterable[str]:
             with contextlib.suppress(OSError):
                 files.append(os.readlink(link))
     return files
-
-
-def _program(process: Path) -> str:
-    try:
-        return (process / "comm").read_text(encoding="utf-8").strip()
-    except (OSError, ValueError):
-        return "a program"
 
 
 # --- latency timer of FTDI adaptors

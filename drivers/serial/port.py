@@ -163,7 +163,13 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
                 return
             data = data[sent:]
             deadline_s = deadline_s or time.monotonic() + WRITE_S
-            self._wait_for_room(deadline_s)
+            # Sleep until a byte can be sent.
+            try:
+                ready = select.select((), (self._fd,), (), max(0.0, deadline_s - time.monotonic()))
+            except (OSError, ValueError) as error:
+                raise self._lost(error) from error
+            if not ready[1]:
+                raise self._lost("it accepts no more bytes")
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` bytes, those received before the deadline.
@@ -248,15 +254,6 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             return bool(select.select((self._fd,), (), (), left_s)[0])
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
-
-    def _wait_for_room(self, deadline_s: float) -> None:
-        """Sleep until a byte can be sent."""
-        try:
-            ready = select.select((), (self._fd,), (), max(0.0, deadline_s - time.monotonic()))
-        except (OSError, ValueError) as error:
-            raise self._lost(error) from error
-        if not ready[1]:
-            raise self._lost("it accepts no more bytes")
 
     def _take(self, length: int) -> bytes:
         try:

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from gazerig.drivers.camera.quiet_opencv import quiet_stderr
-from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.errors import ModelFileError, extra_hint
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.extras import extra_hint
 from gazerig.drivers.types import (
     DetectedFace,
     DetectedPalm,

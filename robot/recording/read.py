@@ -18,7 +18,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, DataEnd, Header, Metadata
 
 from gazerig.drivers.errors import DriverError, SetupError
-from gazerig.drivers.files.mcap_file import MAGIC, open_mcap
+from gazerig.drivers.files.file_input import MAGIC, open_mcap
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import run_format as fmt

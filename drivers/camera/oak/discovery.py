@@ -8,8 +8,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from gazerig.drivers.errors import CameraError
-from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.errors import CameraError, extra_hint
 
 UDEV_RULE = 'SUBSYSTEM=="usb", ATTRS{idVendor}=="03e7", MODE="0666"'
 """Rule that gives all users access to the camera (Luxonis documentation, troubleshooting)."""

@@ -19,14 +19,17 @@ from gazerig.drivers.camera.oak.calibration import (
 )
 from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
 from gazerig.drivers.camera.oak.gyro import Gyro
-from gazerig.drivers.camera.oak.messages import depth_of, faces_of, image_of, lens_of
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
     COLOUR,
     MakeNodes,
+    depth_of,
     device_nodes,
+    faces_of,
+    image_of,
     imu_queue,
     join_outputs,
+    lens_of,
 )
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError

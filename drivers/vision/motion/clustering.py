@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.affine import affine_residual
 from gazerig.drivers.vision.motion.image import Floats, Grey
+from gazerig.drivers.vision.motion.lucas_kanade import affine_residual
 from gazerig.drivers.vision.motion.optical_flow import Flow, Mask
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import MotionMask

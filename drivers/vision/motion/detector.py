@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.affine import PatchMotion, fit_affine_warp, patch_motion
 from gazerig.drivers.vision.motion.backprojection import (
     back_project,
     distance,
@@ -52,7 +51,10 @@ from gazerig.drivers.vision.motion.image import (
 from gazerig.drivers.vision.motion.lucas_kanade import (
     BackgroundWarp,
     Level,
+    PatchMotion,
     blur_images,
+    fit_affine_warp,
+    patch_motion,
     refine_warp,
 )
 from gazerig.drivers.vision.motion.optical_flow import (
@@ -272,9 +274,8 @@ class MotionDetector:
         follow.offset = point - follow.centre
         p = back_project(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
-        edges = _edges(group, *now.grey.shape[:2])
         # A thing that the edge of the image cuts does not grow when more of it becomes visible.
-        growth_sd = np.inf if any(edges) else motion.growth_sd
+        growth_sd = np.inf if _is_cut(group, now.grey.shape) else motion.growth_sd
         loom = _shrink(motion.growth, growth_sd) / dt_s
         fastest_px, fastest_flow = fastest_quarter(group)
         at = back_project(fastest_px, far.z_m, now.K)
@@ -318,7 +319,7 @@ def at_level(params: MotionParams, now: SmallImage) -> MotionParams:
 def _motion_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> float:
     """Return the approximate root mean square motion of a patch's pixels."""
     slide = float(np.hypot(*motion.slide_px))
-    if any(_edges(group, *shape[:2])):
+    if _is_cut(group, shape):
         return slide  # its growth is unknown
     growth = _shrink(motion.growth, motion.growth_sd)
     spin = _shrink(motion.spin_rad, motion.spin_sd)
@@ -327,20 +328,11 @@ def _motion_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> flo
     )
 
 
-class _Edges(NamedTuple):
-    """Edges of the image beyond which a patch continues."""
-
-    left: bool
-    top: bool
-    right: bool
-    bottom: bool
-
-
-def _edges(group: Group, rows: int, columns: int) -> _Edges:
-    """Return the edges of the small image that a patch reaches."""
+def _is_cut(group: Group, shape: tuple[int, ...]) -> bool:
+    """Return whether a patch continues beyond an edge of the small image."""
     x, y, width, height = group.box
-    near = _CUT_PX
-    return _Edges(x <= near, y <= near, x + width >= columns - near, y + height >= rows - near)
+    across, down = shape[1] - _CUT_PX, shape[0] - _CUT_PX
+    return min(x, y) <= _CUT_PX or x + width >= across or y + height >= down
 
 
 def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:

@@ -11,8 +11,8 @@ from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
-from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.model_files import detector_status
 from gazerig.features.bringup.cli import ports as bench
 from gazerig.features.bringup.cli.ports import (
     JsonOption,

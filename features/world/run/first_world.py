@@ -8,8 +8,7 @@ reason.
 import sys
 from importlib.util import find_spec
 
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.gl_context import open_context
 
 ROOM = "--world living-room"

@@ -6,8 +6,7 @@ from tempfile import TemporaryDirectory
 
 from gazerig.config.load import ConfigError, load
 from gazerig.config.save_text import params_text
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.run.run_world import mjcf_of, world_script

@@ -30,8 +30,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.config.load import ConfigError, ConfigFault, load
 from gazerig.config.schema import load_rig, rig_path
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.room import HOME
 from gazerig.features.world.script_faults import CHECKS
