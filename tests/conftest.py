@@ -16,6 +16,7 @@ import forked_workers
 import pytest
 import running_order
 import shared_compiling
+import skipped_tests
 import starvation
 from _pytest.runner import runtestprotocol
 from hypothesis import settings
@@ -101,6 +102,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if "pty" in cases or _PTY & vars(getattr(item, "module", object)).keys():
             item.add_marker("pty")
     items[:] = running_order.spread(items)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the groups of skipped tests."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = [str(report.longrepr[2]) for report in skipped if isinstance(report.longrepr, tuple)]
+    for line in skipped_tests.groups(reasons):
+        terminalreporter.write_line(line)
 
 
 @pytest.hookimpl(optionalhook=True)
