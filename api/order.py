@@ -28,15 +28,12 @@ class OrderHost(Protocol):
 
     def _progress(self) -> Progress:
         """Return the owner of gaze and joints, and the newest gesture."""
-        ...
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         """Let the head's time pass until a condition is true, or at most ``seconds``."""
-        ...
 
     def _release_control(self) -> None:
         """Let the head choose its targets again."""
-        ...
 
 
 class Order:

@@ -21,7 +21,6 @@ class OpenHead(Protocol):
 
     def end(self, reason: str) -> None:
         """Ask the head to park; a second call skips the rest of parking."""
-        ...
 
 
 class ProgramSignals:

@@ -138,7 +138,6 @@ class ServoBus(Protocol):
             PortError: the port cannot be opened.
             ServoMissing: servos are absent or of another model.
         """
-        ...
 
     def read(self, now_s: float) -> Feedback:
         """Read all servos in one exchange.
@@ -149,7 +148,6 @@ class ServoBus(Protocol):
         Raises:
             BusLost: no servo has answered for longer than ``give_up_s``.
         """
-        ...
 
     def enable_torque(self) -> tuple[int, ...]:
         """Set every goal to the present position (clipped to its limits), then switch torque on.
@@ -157,35 +155,27 @@ class ServoBus(Protocol):
         Returns:
             The goals that are now active, in steps.
         """
-        ...
 
     def write(self, goals_steps: Sequence[int]) -> None:
         """Send one goal to every servo in one packet; goals are clipped to the limits."""
-        ...
 
     def faults(self) -> tuple[str, ...]:
         """Return the latched servo faults, one line each, e.g. "servo 7: overload"."""
-        ...
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, e.g. "servo 3 restarted: set up again"."""
-        ...
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Store setups, with the same ids and models, for the next time torque is switched on."""
-        ...
 
     def disable_torque(self) -> None:
         """Switch torque off on every servo; never raises for a servo that does not answer."""
-        ...
 
     def health(self) -> BusHealth:
         """Return byte and error counts."""
-        ...
 
     def close(self) -> None:
         """Close the port."""
-        ...
 
 
 class Clothing(NamedTuple):
@@ -498,7 +488,6 @@ class Camera(Protocol):
         Raises:
             CameraError: it cannot be opened; the message names the device and the remedy.
         """
-        ...
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections available at ``now_s``, or None before the first.
@@ -506,15 +495,12 @@ class Camera(Protocol):
         Raises:
             CameraError: the source has failed permanently.
         """
-        ...
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, e.g. "camera lost: trying it again"."""
-        ...
 
     def close(self) -> None:
         """Stop and free the source; safe to call twice."""
-        ...
 
 
 class FaceDetector(Protocol):
@@ -522,4 +508,3 @@ class FaceDetector(Protocol):
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return faces, the largest first, in pixels of the image."""
-        ...

@@ -117,8 +117,12 @@ def test_camera_that_gives_nothing_is_refused_and_freed(device):
     assert silent.released
 
 
-def test_wishes_reach_the_camera(device):
-    capture = Capture()
+@pytest.fixture
+def capture():
+    return Capture()
+
+
+def test_wishes_reach_the_camera(capture, device):
     opened(device, capture)
     assert capture.wishes[cv2.CAP_PROP_FRAME_WIDTH] == 800
     assert capture.wishes[cv2.CAP_PROP_FRAME_HEIGHT] == 600
@@ -145,15 +149,13 @@ def test_pictures_are_counted_and_fresh(device):
     assert not present(shots[0]).image.flags.writeable
 
 
-def test_a_few_failures_are_skipped(device):
-    capture = Capture()
+def test_a_few_failures_are_skipped(capture, device):
     camera = opened(device, capture)
     capture.failures, capture.empty = 2, 2
     assert present(camera.take(lambda: 1.0, GO_ON)).number == 1
 
 
-def test_lasting_failure_means_the_camera_is_gone(device):
-    capture = Capture()
+def test_lasting_failure_means_the_camera_is_gone(capture, device):
     camera = opened(device, capture)
     capture.failures = 10**6
     with pytest.raises(CameraError, match="no more frames"):
@@ -166,8 +168,7 @@ def test_stop_ends_the_waiting(device):
     assert opened(device, Capture()).take(lambda: 1.0, stop) is None
 
 
-def test_closed_camera_says_so(device):
-    capture = Capture()
+def test_closed_camera_says_so(capture, device):
     camera = opened(device, capture)
     camera.close()
     camera.close()
@@ -235,8 +236,7 @@ def test_camera_that_states_no_rate_cannot_lie(device):
         np.full((4, 6, 3), 7, np.uint8),
     ],
 )
-def test_grey_alpha_and_deep_pictures_become_colour(device, picture):
-    capture = Capture()
+def test_grey_alpha_and_deep_pictures_become_colour(capture, device, picture):
     capture.picture = picture
     shot = opened(device, capture).take(lambda: 1.0, GO_ON)
     assert present(shot).image.shape == (4, 6, 3)
@@ -247,8 +247,7 @@ def test_grey_alpha_and_deep_pictures_become_colour(device, picture):
     "picture",
     [np.zeros((4, 6, 2), np.uint8), np.zeros((4, 6, 3), np.float32), np.zeros(5, np.uint8)],
 )
-def test_pictures_of_no_known_kind_count_as_failures(device, picture):
-    capture = Capture()
+def test_pictures_of_no_known_kind_count_as_failures(capture, device, picture):
     camera = opened(device, capture)
     capture.picture = picture
     with pytest.raises(CameraError, match="no more frames"):
@@ -319,8 +318,7 @@ def test_a_device_without_controls_is_asked_for_nothing_by_default(device):
     assert len(events_with(device, WebcamParams(gain=3))) == 1
 
 
-def test_format_that_the_camera_does_not_take_is_told_once(device):
-    capture = Capture()
+def test_format_that_the_camera_does_not_take_is_told_once(capture, device):
     capture.format = "YUYV"
     camera = opened(device, capture)
     (line,) = camera.events()

@@ -24,7 +24,6 @@ class Exchange(Protocol):
     @property
     def errors(self) -> Counter[str]:
         """Return the error counts by kind; other parts of the bus may add to them."""
-        ...
 
 
 class BusSupervisor(Protocol):

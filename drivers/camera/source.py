@@ -42,7 +42,6 @@ class FrameSource(Protocol):
         Raises:
             CameraError: it cannot be opened; the message names it and the remedy.
         """
-        ...
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for a frame newer than the last one; return None if ``stop`` was set meanwhile.
@@ -50,15 +49,12 @@ class FrameSource(Protocol):
         Raises:
             CameraError: there will be no more frames.
         """
-        ...
 
     def events(self) -> tuple[str, ...]:
         """Return events for the user since the last call, one line each."""
-        ...
 
     def close(self) -> None:
         """Free the device or file; safe to call twice."""
-        ...
 
 
 def to_bgr(pixels: Any) -> ImageArray | None:

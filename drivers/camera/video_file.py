@@ -42,11 +42,9 @@ class VideoReader(Protocol):
 
     def image(self, number: int) -> ImageArray:
         """Return a frame, counted through all repeats, not before the last one returned."""
-        ...
 
     def close(self) -> None:
         """Free the file."""
-        ...
 
 
 def open_video(path: Path) -> VideoReader:

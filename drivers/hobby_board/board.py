@@ -23,12 +23,10 @@ class BoardLine(Exchange, Protocol):
     @property
     def lateness(self) -> HostLateness:
         """Return the counter of answers after their time-outs."""
-        ...
 
     @property
     def port(self) -> BusPort:
         """Return the port."""
-        ...
 
 
 class BoardTexts(NamedTuple):
@@ -88,27 +86,22 @@ class Board(Protocol):
     @property
     def line(self) -> BoardLine:
         """Return the line to the board."""
-        ...
 
     @property
     def texts(self) -> BoardTexts:
         """Return the texts of messages about the board."""
-        ...
 
     @property
     def timing(self) -> Timing:
         """Return the board's time limits."""
-        ...
 
     @property
     def damage(self) -> Sequence[str]:
         """Return the kinds of errors that noise causes."""
-        ...
 
     @property
     def params(self) -> HobbyBoardParams:
         """Return its parameters from the rig file."""
-        ...
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
         """Find the board and return the pulses of these servos; nothing moves.
@@ -116,7 +109,6 @@ class Board(Protocol):
         Raises:
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
-        ...
 
     def prepare(self, log: EventLog) -> None:
         """Prepare the board for goals, before any is sent.
@@ -124,39 +116,30 @@ class Board(Protocol):
         Raises:
             ServoMissing: it does not answer.
         """
-        ...
 
     def look(self, channel: Channel) -> ChannelStatus | None:
         """Read one channel's pulse and the board's errors; None without an answer."""
-        ...
 
     def wake(self) -> tuple[str, ...] | None:
         """Read the errors of a board after a long silence; None without an answer."""
-        ...
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Return the confirmed present pulses of channels; None after a failure."""
-        ...
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
         """Arm the speed limits of channels; return False if a requested confirmation fails."""
-        ...
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send the goals of channels."""
-        ...
 
     def resend_pulses(self, channels: Sequence[Channel]) -> None:
         """Hold the pulses while the board does not answer, if that is safe."""
-        ...
 
     def lead(self, channels: Sequence[Channel]) -> None:
         """Advance pulses towards their goals if the board does not do so itself."""
-        ...
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses; on the last try also by stronger means."""
-        ...
 
 
 def goals_of(channels: Sequence[Channel]) -> Mapping[int, int]:

@@ -16,11 +16,9 @@ class Stoppable(Protocol):
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop the pulses of channels."""
-        ...
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Return the present pulses, None if the board does not answer."""
-        ...
 
 
 def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:

@@ -26,7 +26,6 @@ class OverdueSource(Protocol):
 
     def lasts(self) -> tuple[float, str] | None:
         """Return the time for which a call lasts [s] and a message; None if no call lasts."""
-        ...
 
 
 OVERDUE_SOURCES: set[OverdueSource] = set()

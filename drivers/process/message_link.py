@@ -35,11 +35,9 @@ class MessageLink(Protocol):
 
     def fileno(self) -> int:
         """Return the file descriptor to wait on; it may change until the other end is connected."""
-        ...
 
     def setblocking(self, flag: bool, /) -> None:
         """Set whether ``recv`` waits."""
-        ...
 
     def send(self, data: bytes, flags: int = 0, /) -> int:
         """Send one message.
@@ -47,7 +45,6 @@ class MessageLink(Protocol):
         Raises:
             OSError: the link is closed; BlockingIOError if it is full.
         """
-        ...
 
     def recv(self, bufsize: int, flags: int = 0, /) -> bytes:
         """Return one message, b"" if the other end is closed.
@@ -55,15 +52,12 @@ class MessageLink(Protocol):
         Raises:
             OSError: the link is closed; BlockingIOError if there is no message yet.
         """
-        ...
 
     def shutdown(self, how: int, /) -> None:
         """Wake all waiting threads."""
-        ...
 
     def close(self) -> None:
         """Close."""
-        ...
 
 
 class LinkOffer(NamedTuple):

@@ -45,15 +45,12 @@ class BusPort(Protocol):
 
     def now_s(self) -> float:
         """Return the time, seconds."""
-        ...
 
     def setBaudRate(self, baudrate: int) -> bool:
         """Open at a baud rate; return False if the rate is not supported."""
-        ...
 
     def closePort(self) -> None:
         """Close; safe to call twice."""
-        ...
 
     def write(self, data: bytes) -> None:
         """Send bytes.
@@ -61,7 +58,6 @@ class BusPort(Protocol):
         Raises:
             BusLost: the port is lost.
         """
-        ...
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return up to ``length`` bytes, those received before the deadline.
@@ -69,7 +65,6 @@ class BusPort(Protocol):
         Raises:
             BusLost: the port is lost.
         """
-        ...
 
     def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
         """Clear the port, send a request and read until the deadline, all in one.
@@ -80,7 +75,6 @@ class BusPort(Protocol):
         Raises:
             BusLost: the port is lost.
         """
-        ...
 
     def getBytesAvailable(self) -> int:
         """Return the number of received bytes.
@@ -88,7 +82,6 @@ class BusPort(Protocol):
         Raises:
             BusLost: the port is lost.
         """
-        ...
 
     def clearPort(self) -> None:
         """Discard received bytes, without waiting.
@@ -96,7 +89,6 @@ class BusPort(Protocol):
         Raises:
             BusLost: the port is lost.
         """
-        ...
 
     def drain(self) -> int:
         """Discard bytes until the line is quiet; return their number.
@@ -104,7 +96,6 @@ class BusPort(Protocol):
         Raises:
             BusLost: the port is lost.
         """
-        ...
 
 
 class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types

@@ -47,7 +47,6 @@ class Network(Protocol):
         Shapes are (2254, 12) and (2254,) for people, from values of -1..1, and (2016, 18) and
         (2016,) for palms, from values of 0..1.
         """
-        ...
 
 
 class _Square(NamedTuple):
