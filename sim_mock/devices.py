@@ -147,7 +147,12 @@ def build(
         ValueError: it cannot exist; the message names the wrong value and valid ones.
     """
     if isinstance(what, PluginLine):
-        return _build_plugin(what, now_s, seed)
+        make = load(BUS, what.kind, BusPlugin).device
+        if make is None:
+            raise ValueError(f"{find(BUS, what.kind).label} has no emulated device")
+        params = pickle.loads(base64.b85decode(what.settings))
+        device: Device = make(params, what.servos, now_s, seed)
+        return device
     # A chain or board is imported when it is built: a process that starts a server needs none.
     if isinstance(what, MaestroLine):
         from gazerig.sim_mock.maestro.board import build_board
@@ -186,15 +191,6 @@ def plugin_line(kind: BusKind, params: object, servos: tuple[EmulatedJoint, ...]
     if load(BUS, kind, BusPlugin).device is None:
         raise PluginError(f"{find(BUS, kind).label} has no emulated device: run it without --mock")
     return PluginLine(kind, base64.b85encode(pickle.dumps(params)).decode(), servos)
-
-
-def _build_plugin(what: PluginLine, now_s: Callable[[], float], seed: int) -> Device:
-    make = load(BUS, what.kind, BusPlugin).device
-    if make is None:
-        raise ValueError(f"{find(BUS, what.kind).label} has no emulated device")
-    params = pickle.loads(base64.b85decode(what.settings))
-    device: Device = make(params, what.servos, now_s, seed)
-    return device
 
 
 def packed(what: Emulated) -> dict[str, object]:

@@ -11,10 +11,11 @@ import numpy as np
 
 from gazerig.features.world.measures import ADULT_M, Measures
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Mesh, grid
-from gazerig.robot.description.paint import (
+from gazerig.robot.description.mesh import (
     Colour,
+    Mesh,
     Painted,
+    grid,
     merged,
     mirrored,
     mix,
@@ -122,17 +123,12 @@ _LEANS_M, _LEAN = 0.27, 0.52
 the body lower in front than behind."""
 
 
-def _fine(rows: Sequence[Row], each: int) -> list[Row]:
-    """Return ``each`` interpolated sections per given section, on a smooth curve through them."""
+def _shirt(look: PersonLook, k: float) -> Painted:
     from scipy.interpolate import PchipInterpolator  # loads SciPy only to build a mesh
 
-    at = np.linspace(0.0, len(rows) - 1.0, each * (len(rows) - 1) + 1)
-    smooth = PchipInterpolator(np.arange(len(rows)), np.array(rows))(at)
-    return [(z, x, a, b) for z, x, a, b in smooth.tolist()]
-
-
-def _shirt(look: PersonLook, k: float) -> Painted:
-    mesh = loft(_fine(_TORSO, 3), 28)
+    at = np.linspace(0.0, len(_TORSO) - 1.0, 3 * (len(_TORSO) - 1) + 1)
+    smooth = PchipInterpolator(np.arange(len(_TORSO)), np.array(_TORSO))(at)
+    mesh = loft([(z, x, a, b) for z, x, a, b in smooth.tolist()], 28)
     points = mesh.vertices.copy()
     height = points[:, 2].copy()
     top = _TORSO[-1][0]

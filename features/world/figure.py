@@ -69,7 +69,21 @@ class Figures:
         if self.shared is not None:
             with suppress(OSError):  # the file is not written yet, or was deleted with the run
                 return np.asarray(np.load(self.shared, mmap_mode="r"))
-        return _round(self)
+        script = self.script
+        # The last row is at the end of the round or just after.
+        t_s = np.arange(int(np.ceil(script.round_s * RATE_HZ)) + 2) / RATE_HZ
+        bodies = [
+            BodyMotion(script, self.timelines, name, body, t_s, self.seed)
+            for name, body in self.measures.items()
+        ]
+        eyes = {name: body.eyes_about_m for name, body in zip(script.people, bodies, strict=True)}
+        rows = [row for body in bodies for row in body.pose(eyes)]
+        hands = {(body.name, side): body.hands[side] for body in bodies for side in SIDES}
+        ahead = {body.name: body.ahead for body in bodies}
+        for name in script.things:
+            found = object_handover.holders(script, self.timelines, name)
+            rows.append(object_handover.thing_poses(t_s, found, hands, ahead))
+        return np.stack(rows, axis=1) if rows else np.zeros((len(t_s), 0, 7))
 
     def sharing(self, file: Path) -> "Figures":
         """Return the same people, with their motion in a file once ``share`` has written it."""
@@ -94,21 +108,3 @@ class Figures:
         found = Segments(now[:, :3], quat / np.sqrt((quat * quat).sum(axis=1, keepdims=True)))
         self._last = (t_s, found)
         return found
-
-
-def _round(figures: Figures) -> Floats:
-    script = figures.script
-    # The last row is at the end of the round or just after.
-    t_s = np.arange(int(np.ceil(script.round_s * RATE_HZ)) + 2) / RATE_HZ
-    bodies = [
-        BodyMotion(script, figures.timelines, name, body, t_s, figures.seed)
-        for name, body in figures.measures.items()
-    ]
-    eyes = {name: body.eyes_about_m for name, body in zip(script.people, bodies, strict=True)}
-    rows = [row for body in bodies for row in body.pose(eyes)]
-    hands = {(body.name, side): body.hands[side] for body in bodies for side in SIDES}
-    ahead = {body.name: body.ahead for body in bodies}
-    for name in script.things:
-        found = object_handover.holders(script, figures.timelines, name)
-        rows.append(object_handover.thing_poses(t_s, found, hands, ahead))
-    return np.stack(rows, axis=1) if rows else np.zeros((len(t_s), 0, 7))

@@ -9,8 +9,8 @@ from gazerig.features.world.body_shape import ball, body_segments, cup
 from gazerig.features.world.figure import SEGMENTS, Figures
 from gazerig.features.world.measures import Measures
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.paint import Painted, moved
-from gazerig.robot.description.person_shape import WORLD_LOOKS, HeadSegments, head_segments
+from gazerig.robot.description.mesh import Painted, moved
+from gazerig.robot.description.person_shape import WORLD_LOOKS, head_segments
 from gazerig.robot.description.texture import textured
 
 FINENESS = 0.45
@@ -43,7 +43,16 @@ def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Pai
     found: dict[str, Painted] = {}
     for name, person in figures.script.people.items():
         look, body = WORLD_LOOKS[person.look], figures.measures[name]
-        parts = _head_parts(head_segments(look, fineness), body)
+        head = head_segments(look, fineness)
+        nose = tuple(-one for one in body.skull_m)
+        here: Vec3 = (0.0, 0.0, 0.0)
+        k = body.head_scale
+        parts = {
+            "head": moved(head.head, (nose[0], nose[1], nose[2]), k),
+            "lips": moved(head.lips, here, k),
+            **{f"{side}_eye": moved(head.eye, here, k) for side in ("left", "right")},
+            **{f"{side}_lid": moved(head.lid, here, k) for side in ("left", "right")},
+        }
         parts |= body_segments(body, look, person.gloves)
         found |= {f"{name}/{segment}": parts[segment] for segment in SEGMENTS}
     for name, thing in figures.script.things.items():
@@ -100,18 +109,6 @@ def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
         conaffinity=0,
         group=1,
     )
-
-
-def _head_parts(head: HeadSegments, body: Measures) -> dict[str, Painted]:
-    nose = tuple(-one for one in body.skull_m)
-    here: Vec3 = (0.0, 0.0, 0.0)
-    k = body.head_scale
-    return {
-        "head": moved(head.head, (nose[0], nose[1], nose[2]), k),
-        "lips": moved(head.lips, here, k),
-        **{f"{side}_eye": moved(head.eye, here, k) for side in ("left", "right")},
-        **{f"{side}_lid": moved(head.lid, here, k) for side in ("left", "right")},
-    }
 
 
 def _add_solid(node: Any, segment: str, body: Measures, gloves: bool) -> None:

@@ -182,18 +182,17 @@ class _Feet:
             foot = (first + k) % 2
             lift_s = start_s + k * each_s
             middle_s = lift_s + _MIDDLE * each_s if k < count - 2 else end_s + 0.6
-            self._move(foot, lift_s, each_s * _SWING_SHARE, min(last, round(middle_s * RATE_HZ)))
-
-    def _move(self, foot: int, lift_s: float, swing_s: float, row: int) -> None:
-        place, yaw = self._home(foot, row)
-        share = (self.t_s - lift_s) / swing_s
-        rows = share >= 0.0
-        moved = rise(share)[rows]
-        before, yaw_before = self.p_m[-1, foot, :2].copy(), float(self.yaw_rad[-1, foot])
-        self.p_m[rows, foot, :2] = before + moved[:, None] * (place - before)
-        self.yaw_rad[rows, foot] = yaw_before + moved * (yaw - yaw_before)
-        far = float(np.linalg.norm(place - before)) + 0.15 * abs(yaw - yaw_before)
-        self.p_m[rows, foot, 2] = _LIFT_M * min(1.0, far / 0.3) * hump(share)[rows]
+            swing_s = each_s * _SWING_SHARE
+            row = min(last, round(middle_s * RATE_HZ))
+            place, yaw = self._home(foot, row)
+            share = (self.t_s - lift_s) / swing_s
+            rows = share >= 0.0
+            moved = rise(share)[rows]
+            before, yaw_before = self.p_m[-1, foot, :2].copy(), float(self.yaw_rad[-1, foot])
+            self.p_m[rows, foot, :2] = before + moved[:, None] * (place - before)
+            self.yaw_rad[rows, foot] = yaw_before + moved * (yaw - yaw_before)
+            far = float(np.linalg.norm(place - before)) + 0.15 * abs(yaw - yaw_before)
+            self.p_m[rows, foot, 2] = _LIFT_M * min(1.0, far / 0.3) * hump(share)[rows]
 
     def _home(self, foot: int, row: int) -> tuple[Floats, float]:
         """Return place and direction of a foot under the hips of a row."""

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Mesh, ellipsoid, smooth_normals, turned
-from gazerig.robot.description.paint import Painted, merged
+from gazerig.robot.description.mesh import Mesh, Painted, ellipsoid, merged, smooth_normals, turned
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldPart
 
@@ -48,14 +47,22 @@ def still_parts(
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    left_out = _left_out(model, moving, rig_joints)
+    found = {model.jnt_bodyid[i] for i in range(model.njnt) if model.joint(i).name in rig_joints}
+    for body in range(1, model.nbody):  # parents first
+        if model.body(body).name in moving or model.body_parentid[body] in found:
+            found.add(body)
+    left_out = {int(body) for body in found}
     for geom in range(model.ngeom):
         if model.geom_bodyid[geom] in left_out or (made := _surface(model, geom)) is None:
             continue
         pose = data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy()
         surface = _placed(made, *pose)
         if _is_wall(model, geom):
-            surface = _facing(surface, _ROOM_M)
+            # Only the faces that are visible from the room.
+            (vertices, faces), normals, _ = surface
+            first = faces[:, 0]
+            seen = ((_ROOM_M - vertices[first]) * normals[first]).sum(axis=1) > 0.0
+            surface = surface._replace(mesh=Mesh(vertices, faces[seen]))
         yield WorldPart(f"geom{geom}", _coloured(model, geom, surface), "cloth")
 
 
@@ -90,15 +97,6 @@ def _surface(model: Any, geom: int) -> _Surface | None:
     if make is None or model.geom_group[geom] >= _SHOWN_GROUPS or _rgba(model, geom)[3] == 0.0:
         return None
     return make(model, geom)
-
-
-def _left_out(model: Any, moving: Collection[str], rig_joints: Collection[str]) -> set[int]:
-    """Return the numbers of bodies that are not shown, with all their descendants."""
-    found = {model.jnt_bodyid[i] for i in range(model.njnt) if model.joint(i).name in rig_joints}
-    for body in range(1, model.nbody):  # parents first
-        if model.body(body).name in moving or model.body_parentid[body] in found:
-            found.add(body)
-    return {int(body) for body in found}
 
 
 def _rgba(model: Any, geom: int) -> Floats:
@@ -147,14 +145,6 @@ def _is_wall(model: Any, geom: int) -> bool:
         return False
     thin, middle, _ = np.sort(2.0 * model.geom_size[geom])
     return bool(thin <= _WALL_THICK_M and middle >= _WALL_WIDE_M)
-
-
-def _facing(surface: _Surface, point_m: Floats) -> _Surface:
-    """Return only the faces that are visible from a point."""
-    (vertices, faces), normals, _ = surface
-    first = faces[:, 0]
-    seen = ((point_m - vertices[first]) * normals[first]).sum(axis=1) > 0.0
-    return surface._replace(mesh=Mesh(vertices, faces[seen]))
 
 
 def _projected(model: Any, geom: int, vertices: Floats, half: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.paint import Colour
+from gazerig.robot.description.mesh import Colour
 
 Image = NDArray[np.uint8]
 

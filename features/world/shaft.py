@@ -298,16 +298,12 @@ class WorldShaft(Shaft):
             t = torque_max if t > torque_max else -torque_max
             u = (t + v * self._built.rate) / volts if volts > 0.0 and torque_max > 0.0 else 0.0
         if (loop.i or loop.vi) and not clipped:
-            self._sum_up(loop, v)
+            i, error = self._integral, self.profile.r - self.x
+            if loop.vi:
+                i += loop.vi * (self._rv - v)
+            elif error > RESOLUTION or error < -RESOLUTION:
+                i += loop.i * error
+            self._integral = min(max(i, -loop.u_max), loop.u_max)
         power = u * t
         self.volts = self.supply - self._built.sag * power if power > 0.0 else self.supply
         self.u, self.effort = u, t
-
-    def _sum_up(self, loop: Loop, v: float) -> None:
-        """Update the integral part."""
-        i, error = self._integral, self.profile.r - self.x
-        if loop.vi:
-            i += loop.vi * (self._rv - v)
-        elif error > RESOLUTION or error < -RESOLUTION:
-            i += loop.i * error
-        self._integral = min(max(i, -loop.u_max), loop.u_max)

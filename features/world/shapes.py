@@ -16,7 +16,7 @@ from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.rotations import rotation_matrix
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
 from gazerig.robot.model.frames import Quaternion, quaternion

@@ -77,7 +77,13 @@ class Canvas:
             )
         )
         corners = np.array([corner, corner + right, corner + right + down, corner + down])
-        outline = _clip_to_near_plane(corners)
+        kept: list[Floats] = []
+        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            if a[2] >= _NEAREST_M:
+                kept.append(a)
+            if (a[2] >= _NEAREST_M) != (b[2] >= _NEAREST_M):
+                kept.append(a + (_NEAREST_M - a[2]) / (b[2] - a[2]) * (b - a))
+        outline = np.array(kept).reshape(-1, 3)
         if len(outline) < 3:
             return
         pixels = self._pixels(outline)
@@ -180,14 +186,3 @@ class Canvas:
         z = (1.0 / np.maximum(over_z, 1e-3)).astype(np.float32)
         part = self.depth_m[top : top + height, left : left + width]
         np.copyto(part, z, where=mask > 127)
-
-
-def _clip_to_near_plane(corners: Floats) -> Floats:
-    """Clip a convex polygon (n, 3) of the camera frame at the nearest distance."""
-    kept: list[Floats] = []
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        if a[2] >= _NEAREST_M:
-            kept.append(a)
-        if (a[2] >= _NEAREST_M) != (b[2] >= _NEAREST_M):
-            kept.append(a + (_NEAREST_M - a[2]) / (b[2] - a[2]) * (b - a))
-    return np.array(kept).reshape(-1, 3)

@@ -102,7 +102,25 @@ class SceneCamera:
             # A late call skips the frames that it missed, as a real camera's buffer does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
-            self._on_the_way.append(self._expose(now_s))
+            R, p = self._mount.pose(*self._head_pose(now_s))
+            faces: list[DetectedFace] = []
+            blobs: list[MovingBlob] = []
+            scene_s = now_s - self._start_s
+            for index, person in enumerate(self._scene.people(scene_s)):
+                face = self._face(person, R, p)
+                if face is not None:
+                    faces.append(face)
+                if person.hand is not None:
+                    hand = Thing(index, "hand", person.hand, _HAND_RADIUS_M)
+                    blobs.extend(self._blob(hand, R, p))
+            for thing in self._scene.things(scene_s):
+                blobs.extend(self._blob(thing._replace(id=_FIRST_THING_ID + thing.id), R, p))
+            faces.sort(key=lambda face: -face.box_px[2])
+            par = self._params
+            found = Detections(
+                now_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
+            )
+            self._on_the_way.append(found.located_by(self._locate))
             self._due_s = self._start_s + self._number / self._params.rate_hz - 1e-9
             self._arrives_s = self._arrival_s()
         while now_s >= self._arrives_s:
@@ -127,29 +145,6 @@ class SceneCamera:
 
     def close(self) -> None:
         """Stop; there is nothing to free."""
-
-    def _expose(self, t_s: float) -> Detections:
-        """Return the detections in one frame from the camera's present pose."""
-        assert self._start_s is not None
-        R, p = self._mount.pose(*self._head_pose(t_s))
-        faces: list[DetectedFace] = []
-        blobs: list[MovingBlob] = []
-        scene_s = t_s - self._start_s
-        for index, person in enumerate(self._scene.people(scene_s)):
-            face = self._face(person, R, p)
-            if face is not None:
-                faces.append(face)
-            if person.hand is not None:
-                hand = Thing(index, "hand", person.hand, _HAND_RADIUS_M)
-                blobs.extend(self._blob(hand, R, p))
-        for thing in self._scene.things(scene_s):
-            blobs.extend(self._blob(thing._replace(id=_FIRST_THING_ID + thing.id), R, p))
-        faces.sort(key=lambda face: -face.box_px[2])
-        par = self._params
-        found = Detections(
-            t_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
-        )
-        return found.located_by(self._locate)
 
     def _face(self, person: ScenePerson, R: Mat3, p: Vec3) -> DetectedFace | None:
         """Project the landmarks; a face that is cut off, far or turned away is not detected."""
@@ -176,19 +171,15 @@ class SceneCamera:
             return None
         return DetectedFace(box, np.array(pixels) + noise, 0.98)
 
-    def _pixel(self, p_camera_m: Vec3) -> tuple[float, float]:
-        """Return the pixel of a point in front of the camera."""
-        x, y, z = p_camera_m
-        lens = self._lens
-        return (x / z * lens.fx_px + lens.cx_px, y / z * lens.fy_px + lens.cy_px)
-
     def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
         """Project a hand or thing; nothing if it is behind the camera or outside the frame."""
         noise = self._rng.normal(0.0, self._params.depth_noise_mm / 1e3)
         point = rotate_back(R, sub(thing.p_world_m, p))
         if point[2] < 0.1:
             return ()
-        x, y = self._pixel(point)
+        x, y, z = point
+        lens = self._lens
+        x, y = (x / z * lens.fx_px + lens.cx_px, y / z * lens.fy_px + lens.cy_px)
         if not self._inside(x, y, 0.0):
             return ()
         place = scale(point, 1.0 + noise / norm(point))

@@ -140,7 +140,21 @@ class PixelCamera:
             # A late call skips the frames that it missed, as a real camera's buffer does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
-            self._on_the_way.append(self._detect(self._expose(now_s, R, p)))
+            par = self._params
+            size, motion = (par.width_px, par.height_px), self._motion(now_s, R, p)
+            since_s = now_s - self._start_s
+            seen = expose(self._view, par, since_s, self.lens, size, motion, depth=par.depth)
+            image = self._sensor.image(seen.image)
+            image.setflags(write=False)  # like the frames of real cameras
+            depth = None if seen.depth_m is None else self._sensor.stereo(seen.depth_m)
+            shot = Exposure(now_s, self._number, image, depth, R, p)
+            blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
+            faces = self._detector.find(image)
+            found = Detections(
+                now_s, self._number, image.shape[1], image.shape[0], faces, blobs, image=image,
+                depth_m=depth,
+            )  # fmt: skip
+            self._on_the_way.append(found.located_by(self._locate))
         self._before = now_s, R, p
         late_s = self._params.latency_ms / 1e3
         while self._on_the_way and now_s >= self._on_the_way[0].captured_s + late_s - 1e-9:
@@ -179,36 +193,6 @@ class PixelCamera:
     def close(self) -> None:
         """Stop, and free the view."""
         self._view.close()
-
-    def _detect(self, shot: Exposure) -> Detections:
-        """Return the detections in a frame."""
-        blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
-        height, width = shot.image.shape[:2]
-        found = Detections(
-            shot.captured_s,
-            shot.number,
-            width,
-            height,
-            self._detector.find(shot.image),
-            blobs,
-            image=shot.image,
-            depth_m=shot.depth_m,
-        )
-        return found.located_by(self._locate)
-
-    def _expose(self, t_s: float, R: Mat3, p: Vec3) -> Exposure:
-        """Render one frame from the camera's pose; its time is the middle of the exposure."""
-        assert self._start_s is not None
-        par = self._params
-        size = par.width_px, par.height_px
-        motion = self._motion(t_s, R, p)
-        seen = expose(
-            self._view, par, t_s - self._start_s, self.lens, size, motion, depth=par.depth
-        )
-        image = self._sensor.image(seen.image)
-        image.setflags(write=False)  # like the frames of real cameras
-        depth = None if seen.depth_m is None else self._sensor.stereo(seen.depth_m)
-        return Exposure(t_s, self._number, image, depth, R, p)
 
     def _motion(self, t_s: float, R: Mat3, p: Vec3) -> CameraMotion:
         """Return the camera's pose now and at the previous call."""

@@ -14,8 +14,7 @@ import numpy as np
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.mesh import turned
-from gazerig.robot.description.paint import Painted, painted
+from gazerig.robot.description.mesh import Painted, painted, turned
 from gazerig.robot.description.person_shape import LOOKS, hand, head_parts, torso
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.cameras.canvas import Canvas
@@ -204,11 +203,6 @@ def _draw_room(canvas: Canvas) -> None:
     small = (wall * share + floor * (1.0 - share)).astype(np.float32)
     wide = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
     canvas.image[:] = np.clip(wide, 0.0, 255.0)
-    _draw_window(canvas)
-
-
-def _draw_window(canvas: Canvas) -> None:
-    """Draw two calm pictures on the wall, which make the head's turns visible."""
     for y, z, half_y, half_z, colour in (
         (1.15, 0.72, 0.34, 0.26, (206, 178, 150)),
         (-1.25, 0.66, 0.24, 0.32, (150, 176, 206)),

@@ -86,10 +86,6 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
         if not self._wire.any and not self._twins:
             packet = fast_reply(self._by_id, rows, length, self._now_ms, self._fed_ms)
             return [Piece(rows[0][0], packet, self._delay_s[rows[0][0]])] if packet else []
-        return self._fast_with_faults(rows, length)
-
-    def _fast_with_faults(self, rows: Sequence[GroupRead], length: int) -> list[Piece]:
-        """Build the packet block by block: some are missing, damaged or sent by two servos."""
         answers: list[Answer] = []
         for servo_id, address, size in rows:
             servo = self._by_id.get(servo_id)

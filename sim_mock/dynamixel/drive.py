@@ -175,7 +175,8 @@ class DynamixelDrive(Drive):
     def _start(self) -> None:
         """Start the profile at the shaft's position and follow the goal register."""
         self._start_profile(self.mode == VELOCITY)
-        self._wrap_by_itself()
+        if self._quirks.wrap_at_torque_on and self.mode == POSITION and self._offset:
+            self._shift -= int(self.position_steps // STEPS_PER_TURN) * STEPS_PER_TURN
         if self._quirks.goal_at_torque_on:
             self._set_goal_here()
         self.apply_settings()
@@ -183,11 +184,6 @@ class DynamixelDrive(Drive):
             self.set_goal(self.memory.get("goal_position"))
         elif self.mode == VELOCITY:
             self.set_goal_velocity(self.memory.get("goal_velocity"))
-
-    def _wrap_by_itself(self) -> None:
-        """Shift the position by a turn, as some firmware does with a homing offset."""
-        if self._quirks.wrap_at_torque_on and self.mode == POSITION and self._offset:
-            self._shift -= int(self.position_steps // STEPS_PER_TURN) * STEPS_PER_TURN
 
     def change_mode(self, mode: int) -> None:
         """Set profile, gains, goals to a mode's start values, the position within one turn."""

@@ -29,8 +29,8 @@ class DynamixelFraming(Framing):
                 break
             if at + SHORTEST <= end <= len(data):
                 packet = data[at:end]
-                if _intact(packet):
-                    if not (self.strict and _unstuffed(packet)):
+                if umts(packet[:-2]) == int.from_bytes(packet[-2:], "little"):
+                    if not (self.strict and RAW in packet[7:-2].replace(STUFFED, b"")):
                         params = packet[8:-2].replace(STUFFED, RAW)
                         found.append(Instruction(packet[4], packet[7], params, end - before))
                     at = done = end
@@ -38,12 +38,3 @@ class DynamixelFraming(Framing):
                 found.append(Instruction(packet[4], -1, b"", end - before))
             at += len(HEADER)
         return found, data[done:]
-
-
-def _intact(packet: bytes) -> bool:
-    return umts(packet[:-2]) == int.from_bytes(packet[-2:], "little")
-
-
-def _unstuffed(packet: bytes) -> bool:
-    """Return whether there is a header among the parameters."""
-    return RAW in packet[7:-2].replace(STUFFED, b"")

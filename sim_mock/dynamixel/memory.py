@@ -142,7 +142,26 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
             defined = self._defined[address : address + length]
             if length == 0 or len(defined) != length or 0 in defined:
                 return None
-            found = self.gathers[address, length] = self._gather(address, address + length)
+            end = address + length
+            runs: list[list[int]] = []
+            for real in map(self.real, range(address, end)):
+                if runs and runs[-1][1] == real:
+                    runs[-1][1] = real + 1
+                else:
+                    runs.append([real, real + 1])
+
+            def touches(*spans: tuple[int, int]) -> bool:
+                return any(low < end and high > at for low, high in runs for at, end in spans)
+
+            slices = [slice(low, high) for low, high in runs]
+            # With a single slice, itemgetter would return the bytes themselves.
+            found = self.gathers[address, length] = ResolvedRange(
+                tuple((low, high) for low, high in runs),
+                itemgetter(*slices, slice(0, 0)),
+                touches(SENSED_SPAN),
+                touches(SURROUNDINGS_SPAN),
+                touches(*PROFILED),
+            )
         return found
 
     def window(self, wanted: tuple[int, int, int]) -> "SensedWindow | None":
@@ -164,28 +183,6 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         self.windows[wanted] = found
         return found
 
-    def _gather(self, address: int, end: int) -> ResolvedRange:
-        """Join neighbouring real addresses to runs."""
-        runs: list[list[int]] = []
-        for real in map(self.real, range(address, end)):
-            if runs and runs[-1][1] == real:
-                runs[-1][1] = real + 1
-            else:
-                runs.append([real, real + 1])
-
-        def touches(*spans: tuple[int, int]) -> bool:
-            return any(low < end and high > at for low, high in runs for at, end in spans)
-
-        slices = [slice(low, high) for low, high in runs]
-        # With a single slice, itemgetter would return the bytes themselves.
-        return ResolvedRange(
-            tuple((low, high) for low, high in runs),
-            itemgetter(*slices, slice(0, 0)),
-            touches(SENSED_SPAN),
-            touches(SURROUNDINGS_SPAN),
-            touches(*PROFILED),
-        )
-
     def real(self, address: int) -> int:
         """Return the address to which an indirect data byte refers, and others unchanged."""
         for low, high, pointers in self._windows:
@@ -200,7 +197,10 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
             self.real(a) != a for a in range(address, address + len(data))
         ):
             return self._indirect_fields(address, data)
-        layout = self._layout(address, len(data))
+        key = (address, len(data))
+        if key not in self._layouts:
+            self._layouts[key] = self._lay_out(address, len(data))
+        layout = self._layouts[key]
         if isinstance(layout, int):
             return layout
         out = []
@@ -213,13 +213,6 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
                 return DATA_RANGE
             out.append((register, value))
         return tuple(out)
-
-    def _layout(self, address: int, length: int) -> tuple[DynamixelRegister, ...] | int:
-        """Return the registers that a write covers exactly, or the error number."""
-        key = (address, length)
-        if key not in self._layouts:
-            self._layouts[key] = self._lay_out(address, length)
-        return self._layouts[key]
 
     def _lay_out(self, address: int, length: int) -> tuple[DynamixelRegister, ...] | int:
         end, found = address + length, []

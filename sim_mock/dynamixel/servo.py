@@ -187,7 +187,19 @@ class DynamixelServo(EmulatedServo):
             return fields
         for register, value in fields:
             self.memory.put(register, value)
-            self._act(register.name, value)
+            name = register.name
+            drive = self.drive
+            if name == "torque_enable":
+                self._switch(bool(value))
+            elif name == "bus_watchdog":
+                self._watchdog_ms = value * WATCHDOG_UNIT_MS
+            elif name == "operating_mode":
+                drive.change_mode(value)
+            elif name in ("homing_offset", "drive_mode"):
+                drive.shift_origin()
+            elif name in GOALS:
+                self._command(name, value)
+            self._apply_settings()
         return 0
 
     def _take_goal(self, data: bytes) -> int:
@@ -201,21 +213,6 @@ class DynamixelServo(EmulatedServo):
         drive.set_goal(value)
         drive.followed = GOAL_AT, data
         return 0
-
-    def _act(self, name: str, value: int) -> None:
-        """Apply the effect of a written register."""
-        drive = self.drive
-        if name == "torque_enable":
-            self._switch(bool(value))
-        elif name == "bus_watchdog":
-            self._watchdog_ms = value * WATCHDOG_UNIT_MS
-        elif name == "operating_mode":
-            drive.change_mode(value)
-        elif name in ("homing_offset", "drive_mode"):
-            drive.shift_origin()
-        elif name in GOALS:
-            self._command(name, value)
-        self._apply_settings()
 
     def _command(self, name: str, value: int) -> None:
         """Follow a new goal if the operating mode uses it."""

@@ -155,33 +155,39 @@ class ActiveFaults:
         out: list[Piece] = []
         repeat = False
         for piece in pieces:
-            hurt, cut = self._damage(piece, now_s)
+            servo_id, data = piece.servo_id, bytearray(piece.data)
+            flip = self.take("corrupt", servo_id, now_s)
+            if flip is not None and data:
+                bit = int(flip.numbers[0]) if flip.numbers else self._rng.randrange(len(data) * 8)
+                bit %= len(data) * 8
+                data[bit // 8] ^= 1 << bit % 8
+            drop = self.take("drop", servo_id, now_s)
+            if drop is not None and data:
+                del data[int(drop.numbers[0]) % len(data)]
+            cut = self.take("truncate", servo_id, now_s)
+            if cut is not None:
+                del data[int(cut.numbers[0]) :]
+            hurt = piece._replace(data=bytes(data))
             out += self._delay(hurt, now_s)
             again = self.take("duplicate", piece.servo_id, now_s) is not None
             if again and not fast:
                 out.append(Piece(NO_DEVICE, hurt.data))
             repeat = repeat or again
-            if cut and fast:
+            if cut is not None and fast:
                 break
         if fast and repeat:
             out += [Piece(NO_DEVICE, piece.data) for piece in out]
-        return self._surround_with_noise(out, pieces, now_s)
-
-    def _damage(self, piece: Piece, now_s: float) -> tuple[Piece, bool]:
-        """Return a piece as it arrives and whether its end is missing."""
-        servo_id, data = piece.servo_id, bytearray(piece.data)
-        flip = self.take("corrupt", servo_id, now_s)
-        if flip is not None and data:
-            bit = int(flip.numbers[0]) if flip.numbers else self._rng.randrange(len(data) * 8)
-            bit %= len(data) * 8
-            data[bit // 8] ^= 1 << bit % 8
-        drop = self.take("drop", servo_id, now_s)
-        if drop is not None and data:
-            del data[int(drop.numbers[0]) % len(data)]
-        cut = self.take("truncate", servo_id, now_s)
-        if cut is not None:
-            del data[int(cut.numbers[0]) :]
-        return piece._replace(data=bytes(data)), cut is not None
+        if not pieces:
+            return out
+        if self.take("fragment", pieces[0].servo_id, now_s):
+            out.insert(0, Piece(NO_DEVICE, self._header))
+        before = self.take("noise_before", None, now_s)
+        if before is not None:
+            out.insert(0, Piece(NO_DEVICE, self._noise(before)))
+        after = self.take("noise_after", None, now_s)
+        if after is not None:
+            out.append(Piece(NO_DEVICE, self._noise(after)))
+        return out
 
     def _delay(self, piece: Piece, now_s: float) -> list[Piece]:
         """Return a piece after a delay, or in two halves with a gap."""
@@ -194,22 +200,6 @@ class ActiveFaults:
         half = len(piece.data) // 2
         rest = Piece(piece.servo_id, piece.data[half:], 0.0, gap.numbers[0] / 1000.0)
         return [piece._replace(data=piece.data[:half]), rest]
-
-    def _surround_with_noise(
-        self, out: list[Piece], pieces: Sequence[Piece], now_s: float
-    ) -> list[Piece]:
-        """Put noise, pieces of headers and a babbling node around received pieces."""
-        if not pieces:
-            return out
-        if self.take("fragment", pieces[0].servo_id, now_s):
-            out.insert(0, Piece(NO_DEVICE, self._header))
-        before = self.take("noise_before", None, now_s)
-        if before is not None:
-            out.insert(0, Piece(NO_DEVICE, self._noise(before)))
-        after = self.take("noise_after", None, now_s)
-        if after is not None:
-            out.append(Piece(NO_DEVICE, self._noise(after)))
-        return out
 
     def _noise(self, fault: LineFault) -> bytes:
         return self._rng.randbytes(8) if fault.data is None else fault.data

@@ -56,7 +56,16 @@ class CommandTable(NamedTuple):
                 f"{arguments[0]!r} is not a command; commands: {', '.join(self.verbs)}, help"
             )
         try:
-            rest, lasting = _split_duration(verb, rest)
+            left, found = list(rest), dict[str, Any]()
+            while len(left) >= 2 and left[-2] in BOTH:
+                value, word = left.pop(), left.pop()
+                if word not in verb.lasting:
+                    raise ValueError(f"{word!r} is not expected here")
+                if word == "count":
+                    found["count"] = count(value)
+                else:
+                    found["seconds"] = number(0.0, 1e6, "seconds")(value)
+            rest, lasting = left, found
             return verb.do(faults, *_arguments(verb, rest), **lasting)
         except (KeyError, ValueError) as error:
             raise ValueError(f"{name}: {error.args[0]}; usage: {self.usage(name)}") from None
@@ -78,20 +87,6 @@ class CommandTable(NamedTuple):
         )
         lines += [f"  {case} {values}" for case, values in self.cases.items()]
         return "\n".join(lines)
-
-
-def _split_duration(verb: Verb, arguments: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Split ``count N`` and ``for S`` off the end; return the other words and these values."""
-    left, found = list(arguments), dict[str, Any]()
-    while len(left) >= 2 and left[-2] in BOTH:
-        value, word = left.pop(), left.pop()
-        if word not in verb.lasting:
-            raise ValueError(f"{word!r} is not expected here")
-        if word == "count":
-            found["count"] = count(value)
-        else:
-            found["seconds"] = number(0.0, 1e6, "seconds")(value)
-    return left, found
 
 
 def _arguments(verb: Verb, arguments: Sequence[str]) -> list[Any]:
@@ -146,15 +141,12 @@ def one_of(*values: str) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         if text not in values:
-            listed = f"neither {' nor '.join(values)}" if len(values) == 2 else _none_of(values)
+            two = len(values) == 2
+            listed = f"neither {' nor '.join(values)}" if two else f"none of {', '.join(values)}"
             raise ValueError(f"{text!r} is {listed}")
         return text
 
     return read
-
-
-def _none_of(values: Sequence[str]) -> str:
-    return f"none of {', '.join(values)}"
 
 
 def on_off(text: str) -> bool:

@@ -117,7 +117,9 @@ class FeetechDrive(Drive):
             more, speed = self._noise_now(now_ms)
             current += more
         led = self.torque and isinstance(profile, PositionProfile)
-        goal = round((profile.goal + self._shift) * scale) if led else self._goal_register()
+        goal = self.memory.get("goal_position")
+        if led:
+            goal = round((profile.goal + self._shift) * scale)
         load = round(shaft.u * FULL)
         # Half of them have no sign: the word is the value.
         return (
@@ -128,9 +130,6 @@ class FeetechDrive(Drive):
             goal if 0 <= goal < SIGN else unsigned(goal, 15),
             led and profile.running or not -self._threshold <= turning <= self._threshold,
         )
-
-    def _goal_register(self) -> int:
-        return self.memory.get("goal_position")
 
     # --- settings
 
@@ -152,7 +151,10 @@ class FeetechDrive(Drive):
             if not self.counts_turns:
                 self._wrap_to_one_turn()
         if self._wanted_mode() != self.mode:
-            self._change_mode(self._wanted_mode())
+            self.mode = self._wanted_mode()
+            self._set_goal_here()
+            if self.torque:
+                self._begin()
         self.apply_gains()
 
     def _wanted_mode(self) -> int:
@@ -183,13 +185,6 @@ class FeetechDrive(Drive):
             d=D_SHARE * get("position_d_gain"),
             u_max=most,
         )
-
-    def _change_mode(self, mode: int) -> None:
-        """Start another mode at the shaft's position."""
-        self.mode = mode
-        self._set_goal_here()
-        if self.torque:
-            self._begin()
 
     # --- torque
 
@@ -236,18 +231,15 @@ class FeetechDrive(Drive):
         elif self.mode == PWM:
             self.apply_gains()
         elif self.mode == SERVO:
-            place = self._goal_of_shaft(signed(asked[1], 15))
+            goal = signed(asked[1], 15)
+            if self._range is not None:
+                goal = max(self._range[0], min(self._range[1], goal))
+            place = goal / self._scale - self._shift
             if asked != self._goals_followed or place != profile.goal:
                 self._goals_followed = asked
                 self._plan_path(profile, place, asked)
         elif self.mode == STEP and new_goal:
             self._plan_path(profile, profile.goal + signed(asked[1], 15) / self._scale, asked)
-
-    def _goal_of_shaft(self, goal: int) -> float:
-        """Return a goal position, clamped to the limits, in the shaft's steps."""
-        if self._range is not None:
-            goal = max(self._range[0], min(self._range[1], goal))
-        return goal / self._scale - self._shift
 
     def _plan_path(self, profile: PositionProfile, to: float, asked: tuple[int, ...]) -> None:
         """Plan the profile to a position, in a time or at goal speed and acceleration."""

@@ -163,18 +163,14 @@ class FeetechServo(EmulatedServo):
         """Follow new goals."""
         drive, memory = self.drive, self.memory
         if self.errors & OVERLOAD and memory.bytes[GOAL_AT:GOAL_END] != goal_before:
-            self._goal_after_overload()
+            ends = self.quirks.overload_ends
+            ahead = self.memory.get("goal_position") - self.position_steps
+            if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):
+                self._end_overload()
         if new_goal and not drive.torque and self.quirks.goal == "torque-on":
             memory.set("torque_enable", 1)
             self._switch(1)
         drive.follow(new_goal)
-
-    def _goal_after_overload(self) -> None:
-        """End the overload on a new goal, if the quirks require it."""
-        ends = self.quirks.overload_ends
-        ahead = self.memory.get("goal_position") - self.position_steps
-        if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):
-            self._end_overload()
 
     def _switch(self, value: int) -> None:
         """Switch the torque, or make the present position the centre."""

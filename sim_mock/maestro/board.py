@@ -201,21 +201,15 @@ class EmulatedMaestro:
         if command.trouble:
             self.body.fail(command.trouble)
             return []
-        if self._wire.any and command.code not in ASKING and self._is_lost():
+        silent = self._wire.any and command.code not in ASKING
+        if silent and self._wire.take("lose_writes", None, self.now_s()) is not None:
             return []
         answer = self._do[command.code](command.data)
         self.body.feed()
         if answer is None:
             return []
         asked = command.data[0] if command.code == GET_POSITION else NO_DEVICE
-        return self._apply_faults(Piece(asked, answer))
-
-    def _is_lost(self) -> bool:
-        """Return whether a command without an answer is lost."""
-        return self._wire.take("lose_writes", None, self.now_s()) is not None
-
-    def _apply_faults(self, piece: Piece) -> list[Piece]:
-        """Return an answer as it arrives; faults of one channel affect only its position."""
+        piece = Piece(asked, answer)
         if not self._wire.any:
             return [piece]
         now_s = self.now_s()

@@ -118,20 +118,16 @@ class MaestroBody:
         now = whole_periods(self.now_s())
         while now - self._period > PAUSE and self.script_channel is not None:
             self._run_periods(self._period + 2 * SWING)
-            self._skip_swings(now)
+            due = self._due()
+            until = now if due is None else min(now, due - 1)
+            if self.awake and until > self._period and self._at_rest(but=self.script_channel):
+                self._period += (until - self._period) // (2 * SWING) * (2 * SWING)
         self._run_periods(now)
 
     def _run_periods(self, until: int) -> None:
         while self._period < until:
             self._period = self._next_period(until)
             self._pass()
-
-    def _skip_swings(self, now: int) -> None:
-        """Skip whole swings of a script, because each one ends in its initial state."""
-        due = self._due()
-        until = now if due is None else min(now, due - 1)
-        if self.awake and until > self._period and self._at_rest(but=self.script_channel):
-            self._period += (until - self._period) // (2 * SWING) * (2 * SWING)
 
     def _next_period(self, now: int) -> int:
         """Return the next period with an event."""

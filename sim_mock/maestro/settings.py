@@ -86,7 +86,13 @@ def change_setting(settings: Settings, case: str, value: str) -> Settings:
             raise ValueError(f"crc {value!r}: expected on or off")
         return replace(settings, crc=value == "on")
     if case == "timeout-ms":
-        return replace(settings, timeout_s=_timeout_ms(value) / 1000.0)
+        number = _number(value)
+        if not 0.0 <= number <= LONGEST_TIMEOUT_MS:
+            raise ValueError(
+                f"timeout-ms {value!r}: not a number of milliseconds from 0 to {LONGEST_TIMEOUT_MS:g}"
+            )
+        # The board counts in hundredths of a second.
+        return replace(settings, timeout_s=round(number / 10.0) * 10.0 / 1000.0)
     if case == "home-us":
         return replace(settings, home_steps=width_steps(case, value))
     if case in MOST:
@@ -94,16 +100,6 @@ def change_setting(settings: Settings, case: str, value: str) -> Settings:
             raise ValueError(f"{case} {value!r}: not a whole number from 0 to {MOST[case]}")
         return replace(settings, **{case: int(value)})  # type: ignore[arg-type]
     raise ValueError(f"set {case!r}: unknown; expected {', '.join(cases())}")
-
-
-def _timeout_ms(value: str) -> float:
-    number = _number(value)
-    if not 0.0 <= number <= LONGEST_TIMEOUT_MS:
-        raise ValueError(
-            f"timeout-ms {value!r}: not a number of milliseconds from 0 to {LONGEST_TIMEOUT_MS:g}"
-        )
-    # The board counts in hundredths of a second.
-    return round(number / 10.0) * 10.0
 
 
 def width_steps(case: str, value: str) -> int:

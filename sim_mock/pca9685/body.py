@@ -127,7 +127,11 @@ class Pca9685Body:
         """Advance to the present time."""
         until = self._steps(self.now_s())
         while self._step < until:
-            if self._at_rest():
+            now_s = self.now_s()
+            if all(
+                servo.resting and servo.width_steps == self._pulse_steps(place, now_s)
+                for place, servo in enumerate(self.servos)
+            ):
                 self._step = until
                 return
             self._step += 1
@@ -142,13 +146,6 @@ class Pca9685Body:
 
     def _pulse_steps(self, place: int, now_s: float) -> int:
         return self.width_steps(place, now_s) if self.servo_power else 0
-
-    def _at_rest(self) -> bool:
-        now_s = self.now_s()
-        return all(
-            servo.resting and servo.width_steps == self._pulse_steps(place, now_s)
-            for place, servo in enumerate(self.servos)
-        )
 
     def _pass(self, step: int) -> None:
         now_s = step / STEPS_S

@@ -92,7 +92,23 @@ class Chip:
 
     def _store(self, register: int, byte: int, now_s: float) -> None:
         if register == MODE1:
-            self._set_mode(byte, now_s)
+            before = self._registers[MODE1]
+            # Awake for 0.5 ms first: the write that ends the sleep does not restart the outputs.
+            if byte & RESTART and not (byte | before) & SLEEP and now_s >= self._awake_s:
+                self._held_back = False
+            if (
+                byte & SLEEP
+                and not before & SLEEP
+                and any(not high & FULL for high in self._outputs[3::4])
+            ):
+                self._held_back = True
+            if before & SLEEP and not byte & SLEEP:
+                self._awake_s = now_s + START_S
+            # The external clock is selected asleep, by both bits in one write, and until the next
+            # reset.
+            clock = EXTCLK if before & EXTCLK or (before & byte & SLEEP and byte & EXTCLK) else 0
+            self._registers[MODE1] = byte & ~(RESTART | EXTCLK) | clock
+            self._mark_restart()
         elif register == PRESCALE:
             if self._registers[MODE1] & SLEEP:
                 self._registers[PRESCALE] = max(LEAST_PRESCALE, byte)
@@ -104,21 +120,6 @@ class Chip:
         elif register < LED0:
             self._registers[register] = byte
         # The test mode and the reserved registers ignore writes.
-
-    def _set_mode(self, byte: int, now_s: float) -> None:
-        before = self._registers[MODE1]
-        # Awake for 0.5 ms first: the write that ends the sleep does not restart the outputs.
-        if byte & RESTART and not (byte | before) & SLEEP and now_s >= self._awake_s:
-            self._held_back = False
-        if byte & SLEEP and not before & SLEEP and self._has_output():
-            self._held_back = True
-        if before & SLEEP and not byte & SLEEP:
-            self._awake_s = now_s + START_S
-        # The external clock is selected asleep, by both bits in one write, and until the next
-        # reset.
-        clock = EXTCLK if before & EXTCLK or (before & byte & SLEEP and byte & EXTCLK) else 0
-        self._registers[MODE1] = byte & ~(RESTART | EXTCLK) | clock
-        self._mark_restart()
 
     def _mark_restart(self) -> None:
         mode = self._registers[MODE1] & ~RESTART
@@ -139,9 +140,6 @@ class Chip:
             self._mark_restart()
 
     # --- the outputs
-
-    def _has_output(self) -> bool:
-        return any(not high & FULL for high in self._outputs[3::4])
 
     @property
     def period_s(self) -> float:

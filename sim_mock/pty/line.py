@@ -73,7 +73,10 @@ class TerminalLine:
         self.settings = settings
         self._now_s, self._say, self._warn = now_s, say, warn
         self.device = device or build(settings.device, now_s, settings.seed)
-        for case, value in {**_packet_gap(settings.device), **settings.choices}.items():
+        # The device waits longer for the rest of a packet than its own time.
+        patient = PACKET_GAP in CASES.get(settings.device.kind, {})
+        choices = {PACKET_GAP: str(GAP_MS)} if patient else {}
+        for case, value in {**choices, **settings.choices}.items():
             self.device.choose(case, value)
         self.line = ServoLine(self.device, settings.wire_time, settings.turnaround_us * 1e-6)
         link = None if settings.link is None else Path(os.path.abspath(settings.link))
@@ -116,25 +119,21 @@ class TerminalLine:
         if watch is not None and watch.fd in ready and watch.look():
             self.terminal.release()
         if self.terminal.master in ready:
-            self._take_bytes(now_s)
+            data = self.terminal.read()
+            self.heard = self.heard or bool(data)
+            careful = self.device.check_baud or self.line.wire_time
+            baud = self.terminal.client_baud() if careful else 0
+            answer = self.line.send(data, baud or 1, now_s)
+            if answer:
+                self.terminal.write(answer)
+            if self.device.check_baud and self._warn is not None and data:
+                self._warn_of(baud, self._warn)
         if self.line.busy:
             self._deliver()
         if self.device.faults.wire.any or self._held or self._forbidden:
             self._follow_faults()
         elif not self.terminal.plugged:
             self._plug()
-
-    def _take_bytes(self, now_s: float) -> None:
-        """Pass the client's bytes to the line, and send answers that are due immediately."""
-        data = self.terminal.read()
-        self.heard = self.heard or bool(data)
-        careful = self.device.check_baud or self.line.wire_time
-        baud = self.terminal.client_baud() if careful else 0
-        answer = self.line.send(data, baud or 1, now_s)
-        if answer:
-            self.terminal.write(answer)
-        if self.device.check_baud and self._warn is not None and data:
-            self._warn_of(baud, self._warn)
 
     def _deliver(self) -> None:
         """Write bytes that are due; the last 0.1 ms of the wait is a busy loop."""
@@ -164,7 +163,9 @@ class TerminalLine:
         faults = self.device.faults
         if faults.on("unplug") == self.terminal.plugged:
             if self.terminal.plugged:
-                self._unplug()
+                self.terminal.unplug()
+                self.line.forget()
+                self._held = self._forbidden = False
             else:
                 self._plug()
         if not self.terminal.plugged:
@@ -175,11 +176,6 @@ class TerminalLine:
         if faults.on("deny") != self._forbidden:
             self._forbidden = not self._forbidden
             self.terminal.forbid(self._forbidden)
-
-    def _unplug(self) -> None:
-        self.terminal.unplug()
-        self.line.forget()
-        self._held = self._forbidden = False
 
     def _plug(self) -> None:
         before = self.terminal.path
@@ -199,8 +195,3 @@ class TerminalLine:
         if done.startswith("{"):
             return self.label_message({"ok": "status", **json.loads(done)})
         return self.label_message({"ok": done})
-
-
-def _packet_gap(device: Emulated) -> dict[str, str]:
-    """Return the case that makes a device wait longer for the rest of a packet."""
-    return {PACKET_GAP: str(GAP_MS)} if PACKET_GAP in CASES.get(device.kind, {}) else {}

@@ -87,7 +87,14 @@ class FacesScene:
         self._script = script
         self._acts = {name: _acts_of(script, name, seed) for name in script.people}
         self._acts |= {name: _acts_of_thing(one) for name, one in script.things.items()}
-        self._steps = {name: self._steps_of(name) for name in script.people}
+        self._steps = {
+            name: [
+                _Change(one.start_s, one.end_s, self.place(one.act.to), one.act.do == "walk")
+                for one in self._acts[name]
+                if one.act.do in ("walk", "step")
+            ]
+            for name in script.people
+        }
         self._glances = {
             name: [
                 _Change(one.start_s, one.end_s, (one.act.yaw_deg, one.act.pitch_deg))
@@ -185,13 +192,6 @@ class FacesScene:
         for number, (name, person) in enumerate(self._script.people.items()):
             if person.gloves:
                 yield number, name
-
-    def _steps_of(self, name: str) -> list[_Change]:
-        return [
-            _Change(one.start_s, one.end_s, self.place(one.act.to), one.act.do == "walk")
-            for one in self._acts[name]
-            if one.act.do in ("walk", "step")
-        ]
 
     def _standing(self, name: str, phase_s: float) -> Vec3:
         """Return the place of a face without sway."""

@@ -23,17 +23,14 @@ class AddressTable(Generic[S]):
         self.delay_s: dict[int, float] = {}
         for servo in servos:
             if at_baud(servo, client_baud):
-                self._enter(servo)
-
-    def _enter(self, servo: S) -> None:
-        if servo.id in self.by_id:
-            self.twins.setdefault(servo.id, []).append(servo)
-        else:
-            self.by_id[servo.id] = servo
-            self.delay_s[servo.id] = servo.return_delay_s
-        shadow = servo.shadow_id
-        if shadow is not None and shadow != servo.id:
-            self.shadows.setdefault(shadow, []).append(servo)
+                if servo.id in self.by_id:
+                    self.twins.setdefault(servo.id, []).append(servo)
+                else:
+                    self.by_id[servo.id] = servo
+                    self.delay_s[servo.id] = servo.return_delay_s
+                shadow = servo.shadow_id
+                if shadow is not None and shadow != servo.id:
+                    self.shadows.setdefault(shadow, []).append(servo)
 
     def all(self) -> list[S]:
         """Return all servos at the client's baud rate."""

@@ -94,7 +94,10 @@ class ShaftMotion:
             since = self._since_ms
             until = min(since + ticks, SPAN_MS)
             if since and self._span_start is not None:
-                self._return_to(self._span_start)
+                begun = self._span_start
+                self.x, self.v, self._rv, self.u = begun[:4]
+                self.effort, self._integral, self.joint, self.volts = begun[4:8]
+                self.profile.restore(begun.profile)
             elif until < SPAN_MS:
                 self._span_start = self._state()
             self._advance(until)
@@ -106,12 +109,6 @@ class ShaftMotion:
             self.x, self.v, self._rv, self.u, self.effort, self._integral, self.joint, self.volts,
             self.profile.state(),
         )  # fmt: skip
-
-    def _return_to(self, state: ShaftState) -> None:
-        self.x, self.v, self._rv, self.u, self.effort, self._integral, self.joint, self.volts = (
-            state[:8]
-        )
-        self.profile.restore(state.profile)
 
     def _advance(self, ticks: int) -> None:
         """Advance by some milliseconds, in one map if possible, else one by one."""
@@ -131,17 +128,13 @@ class ShaftMotion:
         if glides and self._glide(path if led else None, before, kr):
             return
         if v == 0.0:
-            self._leave_rest(path, before, kr)
+            was = self.x, self.u, self._integral, self.joint, self.volts
+            if not (self._linear and self._integral == 0.0 and self._step(path, before, kr)):
+                self._follow(path, before, kr)
+            if self.v == 0.0 and self._rv == 0.0 and not self.profile.running:
+                self.quiet = was == (self.x, self.u, self._integral, self.joint, self.volts)
         elif not (linear and self._step(path, before, kr)):
             self._follow(path, before, kr)
-
-    def _leave_rest(self, path: Sequence[float], before: float, kr: float) -> None:
-        """Follow a path from rest, and check whether it stays at rest permanently."""
-        was = self.x, self.u, self._integral, self.joint, self.volts
-        if not (self._linear and self._integral == 0.0 and self._step(path, before, kr)):
-            self._follow(path, before, kr)
-        if self.v == 0.0 and self._rv == 0.0 and not self.profile.running:
-            self.quiet = was == (self.x, self.u, self._integral, self.joint, self.volts)
 
     def _stick(self, kr: float) -> bool:
         """Hold the position for a span if friction holds it; return False if it may not."""

@@ -55,19 +55,15 @@ def change_quirk(quirks: Q, case: str, value: str) -> Q:
     name, choices = case.replace("-", "_"), _choices(type(quirks))
     change: dict[str, Any] = {name: value}
     if name in TIMES:
-        change = {TIMES[name]: _milliseconds(case, value) / 1000.0}
+        try:
+            number = float(value)
+        except ValueError:
+            number = -1.0
+        if not 0.0 <= number < 1e6:
+            raise ValueError(f"{case} {value!r}: not a number of milliseconds of 0 or more")
+        change = {TIMES[name]: number / 1000.0}
     elif name not in choices:
         raise ValueError(f"set {case!r}: unknown; expected {', '.join(cases_of(type(quirks)))}")
     elif value not in choices[name]:
         raise ValueError(f"{case} {value!r}: expected {', '.join(choices[name])}")
     return replace(quirks, **change)
-
-
-def _milliseconds(case: str, value: str) -> float:
-    try:
-        number = float(value)
-    except ValueError:
-        number = -1.0
-    if not 0.0 <= number < 1e6:
-        raise ValueError(f"{case} {value!r}: not a number of milliseconds of 0 or more")
-    return number

@@ -99,7 +99,18 @@ def compose_group(options: RunOptions) -> "HeadGroup":
     found = world_of(first, options)
     assert found.spec.figures is not None  # heads are part of a script
     heads = found.spec.figures.script.heads
-    others = [_other_options(options, name, n, heads[name].rig) for n, name in enumerate(heads, 1)]
+    others = [
+        replace(
+            options,
+            rig=heads[name].rig or options.rig,
+            seed=options.seed + n,
+            record=None if options.record is None else other_head_file(options.record, name),
+            heatmap=None,
+            summary=None,
+            page=None,
+        )
+        for n, name in enumerate(heads, 1)
+    ]
     each = (options, *others)
     rigs = [(FIRST, first), *zip(heads, map(run_rig, others), strict=True)]
     world = SimulatedWorld(found) if options.fast else RealTimeWorld(found, rigs)
@@ -130,19 +141,6 @@ def _link(members: Sequence[_Member]) -> list[_Member]:
     # The process has one parameter store and one remote control: those of the first head.
     alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in others]
     return [first._replace(composed=first.composed._replace(made=made)), *alone]
-
-
-def _other_options(options: RunOptions, name: str, number: int, rig: str) -> RunOptions:
-    """Return the options of another head."""
-    return replace(
-        options,
-        rig=rig or options.rig,
-        seed=options.seed + number,
-        record=None if options.record is None else other_head_file(options.record, name),
-        heatmap=None,
-        summary=None,
-        page=None,
-    )
 
 
 def other_head_file(path: Path, name: str) -> Path:
