@@ -62,9 +62,7 @@ def at_the_rig(opened: tuple[Rig, Person]) -> tuple[Rig, Person]:
     return rig, person
 
 
-def test_stop_takes_the_torque_off_until_it_is_asked_back(
-    at_the_rig: tuple[Rig, Person],
-) -> None:
+def test_stop_takes_the_torque_off_until_it_is_asked_back(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     person.click(STOP)
     wait_for(lambda: "STOP was pressed on the page (browser " in rig.robot.stopped, "the stop")
@@ -73,9 +71,7 @@ def test_stop_takes_the_torque_off_until_it_is_asked_back(
     resumed(rig, person)
 
 
-def test_the_space_bar_stops_but_not_while_somebody_types(
-    at_the_rig: tuple[Rig, Person],
-) -> None:
+def test_the_space_bar_stops_but_not_while_somebody_types(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     person.open("Tune")
     before = len(rig.orders)
@@ -270,9 +266,7 @@ def test_a_drawer_opens_by_its_tab_and_closes_by_escape(at_the_rig: tuple[Rig, P
     assert person.run("document.querySelector('#drawer').checkVisibility()") is False
 
 
-def test_a_parameter_is_found_changed_marked_and_put_back(
-    at_the_rig: tuple[Rig, Person],
-) -> None:
+def test_a_parameter_is_found_changed_marked_and_put_back(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     key = "ranges.neck_yaw_deg"
     (label,) = (k.key for k in rig.tuning.parameters() if k.key == key)
@@ -349,9 +343,7 @@ def test_who_did_not_stop_is_asked_about_other_hands(at_the_rig: tuple[Rig, Pers
     resumed(rig, person, "Is no hand in the mechanism?")
 
 
-def test_on_a_phone_stop_is_in_sight_and_nothing_covers_it(
-    at_the_rig: tuple[Rig, Person],
-) -> None:
+def test_on_a_phone_stop_is_in_sight_and_nothing_covers_it(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     phone = {"width": 360, "height": 640, "deviceScaleFactor": 1, "mobile": True}
     person.tab.ask("Emulation.setDeviceMetricsOverride", **phone)

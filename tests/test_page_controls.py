@@ -32,18 +32,24 @@ from gazerig.robot.dashboard.feed.page_process import (
     PageProcess,
 )
 from gazerig.robot.dashboard.feed.publisher import ParamFeed
-from gazerig.robot.dashboard.panels.controls import LeadPanel
-from gazerig.robot.dashboard.panels.jog_panel import ESTIMATED, JogPanel, estimated_joints_note
-from gazerig.robot.dashboard.panels.param_control import (
+from gazerig.robot.dashboard.panels.controls import (
+    ESTIMATED,
+    JogPanel,
+    LeadPanel,
+    estimated_joints_note,
+)
+from gazerig.robot.dashboard.panels.param_panel import (
     ParamControl,
+    ParamState,
     fits_slider,
     format_value,
+    found,
+    group_of,
     hint,
     label,
     read,
     slider_step,
 )
-from gazerig.robot.dashboard.panels.param_panel import ParamState, found, group_of
 from gazerig.robot.dashboard.requests.inbox import (
     MESSAGE_BYTES,
     REQUEST,

@@ -38,7 +38,6 @@ from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices
 from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, REPLAY, pack, unpack
 from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.panels.attention_panel import reason, saliences, winner
-from gazerig.robot.dashboard.panels.dwell_chart import BIN_S, BINS, DwellChart
 from gazerig.robot.dashboard.panels.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.panels.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face
 from gazerig.robot.dashboard.panels.joint_charts import (
@@ -50,29 +49,35 @@ from gazerig.robot.dashboard.panels.joint_charts import (
     groups_of,
     mean_deg,
 )
-from gazerig.robot.dashboard.panels.main_sequence_chart import KEPT, MainSequenceChart
 from gazerig.robot.dashboard.panels.panel import PanelView
-from gazerig.robot.dashboard.panels.run_figures import RunFigure, RunFigures, compare_with_band
+from gazerig.robot.dashboard.panels.run_figures import (
+    BIN_S,
+    BINS,
+    KEPT,
+    DwellChart,
+    MainSequenceChart,
+    RunFigure,
+    RunFigures,
+    compare_with_band,
+)
 from gazerig.robot.dashboard.panels.servo_health import (
     NO_FEEDBACK,
+    alarms,
+    group_reasons,
     guard,
     health,
+    other_heads,
     servo_table,
     strain_of_heat,
     strain_of_load,
     strain_of_voltage,
-)
-from gazerig.robot.dashboard.panels.status import (
-    alarms,
-    group_reasons,
-    other_heads,
     without_feedback,
 )
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.view.head_view import lid_edges
 from gazerig.robot.dashboard.view.overlays import OverlayPanel, field_edge
 from gazerig.robot.dashboard.view.people import fixated_part
-from gazerig.robot.dashboard.view.scene_node import along, turned_up, upright_along
+from gazerig.robot.dashboard.view.scene_node import along, turned_up
 from gazerig.robot.dashboard.widgets.widget import Html, Widget
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.description.mesh import Mesh, cap, ellipsoid, lid, ring, turned
@@ -100,9 +105,7 @@ AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def snapshot(
-    t_s: float = 0.0,
-    measured_rad: tuple[float, ...] = (0.0,) * 9,
-    reasons: tuple[str, ...] = (),
+    t_s: float = 0.0, measured_rad: tuple[float, ...] = (0.0,) * 9, reasons: tuple[str, ...] = ()
 ) -> Snapshot:
     return Snapshot(
         t_s=t_s,
@@ -317,7 +320,6 @@ def test_turns_lay_axes_where_they_should() -> None:
         x, y, z = (v := dice.normal(size=3)) / np.linalg.norm(v)
         assert np.allclose(turn(along((x, y, z)), (1.0, 0.0, 0.0)), (x, y, z))
         assert turn(along((x, y, z)), (0.0, 1.0, 0.0))[2] == pytest.approx(0.0, abs=1e-12)
-        assert np.allclose(turn(upright_along((x, y, z)), (0.0, 0.0, 1.0)), (x, y, z))
         R = rotation(tuple(dice.uniform(-3.0, 3.0, 3)))
         for axis in AHEAD:
             assert np.allclose(turn(quaternion(R), axis), np.array(R) @ axis, atol=1e-7)
@@ -867,9 +869,7 @@ class Nobody:
         self.reported = dict(state)
 
 
-def test_who_comes_late_sees_all_panels_as_they_are_now(
-    server: viser.ViserServer,
-) -> None:
+def test_who_comes_late_sees_all_panels_as_they_are_now(server: viser.ViserServer) -> None:
     button = Nobody()
     widgets = Widgets()
     view = PageView(server, widgets, Outbox(None), button.tell)  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ SCAN = CommandEntry(
                 "who answers on this port, of any kind, at every baud rate",
             ),
             ("scan --port /dev/ttyUSB0 --kind feetech", "Feetech servos only"),
-        ),
+        )
     },
 )
 SETUP = CommandEntry(
@@ -25,7 +25,7 @@ SETUP = CommandEntry(
         "setup": (
             ("setup my.yaml", "give new servos their ids, one at a time; try a Maestro's channels"),
             ("setup my.yaml --joint neck_yaw", "one servo only"),
-        ),
+        )
     },
 )
 DOCTOR = CommandEntry(
@@ -37,7 +37,7 @@ DOCTOR = CommandEntry(
             ("doctor my.yaml", "port, servos and settings against the file, with cures"),
             ("doctor my.yaml --fix", "mend what is safe to mend; nothing moves"),
             ("doctor my.yaml --mock", "see what it looks like without hardware"),
-        ),
+        )
     },
 )
 CALIBRATE = CommandEntry(
@@ -54,48 +54,38 @@ CALIBRATE = CommandEntry(
                 "the lens as an OAK camera has it in memory",
             ),
             ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
-        ),
+        )
     },
 )
 JOG = CommandEntry(
     "gazerig.features.bringup.cli.motion",
     "Move one joint slowly while the others hold: gazerig jog my.yaml neck_yaw 20.",
     "Bring-up",
-    examples={
-        "jog": (("jog my.yaml neck_yaw 20", "turn the neck 20 deg to the left, slowly"),),
-    },
+    examples={"jog": (("jog my.yaml neck_yaw 20", "turn the neck 20 deg to the left, slowly"),)},
 )
 HOME = CommandEntry(
     "gazerig.features.bringup.cli.motion",
     "Move slowly to the centre: all joints to 0 deg, lids open; then torque off.",
     "Bring-up",
-    examples={
-        "home": (("home my.yaml", "all joints to 0 deg, then torque off"),),
-    },
+    examples={"home": (("home my.yaml", "all joints to 0 deg, then torque off"),)},
 )
 LOOK_AT = CommandEntry(
     "gazerig.features.bringup.cli.motion",
     "Turn eyes and head to a point and report the gaze error: X Y Z in metres.",
     "Bring-up",
-    examples={
-        "look-at": (("look-at my.yaml 1 0.2 0.3", "1 m ahead, 20 cm left, 30 cm up"),),
-    },
+    examples={"look-at": (("look-at my.yaml 1 0.2 0.3", "1 m ahead, 20 cm left, 30 cm up"),)},
 )
 MONITOR = CommandEntry(
     "gazerig.features.bringup.cli.monitor",
     "Watch all servos; reads alone: nothing is written, torque stays as it is.",
     "Bring-up",
-    examples={
-        "monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),),
-    },
+    examples={"monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),)},
 )
 REBOOT = CommandEntry(
     "gazerig.features.bringup.cli.reboot",
     "Restart servos, which clears latched errors; their torque is off afterwards.",
     "Bring-up",
-    examples={
-        "reboot": (("reboot my.yaml neck_yaw", "clear what a servo has latched"),),
-    },
+    examples={"reboot": (("reboot my.yaml neck_yaw", "clear what a servo has latched"),)},
 )
 RECORD_GESTURE = CommandEntry(
     "gazerig.features.bringup.cli.record_gesture",
@@ -103,6 +93,6 @@ RECORD_GESTURE = CommandEntry(
     examples={
         "record-gesture": (
             ("record-gesture my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
-        ),
+        )
     },
 )

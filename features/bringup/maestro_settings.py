@@ -32,10 +32,7 @@ TIMEOUT_S = 0.5
 def range_us(setup: ServoConfig) -> tuple[int, int]:
     """Return Min and Max of a channel, us: the joint's range rounded outwards."""
     step = UNIT_US * US_STEPS
-    return (
-        UNIT_US * floor(setup.min_steps / step),
-        UNIT_US * ceil(setup.max_steps / step),
-    )
+    return (UNIT_US * floor(setup.min_steps / step), UNIT_US * ceil(setup.max_steps / step))
 
 
 def wide_range(setup: ServoConfig) -> tuple[int, int] | None:

@@ -349,8 +349,19 @@ class ManualControl:
             clock.sleep_until(start_s + slot * period)
             if gently:
                 self._guard.go_gently()
-            step = self._step(desired, last_s)
-            last_s = step.t_s
+            t_s = clock.now_s()
+            joints = self.body.read(t_s)
+            wanted = desired(joints, t_s, t_s - last_s)
+            # No camera is used here, so no frame can be too old.
+            guard_result = self._guard.check(wanted, joints, 0.0, t_s)
+            self.body.write(guard_result.command_rad)
+            step, last_s = Step(t_s, wanted, guard_result, joints), t_s
+            if self._watch is not None:
+                try:
+                    self._watch(step)
+                except Exception as error:
+                    self._watch = None
+                    self._said.append(failure_text("who watches", error))
             notes.add(step.guard_result)
             events += self.body.bus.events()
             ended = done(step) or self._stopped()
@@ -365,23 +376,6 @@ class ManualControl:
         events += self._said
         self._said.clear()
         return MoveResult(ended, step.t_s - start_s, applied, level, tuple(events), step)
-
-    def _step(self, desired: DesiredPose, last_s: float) -> Step:
-        """Read, ask for the desired pose, guard, write."""
-        t_s = self._clock.now_s()
-        joints = self.body.read(t_s)
-        wanted = desired(joints, t_s, t_s - last_s)
-        # No camera is used here, so no frame can be too old.
-        guard_result = self._guard.check(wanted, joints, 0.0, t_s)
-        self.body.write(guard_result.command_rad)
-        step = Step(t_s, wanted, guard_result, joints)
-        if self._watch is not None:
-            try:
-                self._watch(step)
-            except Exception as error:
-                self._watch = None
-                self._said.append(failure_text("who watches", error))
-        return step
 
 
 def park_slowly(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:

@@ -98,10 +98,7 @@ def test_kinds_that_are_named_are_asked_and_no_other():
     assert {kind for kind, _ in plan("", ("feetech",), None)} == {"feetech"}
     assert {kind for kind, _ in plan("", ("dynamixel",), None)} == {"dynamixel"}
     # Whether a board is there is asked at whatever rate, before servo packets are sent.
-    assert plan("", ALL, (4_500_000,)) == (
-        ("maestro", BOARD_RATES[0]),
-        ("dynamixel", 4_500_000),
-    )
+    assert plan("", ALL, (4_500_000,)) == (("maestro", BOARD_RATES[0]), ("dynamixel", 4_500_000))
 
 
 # --- servos of each kind hear the other's packets and are left as they are

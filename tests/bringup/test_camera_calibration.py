@@ -59,8 +59,13 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.sim_mock.cameras.charuco import BoardCamera, BoardCameraParams, true_lens
-from gazerig.sim_mock.cameras.charuco_scene import BoardScene, hand_held_pose
+from gazerig.sim_mock.cameras.charuco_scene import (
+    BoardCamera,
+    BoardCameraParams,
+    BoardScene,
+    hand_held_pose,
+    true_lens,
+)
 
 SIZE = (640, 400)
 BOARD = CharucoBoard()

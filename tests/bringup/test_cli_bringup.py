@@ -516,9 +516,7 @@ def test_monitor_of_a_mixed_rig_as_json(rigs: dict[str, str]) -> None:
     assert reported["eyes_pan"]["measured"] is False and reported["neck_yaw"]["measured"] is True
 
 
-def test_on_real_wires_hobby_servos_are_asked_for_first(
-    rigs: dict[str, str],
-) -> None:
+def test_on_real_wires_hobby_servos_are_asked_for_first(rigs: dict[str, str]) -> None:
     rig = rigs["mixed"]
     with served(rig) as buses:
         refused = invoked("jog", rig, "neck_yaw", "5", "--port", buses.ports)

@@ -108,12 +108,7 @@ BOTH_RULES = [
 ]
 DYNAMIXEL_RULES = [
     ({"drive_mode": 1}, "warn", "Drive Mode 1 (reversed)", "--fix"),
-    (
-        {"drive_mode": 12},
-        "warn",
-        "profile in milliseconds, torque on with any goal",
-        "--fix",
-    ),
+    ({"drive_mode": 12}, "warn", "profile in milliseconds, torque on with any goal", "--fix"),
     ({"operating_mode": 4}, "warn", "extended position mode", "--fix"),
     ({"secondary_id": 7}, "error", "also obeys what is sent to servo 7", "--fix"),
     ({"startup_configuration": 1}, "warn", "switches its torque on by itself", "--fix"),

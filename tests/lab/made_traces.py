@@ -4,9 +4,7 @@ import numpy as np
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
 from gazerig.features.lab.report.report import findings_of
-from gazerig.features.lab.report.statistics import (
-    MeasureResult,
-)
+from gazerig.features.lab.report.statistics import MeasureResult
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Commanded, SaccadeEvent
 

@@ -21,13 +21,17 @@ from typer.testing import CliRunner
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.eye_tracker_csv import read_recording
-from gazerig.features.lab.analysis.reaction_finder import ReactionFinder
 from gazerig.features.lab.cli.report import app, page_file
 from gazerig.features.lab.report import blinks as blink_measures
 from gazerig.features.lab.report import eye_contact, face, landing, rests
 from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import compare_page, differences_of
-from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
+from gazerig.features.lab.report.gaze_trace import (
+    GazeTrace,
+    GazeTraceBuilder,
+    ReactionFinder,
+    TraceRow,
+)
 from gazerig.features.lab.report.landing import planned_saccades
 from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.features.lab.report.page import (

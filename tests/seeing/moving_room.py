@@ -144,11 +144,7 @@ ROOM = (
     Board((0.3, 1.1, 2.2), (0.6, 0.3), 3),
 )
 # Still things nearer than most of the room, which pass it where the lens moves aside.
-NEAR = (
-    *ROOM,
-    Board((-0.45, 0.35, 0.9), (0.12, 0.15), 1),
-    Board((0.5, 0.4, 1.3), (0.15, 0.2), 2),
-)
+NEAR = (*ROOM, Board((-0.45, 0.35, 0.9), (0.12, 0.15), 1), Board((0.5, 0.4, 1.3), (0.15, 0.2), 2))
 PEOPLE = (
     Board((1.3, 0.5, 4.2), (0.28, 0.9), 4, True, 1.0, 0.9),
     Board((-0.9, 0.5, 2.8), (0.26, 0.85), 5, True, 0.6, 0.5),

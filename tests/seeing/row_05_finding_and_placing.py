@@ -5,16 +5,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from seeing.material import (
-    MODELS,
-    at_hand,
-    background,
-    carphone,
-    eyes_at,
-    noisy,
-    paste,
-    portrait,
-)
+from seeing.material import MODELS, at_hand, background, carphone, eyes_at, noisy, paste, portrait
 
 from gazerig.drivers.types import FaceDetector, ImageArray
 from gazerig.drivers.vision.face.detector import face_detector

@@ -81,11 +81,7 @@ def to_and_fro(rng: np.random.Generator, away_m: float) -> Way:
     """Return a way from one side of the view to the other and back, of somebody of any height."""
     wide, speed = 0.45 * away_m, rng.uniform(0.5, 1.2)
     begun, below = rng.uniform(0.0, 4.0 * wide), rng.normal(0.0, 0.08)
-    return lambda t: (
-        abs((begun + speed * t) % (4.0 * wide) - 2.0 * wide) - wide,
-        below,
-        away_m,
-    )
+    return lambda t: (abs((begun + speed * t) % (4.0 * wide) - 2.0 * wide) - wide, below, away_m)
 
 
 def crossings(rng: np.random.Generator) -> dict[str, tuple[list[Way], float]]:

@@ -16,12 +16,11 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from gazerig.features.study.journal import Journal
-from gazerig.features.study.pages.head_link import HeadLink
+from gazerig.features.study.pages.experimenter_line import HeadLink
 from gazerig.features.study.pages.server import StudyServer
-from gazerig.features.study.presenter import FilmPresenter, Presenter
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.session import StudySession
-from gazerig.features.study.study_run import StudyRun
+from gazerig.features.study.study_run import FilmPresenter, Presenter, StudyRun
 
 PARTICIPANT, EXPERIMENTER = "participants-token", "experimenters-token"
 CODE = "P007"

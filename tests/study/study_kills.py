@@ -25,8 +25,7 @@ from branch import Branch, gazerig
 from study_at_the_page import Tab, answers
 
 from gazerig.drivers.files.film_writer import film_writer
-from gazerig.features.study.journal import read
-from gazerig.features.study.records import Closed, ItemAnswered
+from gazerig.features.study.journal import Closed, ItemAnswered, read
 from gazerig.robot.model import clock
 
 STUDY = """\

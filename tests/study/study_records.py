@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from gazerig.features.study.design import Condition, Hypothesis, StatisticalPlan, StudyDesign, Test
-from gazerig.features.study.order import orders
-from gazerig.features.study.questionnaire import Item, Questionnaire
-from gazerig.features.study.records import (
+from gazerig.features.study.journal import (
     Closed,
     Consented,
     ItemAnswered,
@@ -15,6 +13,8 @@ from gazerig.features.study.records import (
     TrialBegan,
     TrialEnded,
 )
+from gazerig.features.study.order import orders
+from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.simulation import Population, SimulatedParticipant
 
 UTC = "2026-11-23T10:00:00Z"

@@ -5,7 +5,6 @@ from itertools import count
 from pathlib import Path
 
 from gazerig.features.study.journal import Journal
-from gazerig.features.study.presenter import FilmPresenter, Presenter
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.screens import (
     ConsentScreen,
@@ -19,7 +18,7 @@ from gazerig.features.study.screens import (
     Screen,
 )
 from gazerig.features.study.session import StudySession
-from gazerig.features.study.study_run import StudyRun
+from gazerig.features.study.study_run import FilmPresenter, Presenter, StudyRun
 
 UTC = "2026-01-01T00:00:00+00:00"
 

@@ -13,8 +13,8 @@ from study_records import QUESTIONS, design, records
 
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.analysis import StudyAnalysis, analyse_study
+from gazerig.features.study.journal import ItemAnswered, Record, TrialEnded
 from gazerig.features.study.participation import participation
-from gazerig.features.study.records import ItemAnswered, Record, TrialEnded
 from gazerig.features.study.report.bids import StudyDataSet, write_study
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

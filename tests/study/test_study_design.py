@@ -30,8 +30,7 @@ from gazerig.features.study.order import (
     practice,
     williams,
 )
-from gazerig.features.study.run.study_check import checked_study
-from gazerig.features.study.run.study_file import LoadedStudy, load_study
+from gazerig.features.study.run.study_file import LoadedStudy, checked_study, load_study
 from gazerig.features.study.shipped import HOME
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions

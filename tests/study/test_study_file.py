@@ -19,8 +19,7 @@ from ruamel.yaml import YAML
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
 from gazerig.features.study.pages.study_files import FOLDER
-from gazerig.features.study.run.study_check import checked_study
-from gazerig.features.study.run.study_file import load_questionnaire, load_study
+from gazerig.features.study.run.study_file import checked_study, load_questionnaire, load_study
 from gazerig.features.study.shipped import HOME
 from gazerig.gaze.attention.top_down import PLANNED
 

@@ -13,8 +13,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.film_writer import film_seconds, film_writer
 from gazerig.drivers.types import ImageArray
 from gazerig.features.study.run import film
-from gazerig.features.study.run.study_check import checked_study
-from gazerig.features.study.run.study_file import LoadedStudy, load_study
+from gazerig.features.study.run.study_file import LoadedStudy, checked_study, load_study
 
 
 @pytest.fixture(scope="module")

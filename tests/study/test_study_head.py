@@ -8,13 +8,13 @@ import pytest
 from shown_page import wait_for
 from slow_rigs import at_rate
 
-from gazerig.features.study.presenter import HeadLost
-from gazerig.features.study.records import STEP_DEG, Record, TrialBegan, TrialEnded
+from gazerig.features.study.journal import STEP_DEG, Record, TrialBegan, TrialEnded
 from gazerig.features.study.run.head_presenter import HeadPresenter
 from gazerig.features.study.run.head_process import as_line, options_in
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.run.trial_measures import SWITCH_S, measure_presentations
 from gazerig.features.study.session import ShownTrial
+from gazerig.features.study.study_run import HeadLost
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.read import RunRecording

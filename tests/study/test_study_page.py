@@ -15,14 +15,20 @@ from page_at_the_door import fetch
 from study_at_the_page import CODE, EXPERIMENTER, PARTICIPANT, Pages, Tab, answers, serving
 
 from gazerig.features.study.design import Condition
-from gazerig.features.study.journal import WriteFailed
+from gazerig.features.study.journal import (
+    Closed,
+    Consented,
+    ItemAnswered,
+    TrialBegan,
+    TrialEnded,
+    WriteFailed,
+)
 from gazerig.features.study.pages import server
-from gazerig.features.study.pages.head_link import HeadReport
+from gazerig.features.study.pages.experimenter_line import HeadReport
 from gazerig.features.study.pages.study_files import FOLDER, HEADERS
-from gazerig.features.study.presenter import FilmPresenter
-from gazerig.features.study.records import Closed, Consented, ItemAnswered, TrialBegan, TrialEnded
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 from gazerig.features.study.shipped import HOME
+from gazerig.features.study.study_run import FilmPresenter
 from gazerig.robot.dashboard.door import browsers
 from gazerig.robot.dashboard.door.admission import page_url
 

@@ -14,8 +14,13 @@ from page_layout import value, violations
 from shown_page import wait_for
 from study_at_the_page import CODE, Pages, Tab, serving
 
-from gazerig.features.study.journal import WriteFailed
-from gazerig.features.study.records import AnswerValue, ItemAnswered, TrialBegan, TrialEnded
+from gazerig.features.study.journal import (
+    AnswerValue,
+    ItemAnswered,
+    TrialBegan,
+    TrialEnded,
+    WriteFailed,
+)
 from gazerig.features.study.run.study_file import LoadedStudy, load_study
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

@@ -21,27 +21,32 @@ from gazerig.features.study.analysis import (
     within_participant_half_widths,
 )
 from gazerig.features.study.cli.analyse import verdicts
-from gazerig.features.study.collected import collect_study
 from gazerig.features.study.data_folder import StudyData, code_of
 from gazerig.features.study.design import Condition, Exclusion, Hypothesis, StudyDesign, Trials
-from gazerig.features.study.journal import FILE, Journal
-from gazerig.features.study.participation import participation
-from gazerig.features.study.preregistration import canonical
-from gazerig.features.study.records import (
+from gazerig.features.study.journal import (
+    FILE,
     STEP_DEG,
     ItemAnswered,
+    Journal,
     Opened,
     Record,
     TrialBegan,
     TrialEnded,
 )
+from gazerig.features.study.participation import collect_study, participation
+from gazerig.features.study.preregistration import canonical
 from gazerig.features.study.report import apa, figures
 from gazerig.features.study.report.page import banners, study_page
-from gazerig.features.study.report.r_script import r_script
 from gazerig.features.study.report.report import add_interim_looks, write_report
-from gazerig.features.study.report.tables import ANSWERS, answers_csv, results_json, trials_csv
+from gazerig.features.study.report.tables import (
+    ANSWERS,
+    answers_csv,
+    r_script,
+    results_json,
+    trials_csv,
+)
 from gazerig.features.study.simulation import Population
-from gazerig.features.study.statistics.results import EffectSize, StatisticalTest
+from gazerig.features.study.statistics.effects import EffectSize, StatisticalTest
 
 SHA = "ab" * 32
 

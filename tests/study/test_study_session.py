@@ -15,19 +15,22 @@ from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.answers import LONGEST_TEXT, WrongAnswer
 from gazerig.features.study.data_folder import StudyData, code_of
-from gazerig.features.study.journal import FILE, Journal, WriteFailed, encode_records, read
-from gazerig.features.study.order import PAIR
-from gazerig.features.study.presenter import HeadLost, PresentationData
-from gazerig.features.study.records import (
+from gazerig.features.study.journal import (
+    FILE,
     Closed,
     Consented,
     ItemAnswered,
+    Journal,
     Measured,
     Opened,
     Record,
     TrialBegan,
     TrialEnded,
+    WriteFailed,
+    encode_records,
+    read,
 )
+from gazerig.features.study.order import PAIR
 from gazerig.features.study.run.participant import open_journal
 from gazerig.features.study.run.simulated_session import simulate_study
 from gazerig.features.study.run.study_file import LoadedStudy, load_questionnaire, load_study
@@ -44,6 +47,7 @@ from gazerig.features.study.screens import (
 from gazerig.features.study.session import INTERRUPTED, ShownTrial
 from gazerig.features.study.shipped import HOME
 from gazerig.features.study.simulation import Population
+from gazerig.features.study.study_run import HeadLost, PresentationData
 
 
 def rating(**trials: float) -> LoadedStudy:

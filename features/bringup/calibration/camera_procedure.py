@@ -210,11 +210,7 @@ def neck_steps(
 
 
 def _average_view(
-    neck: Neck,
-    look: Look,
-    now_s: Callable[[], float],
-    board: CharucoBoard,
-    params: NeckStepParams,
+    neck: Neck, look: Look, now_s: Callable[[], float], board: CharucoBoard, params: NeckStepParams
 ) -> tuple[SeenBoard | None, Angles3, str]:
     """Average the board over some frames taken while the head was still."""
     sights: list[SeenBoard] = []

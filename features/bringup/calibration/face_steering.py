@@ -204,11 +204,7 @@ class FaceSteering:
     """
 
     def __init__(
-        self,
-        state: FaceCalibration,
-        top_down: TopDown,
-        rest_world_m: Vec3,
-        converges: bool = True,
+        self, state: FaceCalibration, top_down: TopDown, rest_world_m: Vec3, converges: bool = True
     ) -> None:
         self._converges = converges
         self.top_down = top_down

@@ -382,10 +382,7 @@ class HandEye:
 
 
 def camera_on_head(
-    views: Sequence[NeckView],
-    lens: Intrinsics,
-    width_px: int,
-    params: HandEyeParams | None = None,
+    views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: HandEyeParams | None = None
 ) -> HandEye:
     """Find the place of the camera on the head.
 

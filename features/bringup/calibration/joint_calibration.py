@@ -249,10 +249,7 @@ def with_calibration(joint: JointParams, made: Calibration) -> JointParams:
 
 
 def changes(
-    name: str,
-    joint: JointParams,
-    made: Calibration | LinkageFit,
-    park_deg: Mapping[str, float],
+    name: str, joint: JointParams, made: Calibration | LinkageFit, park_deg: Mapping[str, float]
 ) -> dict[str, Value]:
     """Return dotted keys of the rig file and their new values, only those that differ.
 

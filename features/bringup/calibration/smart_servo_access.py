@@ -48,12 +48,7 @@ class SingleServo:
     """
 
     def __init__(
-        self,
-        name: str,
-        servo_id: int,
-        model: str,
-        port: BusPort,
-        guardian: Guardian | None = None,
+        self, name: str, servo_id: int, model: str, port: BusPort, guardian: Guardian | None = None
     ) -> None:
         self.who = f"{name} (servo {servo_id})"
         self._kind = kind_of(model)

@@ -146,10 +146,7 @@ def _print_line(line: str) -> None:
 
 
 def _apply_fixes(
-    rig: Rig,
-    lines: Mapping[str, BusPort],
-    findings: Mapping[str, Sequence[Diagnostic]],
-    tell: Tell,
+    rig: Rig, lines: Mapping[str, BusPort], findings: Mapping[str, Sequence[Diagnostic]], tell: Tell
 ) -> None:
     """Apply all fixes, and print each of them."""
     done = []

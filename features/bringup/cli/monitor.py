@@ -29,7 +29,6 @@ from gazerig.features.bringup.telemetry import (
     Monitor,
     Pca9685Telemetry,
     SmartServoTelemetry,
-    Telemetry,
     TelemetryReader,
     TelemetrySample,
     as_json,
@@ -155,32 +154,30 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
     table.add_column("errors")
     for name, look in sample.servos.items():
         bus, servo_id = joints[name].bus, joints[name].id
-        table.add_row(name, f"{bus}:{servo_id}" if bus else f"{servo_id}", *_row(look))
-    return table
-
-
-def _row(look: Telemetry | None) -> tuple[str, ...]:
-    if look is None:
-        return ("",) * (_COLUMNS + 1) + ("[red]no answer[/red]",)
-    if look.errors:
-        errors = f"[red]{', '.join(look.errors)}[/red]"
-    else:
+        named = (name, f"{bus}:{servo_id}" if bus else f"{servo_id}")
+        if look is None:
+            table.add_row(*named, *("",) * (_COLUMNS + 1), "[red]no answer[/red]")
+            continue
         errors = "none" if look.measured else _UNTOLD
-    at = _number(look.position_deg, 1)
-    place = _UNTOLD if look.position_steps is None else str(look.position_steps)
-    if look.pulse_us is not None:
-        place = f"{look.pulse_us:g}" if look.pulse_us else "none"
-    return (
-        _number(look.goal_deg, 1),
-        at if look.measured or at == _UNTOLD else f"~{at}",
-        place,
-        _number(look.velocity_deg_s, 0),
-        _number(None if look.load is None else 100.0 * look.load, 0),
-        _number(look.temperature_c, 0),
-        _number(look.voltage_v, 1),
-        "on" if look.torque else "off",
-        errors,
-    )
+        if look.errors:
+            errors = f"[red]{', '.join(look.errors)}[/red]"
+        at = _number(look.position_deg, 1)
+        place = _UNTOLD if look.position_steps is None else str(look.position_steps)
+        if look.pulse_us is not None:
+            place = f"{look.pulse_us:g}" if look.pulse_us else "none"
+        table.add_row(
+            *named,
+            _number(look.goal_deg, 1),
+            at if look.measured or at == _UNTOLD else f"~{at}",
+            place,
+            _number(look.velocity_deg_s, 0),
+            _number(None if look.load is None else 100.0 * look.load, 0),
+            _number(look.temperature_c, 0),
+            _number(look.voltage_v, 1),
+            "on" if look.torque else "off",
+            errors,
+        )
+    return table
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -13,12 +13,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.features.bringup.cli.manual_session import holding_rig, holding_text
 from gazerig.features.bringup.cli.ports import MockOption, PortOption, confirm_safe, rig_ports
-from gazerig.features.bringup.look_at import (
-    ends_reached,
-    gaze_text,
-    look_at,
-    refuse_not_finite,
-)
+from gazerig.features.bringup.look_at import ends_reached, gaze_text, look_at, refuse_not_finite
 from gazerig.features.bringup.manual_control import (
     PASSING,
     JogParams,
@@ -171,11 +166,7 @@ def _manual_control(
                 "Is no hand in the mechanism?",
                 yes,
             )
-    with (
-        clear_errors(name, port, mock),
-        signals() as stopped,
-        rig_ports(rig, mock, port) as wire,
-    ):
+    with clear_errors(name, port, mock), signals() as stopped, rig_ports(rig, mock, port) as wire:
         gentle = rig.guard.soft_start_speed_deg_s
         if speed > gentle:
             say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")

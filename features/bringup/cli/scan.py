@@ -205,11 +205,7 @@ def _one(
 
 
 def _search(
-    line: BusPort,
-    usb: str,
-    asked: Sequence[tuple[BusKind, int]],
-    thorough: bool,
-    to_the_end: bool,
+    line: BusPort, usb: str, asked: Sequence[tuple[BusKind, int]], thorough: bool, to_the_end: bool
 ) -> list[SearchRound]:
     rounds = []
     errors = Console(stderr=True)

@@ -44,14 +44,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
 from gazerig.robot.app.session import prepare_shutdown
-from gazerig.robot.cli.terminal import (
-    FAULT,
-    RigArgument,
-    clear_errors,
-    say,
-    signals,
-    status,
-)
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.event_text import group_events
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
@@ -128,11 +121,7 @@ def calibrate_face(
 
 
 def _calibrate(
-    options: RunOptions,
-    rig: Rig,
-    lines: Lines,
-    scripted: bool,
-    stopped: Callable[[], str | None],
+    options: RunOptions, rig: Rig, lines: Lines, scripted: bool, stopped: Callable[[], str | None]
 ) -> FaceCalibration:
     """Let the user steer the gaze from part to part; the rig ends parked, torque off."""
     idle = rig.gaze.idle
