@@ -1,54 +1,13 @@
 """YAML to frozen values: every fault with its file and line, layer over layer."""
 
 import os
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
 
 import pytest
+from fakes.small_config import Camera, Joint, Rig, one_id_each, write
 
 from gazerig.config.load import ConfigError, ConfigFault, load
-from gazerig.params import Bounds, Unit
-
-
-@dataclass(frozen=True, slots=True)
-class Joint:
-    id: Annotated[int, Bounds(0, 252), "servo id"]
-    max_speed_deg_s: Annotated[float, Bounds(1, 2000)] = 300.0
-    low_deg: float = -30.0
-    high_deg: float = 30.0
-
-    def __post_init__(self) -> None:
-        if self.low_deg >= self.high_deg:
-            raise ValueError("low_deg must be below high_deg")
-
-
-@dataclass(frozen=True, slots=True)
-class Camera:
-    fps: Annotated[int, Bounds(1, 120), Unit("Hz")] = 30
-    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    face: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Rig:
-    name: str
-    joints: Mapping[str, Joint]
-    camera: Camera = Camera()
-    spare: Camera | None = None
-    dwell: Literal["gamma", "lognormal"] = "gamma"
-    gains: Annotated[dict[str, float], Bounds(0, 1000)] = field(default_factory=dict)
-    matrix: tuple[tuple[float, ...], ...] = ()
-    baud: int = 57_600
-
-
-def one_id_each(rig: Rig) -> Iterator[tuple[str, str]]:
-    owners: dict[int, str] = {}
-    for name, joint in rig.joints.items():
-        if joint.id in owners:
-            yield f"joints.{name}.id", f"id {joint.id} is also that of {owners[joint.id]}"
-        owners.setdefault(joint.id, name)
 
 
 def has_neck(rig: Rig) -> Iterator[tuple[str, str]]:
@@ -74,12 +33,6 @@ joints:
 camera:
   offset_m: [0, 0.5, -1e-2]
 """
-
-
-def write(folder: Path, text: str | bytes, name: str = "rig.yaml") -> Path:
-    file = folder / name
-    file.write_bytes(text.encode() if isinstance(text, str) else text)
-    return file
 
 
 def faults_of(folder: Path, text: str | bytes) -> list[str]:

@@ -19,8 +19,12 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.bus_bench import rows
 
 
-def test_open_prepares_the_servos():
-    rig = Rig()
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_open_prepares_the_servos(rig):
     servo = rig.chain[2]
     for name, value in (("operating_mode", 4), ("drive_mode", 4), ("status_return_level", 1)):
         servo.memory.set(name, value)
@@ -43,8 +47,7 @@ def test_opening_a_prepared_bus_writes_nothing_to_the_eeprom():
     assert writes == []
 
 
-def test_open_sets_the_limits_of_the_setup_and_says_so():
-    rig = Rig()
+def test_open_sets_the_limits_of_the_setup_and_says_so(rig):
     rig.chain[2].memory.set("max_position_limit", 2500)
     rig.open()
     get = rig.chain[2].memory.get
@@ -55,15 +58,13 @@ def test_open_sets_the_limits_of_the_setup_and_says_so():
     assert rig.bus.events() == ()
 
 
-def test_open_tells_a_dead_bus_from_a_missing_servo():
-    rig = Rig()
+def test_open_tells_a_dead_bus_from_a_missing_servo(rig):
     rig.port.spoil = lambda code, raw: b""
     with pytest.raises(ServoMissing, match="no servo answers: check servo power"):
         rig.open()
 
 
-def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint():
-    rig = Rig()
+def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint(rig):
     setups = [
         ServoConfig(1, "xl430-w250", 1000, 3000, 6000.0, "neck_yaw"),
         ServoConfig(2, "xl330-m077", 1000, 3000, 6000.0, "eye_left", 99),
@@ -79,8 +80,7 @@ def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint():
     assert "is one of them the missing one?" in message
 
 
-def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told():
-    rig = Rig()
+def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told(rig):
     servo = rig.chain[2]
     servo.memory.set("velocity_limit", 100)
     setup = ServoConfig(2, "xl330-m077", 1000, 3000, 6000.0, "jaw", 0, (700, 10, 30), 0.4)
@@ -133,8 +133,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
         )
 
 
-def test_the_block_can_be_left_out_by_choice():
-    rig = Rig()
+def test_the_block_can_be_left_out_by_choice(rig):
     setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
     bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(indirect_block=False))
     bus.open()
@@ -143,8 +142,7 @@ def test_the_block_can_be_left_out_by_choice():
     assert {int.from_bytes(packet[8:10], "little") for packet in rig.sent} >= {126}
 
 
-def test_open_with_an_impossible_baud_rate_names_it():
-    rig = Rig()
+def test_open_with_an_impossible_baud_rate_names_it(rig):
     setups = [ServoConfig(1, "xl330-m077", 1000, 3000, 6000.0)]
     rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(baud=1234))  # type: ignore[arg-type]
     with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
@@ -162,8 +160,7 @@ def test_old_firmware_is_read_the_plain_way():
     assert sent[-1][7] == 0x82
 
 
-def test_a_lost_setup_answer_is_asked_for_again():
-    rig = Rig()
+def test_a_lost_setup_answer_is_asked_for_again(rig):
     lost = []
 
     def lose_every_third(code, raw):
@@ -175,16 +172,14 @@ def test_a_lost_setup_answer_is_asked_for_again():
     assert rig.chain[3].memory.get("profile_velocity") == 383
 
 
-def test_a_refused_setup_read_gives_none():
-    rig = Rig()
+def test_a_refused_setup_read_gives_none(rig):
     rig.port.setBaudRate(1_000_000)
     assert Registers(rig.port, DYNAMIXEL).read(1, "goal_current") == 1750
     rig.port.spoil = lambda code, raw: status(1, 7, b"") if code == 2 else raw
     assert Registers(rig.port, DYNAMIXEL).read(1, "goal_current") is None
 
 
-def test_negative_registers_are_read_as_negative():
-    rig = Rig()
+def test_negative_registers_are_read_as_negative(rig):
     rig.port.setBaudRate(1_000_000)
     PacketHandler(2.0).write4ByteTxRx(rig.port, 1, 20, (-100) & 0xFFFFFFFF)
     assert Registers(rig.port, DYNAMIXEL).read(1, "homing_offset") == -100

@@ -4,7 +4,7 @@ import pytest
 from servo_bench import ALL, CALIBRATE, FACTORY_RESET, PING, READ, REBOOT, WRITE, FeetechBench
 
 from gazerig.drivers.feetech import memory_table as feetech_table
-from gazerig.sim_mock.feetech.tables import STS
+from gazerig.sim_mock.feetech.memory import STS
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 FACTORY = {
@@ -31,8 +31,12 @@ def restart(bench, servo_id=1):
 # --- who is there
 
 
-def test_every_register_of_a_new_servo():
-    bench = FeetechBench()
+@pytest.fixture
+def bench():
+    return FeetechBench()
+
+
+def test_every_register_of_a_new_servo(bench):
     assert {at: (n, bench.read(1, at, n)) for at, (n, _) in FACTORY.items()} == FACTORY
     assert bench.position() == 2048
 
@@ -48,8 +52,7 @@ def test_the_firmware_is_the_number_behind_3():
 
 
 @pytest.mark.parametrize(("length", "address"), [(0, 40), (253, 0), (20, 250), (5, 70)])
-def test_what_is_no_register_reads_0(length, address):
-    bench = FeetechBench()
+def test_what_is_no_register_reads_0(bench, length, address):
     [(_, _, data)] = bench.ask(1, READ, address, length)
     assert len(data) == length
     if address >= 70:
@@ -82,8 +85,7 @@ def test_a_model_that_is_not_feetechs_is_refused():
 # --- writes
 
 
-def test_read_only_registers_stay_and_nobody_complains():
-    bench = FeetechBench()
+def test_read_only_registers_stay_and_nobody_complains(bench):
     for address in (0, 3, 56, 62, 65):
         before = bench.read(1, address)
         assert bench.write(1, address, before ^ 0x55) == 0
@@ -91,14 +93,12 @@ def test_read_only_registers_stay_and_nobody_complains():
 
 
 @pytest.mark.parametrize(("address", "value", "stays"), [(5, 254, 1), (6, 8, 0), (33, 4, 0)])
-def test_ids_bauds_and_modes_that_do_not_exist_change_nothing(address, value, stays):
-    bench = FeetechBench()
+def test_ids_bauds_and_modes_that_do_not_exist_change_nothing(bench, address, value, stays):
     bench.write(1, address, value)
     assert bench.read(1, address) == stays
 
 
-def test_a_locked_eeprom_counts_until_the_power_goes():
-    bench = FeetechBench()
+def test_a_locked_eeprom_counts_until_the_power_goes(bench):
     bench.write(1, 21, 16)
     bench.write(1, 9, 500, 2)
     assert (bench.read(1, 21), bench.read(1, 9, 2)) == (16, 500)
@@ -106,8 +106,7 @@ def test_a_locked_eeprom_counts_until_the_power_goes():
     assert (bench.read(1, 21), bench.read(1, 9, 2)) == (32, 0)
 
 
-def test_only_what_is_written_while_it_is_open_is_kept():
-    bench = FeetechBench()
+def test_only_what_is_written_while_it_is_open_is_kept(bench):
     bench.write(1, 22, 5)
     bench.write(1, 55, 0)
     bench.write(1, 21, 16)
@@ -117,8 +116,7 @@ def test_only_what_is_written_while_it_is_open_is_kept():
     assert [bench.read(1, at) for at in (21, 22, 23, 55)] == [16, 32, 0, 1]
 
 
-def test_ram_starts_anew():
-    bench = FeetechBench()
+def test_ram_starts_anew(bench):
     bench.write(1, 55, 0)
     bench.write(1, 16, 700, 2)
     for address, value in ((41, 9), (42, 99), (46, 8), (48, 5)):
@@ -128,8 +126,7 @@ def test_ram_starts_anew():
     assert values == [0, 0, 0, 0, 700]
 
 
-def test_a_new_id_counts_at_once_and_is_lost_with_the_lock_closed():
-    bench = FeetechBench()
+def test_a_new_id_counts_at_once_and_is_lost_with_the_lock_closed(bench):
     assert FeetechBench.packets(bench.chain.receive(FeetechBench.instruction(1, WRITE, 5, 7))) == [
         (1, 0, b"")
     ]
@@ -166,8 +163,7 @@ def test_restore_gives_everything_back_but_the_id():
     assert [bench.read(4, at) for at in (5, 6, 21, 36)] == [4, 0, 32, 80]
 
 
-def test_a_reboot_may_be_met_with_silence():
-    bench = FeetechBench()
+def test_a_reboot_may_be_met_with_silence(bench):
     assert bench.ask(1, REBOOT) == []
     bench.wait(0.79)
     assert bench.ask(1, PING) == []

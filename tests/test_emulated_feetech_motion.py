@@ -31,9 +31,13 @@ def led_to(bench):
 # --- the path
 
 
+@pytest.fixture
+def bench():
+    return one()
+
+
 @pytest.mark.parametrize("seconds", [0.1, 0.4, 0.9])
-def test_goal_speed_alone_is_a_straight_line(seconds):
-    bench = one()
+def test_goal_speed_alone_is_a_straight_line(bench, seconds):
     bench.enable_torque()
     command(bench, 3048, speed=1000)
     bench.wait(seconds, 7)
@@ -43,9 +47,7 @@ def test_goal_speed_alone_is_a_straight_line(seconds):
 @pytest.mark.parametrize(
     ("seconds", "at"), [(0.2, 40.0), (0.5, 250.0), (1.0, 750.0), (1.5, 1000.0)]
 )
-def test_acceleration_makes_ramps_at_both_ends(seconds, at):
-    # 20 units are 2000 steps/s2: 0.5 s to 1000 steps/s, 0.5 s at it, 0.5 s to rest
-    bench = one()
+def test_acceleration_makes_ramps_at_both_ends(bench, seconds, at):
     bench.enable_torque()
     command(bench, 3048, speed=1000, acceleration=20)
     bench.wait(seconds, 5)
@@ -62,8 +64,7 @@ def test_goal_time_decides_how_long_it_takes_or_nothing():
         assert led_to(bench) == pytest.approx(at + (policy == "ignore") * 8)
 
 
-def test_no_goal_time_is_faster_than_the_motor_and_the_next_goal_brings_it_back():
-    bench = one()
+def test_no_goal_time_is_faster_than_the_motor_and_the_next_goal_brings_it_back(bench):
     bench.enable_torque()
     command(bench, 3048, speed=2000, time_ms=7)
     bench.wait(0.005)
@@ -110,8 +111,7 @@ def test_it_comes_to_its_goal_and_stays(goal, model):
     assert (bench.read(1, 66), bench.read(1, 67, 2)) == (0, goal)
 
 
-def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing():
-    bench = one()
+def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing(bench):
     bench.enable_torque()
     command(bench, 3048, speed=500)
     bench.wait(0.2)
@@ -140,8 +140,7 @@ def test_the_same_goals_give_the_same_bytes():
 # --- torque
 
 
-def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on():
-    bench = one()
+def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on(bench):
     bench.chain.choose("torque-on", "present")
     bench.write(1, 42, 3000, 2)
     bench.write(1, 40, 1)
@@ -149,8 +148,7 @@ def test_the_old_goal_may_be_forgotten_as_the_torque_comes_on():
     assert bench.position() == bench.read(1, 42, 2) == 2048
 
 
-def test_a_goal_may_switch_the_torque_on():
-    bench = one()
+def test_a_goal_may_switch_the_torque_on(bench):
     bench.chain.choose("goal", "torque-on")
     bench.write(1, 46, 1000, 2)
     assert bench.read(1, 40) == 0
@@ -160,8 +158,7 @@ def test_a_goal_may_switch_the_torque_on():
     assert bench.position() == pytest.approx(2500, abs=STEADY_STEPS)
 
 
-def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back():
-    bench = one()
+def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back(bench):
     bench.chain.faults.command("turn 1 300")
     assert bench.position() == 2348
     bench.enable_torque()
@@ -234,8 +231,7 @@ def test_a_smaller_gain_holds_softer():
 
 
 @pytest.mark.parametrize(("goal", "at"), [(100, 1000), (4000, 3000), (0x8000 | 50, 1000)])
-def test_goals_end_at_the_angle_limits(goal, at):
-    bench = one()
+def test_goals_end_at_the_angle_limits(bench, goal, at):
     bench.write(1, 9, 1000, 2)
     bench.write(1, 11, 3000, 2)
     bench.enable_torque(goal=goal)
@@ -271,8 +267,7 @@ def test_within_one_turn_it_reads_on_from_0_and_goes_the_long_way():
     assert bench.position() == pytest.approx(4000, abs=STEADY_STEPS)
 
 
-def test_the_offset_moves_the_origin():
-    bench = one()
+def test_the_offset_moves_the_origin(bench):
     bench.write(1, 31, 100, 2)
     assert bench.position() == 1948
     bench.write(1, 31, 0x800 | 100, 2)
@@ -332,8 +327,7 @@ def test_mode_wheel_turns_at_the_goal_speed_both_ways_and_stops_at_0():
     assert bench.read(1, 66) == 0
 
 
-def test_mode_wheel_follows_the_acceleration():
-    bench = one()
+def test_mode_wheel_follows_the_acceleration(bench):
     bench.write(1, 33, 1)
     bench.write(1, 41, 10)
     bench.write(1, 46, 1500, 2)
@@ -343,8 +337,7 @@ def test_mode_wheel_follows_the_acceleration():
 
 
 @pytest.mark.parametrize(("duty", "share"), [(500, 0.5), (0x400 | 250, -0.25), (0, 0.0)])
-def test_mode_pwm_gives_the_duty(duty, share):
-    bench = one()
+def test_mode_pwm_gives_the_duty(bench, duty, share):
     bench.write(1, 33, 2)
     bench.write(1, 44, duty, 2)
     bench.write(1, 40, 1)
@@ -353,8 +346,7 @@ def test_mode_pwm_gives_the_duty(duty, share):
     assert bench.chain[1].shaft.speed_steps_s == pytest.approx(TOP_STEPS_S * share, rel=0.01)
 
 
-def test_mode_step_goes_on_from_the_last_goal():
-    bench = one()
+def test_mode_step_goes_on_from_the_last_goal(bench):
     for address in (9, 11):
         bench.write(1, address, 0, 2)
     bench.write(1, 33, 3)
@@ -370,8 +362,7 @@ def test_mode_step_goes_on_from_the_last_goal():
     assert bench.position() == pytest.approx(7048, abs=STEADY_STEPS)
 
 
-def test_a_change_of_mode_under_torque_begins_at_rest_where_it_is():
-    bench = one()
+def test_a_change_of_mode_under_torque_begins_at_rest_where_it_is(bench):
     bench.enable_torque()
     bench.write(1, 33, 1)
     bench.wait(0.5)
@@ -385,8 +376,7 @@ def test_a_change_of_mode_under_torque_begins_at_rest_where_it_is():
     assert bench.read(1, 66) == 0
 
 
-def test_coarse_speeds_are_50_steps_a_second():
-    bench = one()
+def test_coarse_speeds_are_50_steps_a_second(bench):
     bench.write(1, 18, 8)
     bench.enable_torque()
     command(bench, 3048, speed=20)
@@ -395,8 +385,7 @@ def test_coarse_speeds_are_50_steps_a_second():
     assert bench.read(1, 58, 2, 15) == pytest.approx(20, abs=1)
 
 
-def test_speed_0_may_mean_to_stop():
-    bench = one()
+def test_speed_0_may_mean_to_stop(bench):
     bench.write(1, 18, 4)
     bench.enable_torque()
     command(bench, 3048, speed=0)

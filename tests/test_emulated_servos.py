@@ -83,21 +83,23 @@ def test_what_cannot_be_built(make):
         make(ServoSpec(1, make.model, 0.0, physics=Physics(load_nm=1e9)))
 
 
-def test_a_new_id_answers_once_under_the_old_one(make):
-    bench = make()
+@pytest.fixture
+def bench(make):
+    return make()
+
+
+def test_a_new_id_answers_once_under_the_old_one(bench):
     assert ids(bench.ask(1, WRITE, bench.head_of("id"), 9)) == [1]
     assert bench.ask(1, PING) == []
     assert bench.get("id", 9) == 9
 
 
-def test_what_follows_a_new_id_in_the_same_breath_is_heard(make):
-    bench = make()
+def test_what_follows_a_new_id_in_the_same_breath_is_heard(bench):
     data = bench.instruction(1, WRITE, bench.head_of("id"), 7) + bench.instruction(7, PING)
     assert ids(bench.packets(bench.chain.receive(data))) == [1, 7]
 
 
-def test_the_return_delay_stands_in_front_of_the_answer(make):
-    bench = make()
+def test_the_return_delay_stands_in_front_of_the_answer(bench):
     [reply] = bench.chain.exchange(bench.instruction(1, PING))
     assert reply.pieces[0].delay_s == pytest.approx(500e-6)
     assert reply.end == len(bench.instruction(1, PING))
@@ -106,8 +108,7 @@ def test_the_return_delay_stands_in_front_of_the_answer(make):
     assert reply.pieces[0].delay_s == pytest.approx(20e-6)
 
 
-def test_a_lower_status_return_level_answers_reads_and_pings_only(make):
-    bench = make()
+def test_a_lower_status_return_level_answers_reads_and_pings_only(bench):
     level = bench.get("status_return_level")
     assert bench.put("status_return_level", level - 1) == 0
     assert bench.put("goal_position", 257) == -1
@@ -144,8 +145,7 @@ def test_a_kept_write_waits_for_action(make):
     assert bench.get("registered_instruction") == 0
 
 
-def test_a_later_kept_write_replaces_the_first_and_action_works_once(make):
-    bench = make()
+def test_a_later_kept_write_replaces_the_first_and_action_works_once(bench):
     kept_goal(bench, 1, 1024)
     kept_goal(bench, 1, 1280)
     assert bench.ask(1, ACTION) == [(1, 0, b"")]
@@ -155,8 +155,7 @@ def test_a_later_kept_write_replaces_the_first_and_action_works_once(make):
     assert bench.get("goal_position") == 7
 
 
-def test_a_restart_forgets_a_kept_write(make):
-    bench = make()
+def test_a_restart_forgets_a_kept_write(bench):
     kept_goal(bench, 1, 1024)
     bench.chain.faults.command("brown-out 1")
     bench.wait(1.0)
@@ -227,8 +226,7 @@ def test_factory_settings_come_back_but_for_the_id_where_that_is_asked(make):
 # --- motion
 
 
-def test_the_goal_waits_for_the_torque_and_is_followed_then(make):
-    bench = make()
+def test_the_goal_waits_for_the_torque_and_is_followed_then(bench):
     bench.put("goal_position", 2300)
     bench.wait(0.5)
     assert (bench.position(), bench.get("moving")) == (2048, 0)
@@ -237,8 +235,7 @@ def test_the_goal_waits_for_the_torque_and_is_followed_then(make):
     assert bench.position() == pytest.approx(2300, abs=12)
 
 
-def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back(make):
-    bench = make()
+def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back(bench):
     bench.chain.faults.command("turn 1 300")
     assert bench.position() == 2348
     bench.enable_torque()
@@ -273,8 +270,7 @@ def test_servos_that_are_given_one_id_answer_at_once(make):
     assert bench.chain.ids() == (9, 9)
 
 
-def test_heat_takes_the_torque(make):
-    bench = make()
+def test_heat_takes_the_torque(bench):
     bench.enable_torque()
     bench.chain.faults.command("overheat 1")
     bench.wait(0.04)
@@ -284,8 +280,7 @@ def test_heat_takes_the_torque(make):
     assert bench.get("torque_enable") == 0
 
 
-def test_a_brown_out_is_deaf_and_then_as_at_power_on(make):
-    bench = make()
+def test_a_brown_out_is_deaf_and_then_as_at_power_on(bench):
     bench.enable_torque()
     bench.chain.faults.command("turn 1 10")
     bench.chain.faults.command("brown-out 1")

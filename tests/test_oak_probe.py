@@ -111,8 +111,12 @@ def test_frames_that_a_late_reader_left_lying_do_not_fill_the_line():
     assert source.events() == ()
 
 
-def test_e97_camera_without_stereo_goes_on_without_depth():
-    rig = Rig()
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_e97_camera_without_stereo_goes_on_without_depth(rig):
     rig.device.sockets = rig.device.sockets[:1]
     source = rig.source()
     source.open()
@@ -125,8 +129,7 @@ def test_e97_camera_without_stereo_goes_on_without_depth():
     assert plain.events() == ()
 
 
-def test_stereo_that_is_not_calibrated_goes_on_without_depth():
-    rig = Rig()
+def test_stereo_that_is_not_calibrated_goes_on_without_depth(rig):
     rig.device.calibration = calibrated(real(), stereo=False)
     source = rig.source()
     source.open()
@@ -134,8 +137,7 @@ def test_stereo_that_is_not_calibrated_goes_on_without_depth():
     assert "stereo pair is not calibrated" in reported and not rig.asked.depth
 
 
-def test_camera_without_colour_is_refused():
-    rig = Rig()
+def test_camera_without_colour_is_refused(rig):
     rig.device.sockets = rig.device.sockets[1:]
     with pytest.raises(CameraError, match=r"OAK-D has no camera at socket CAM_A.*use a model"):
         rig.source().open()
@@ -151,8 +153,7 @@ def test_camera_without_colour_is_refused():
         ("BMI270", False, "lacks the IMU's orientation: set oak.imu_rotation_deg"),
     ],
 )
-def test_camera_without_a_usable_gyro_goes_on_without(imu, extrinsics, told):
-    rig = Rig()
+def test_camera_without_a_usable_gyro_goes_on_without(rig, imu, extrinsics, told):
     rig.device.imu, rig.device.calibration = imu, calibrated(real(), imu=extrinsics)
     source = rig.source()
     source.open()
@@ -165,8 +166,7 @@ def test_camera_without_a_usable_gyro_goes_on_without(imu, extrinsics, told):
     assert without.events() == () and not rig.asked.gyro
 
 
-def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own():
-    rig = Rig()
+def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own(rig):
     rig.device.calibration = calibrated(real(), imu=False)
     source = rig.source(imu_rotation_deg=(0.0, 0.0, 90.0))
     source.open()
@@ -188,8 +188,7 @@ def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own():
         ({"outputs": ("cls", "obj", "bbox")}, "it has no outputs kps_8, kps_16, kps_32"),
     ],
 )
-def test_face_model_of_another_kind_is_told_and_left_out(tmp_path, archive, told):
-    rig = Rig()
+def test_face_model_of_another_kind_is_told_and_left_out(rig, tmp_path, archive, told):
     rig.device.platform = getattr(real().Platform, archive.pop("platform", "RVC4"))
     file = face_archive(tmp_path / "faces.tar.xz", **archive)
     source = rig.source(face_model=str(file))
@@ -263,8 +262,7 @@ def test_camera_that_does_not_start_is_freed_and_named():
     assert rig.waited and rig.device.closed == 1  # type: ignore[attr-defined]
 
 
-def test_camera_that_is_dropped_open_is_closed():
-    rig = Rig()
+def test_camera_that_is_dropped_open_is_closed(rig):
     source = rig.source()
     source.open()
     held: list[object] = [source]
@@ -279,8 +277,7 @@ def take(rig, source, clock, *messages):
     return [source.take(clock, threading.Event()) for _ in messages]
 
 
-def test_unplugged_camera_is_lost():
-    rig = Rig()
+def test_unplugged_camera_is_lost(rig):
     source = rig.source()
     source.open()
     rig.queue.fed.append(real().XLinkReadError("Couldn't read data from stream"))
@@ -288,8 +285,7 @@ def test_unplugged_camera_is_lost():
         source.take(lambda: 0.0, threading.Event())
 
 
-def test_stamps_in_step_with_the_host_are_used():
-    rig = Rig()
+def test_stamps_in_step_with_the_host_are_used(rig):
     source = rig.source()
     source.open()
     first, second = take(rig, source, lambda: 100.1, Message(5.0, 100.03), Message(5.033, 100.064))
@@ -299,8 +295,7 @@ def test_stamps_in_step_with_the_host_are_used():
 
 
 @pytest.mark.parametrize("stamp_s", [100.5, 90.0, 0.0])
-def test_stamps_out_of_step_give_way_to_arrivals(stamp_s):
-    rig = Rig()
+def test_stamps_out_of_step_give_way_to_arrivals(rig, stamp_s):
     source = rig.source(latency_ms=30.0)
     source.open()
     (shot,) = take(rig, source, lambda: 100.1, Message(5.0, stamp_s))
@@ -309,8 +304,7 @@ def test_stamps_out_of_step_give_way_to_arrivals(stamp_s):
     assert "not in step" in reported and "30 ms (latency_ms)" in reported
 
 
-def test_device_clock_set_anew_is_told():
-    rig = Rig()
+def test_device_clock_set_anew_is_told(rig):
     source = rig.source()
     source.open()
     now = iter([100.1, 100.1, 200.1, 200.1])

@@ -24,8 +24,12 @@ def at(player: PlaybackClock, now_s: float) -> float:
     return player.state(now_s).at_s
 
 
-def test_it_stands_at_the_beginning_until_it_is_asked_to_play() -> None:
-    player = made()
+@pytest.fixture
+def player() -> PlaybackClock:
+    return made()
+
+
+def test_it_stands_at_the_beginning_until_it_is_asked_to_play(player: PlaybackClock) -> None:
     assert player.state(100.0) == (0.0, 10.0, False, 1.0, None)
     player.play(100.0)
     assert at(player, 103.0) == pytest.approx(3.0)
@@ -35,8 +39,7 @@ def test_it_stands_at_the_beginning_until_it_is_asked_to_play() -> None:
     assert at(player, 200.5) == pytest.approx(3.5)
 
 
-def test_another_speed_holds_from_now_on() -> None:
-    player = made()
+def test_another_speed_holds_from_now_on(player: PlaybackClock) -> None:
     player.play(0.0)
     player.set_speed(0.25, 2.0)
     assert at(player, 2.0) == pytest.approx(2.0)
@@ -46,16 +49,16 @@ def test_another_speed_holds_from_now_on() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 9.0, float("nan"), float("inf")])
-def test_a_speed_outside_is_refused_and_changes_nothing(speed: float) -> None:
-    player = made()
+def test_a_speed_outside_is_refused_and_changes_nothing(
+    player: PlaybackClock, speed: float
+) -> None:
     player.play(0.0)
     with pytest.raises(ValueError, match="is not between 0.05 and 8"):
         player.set_speed(speed, 1.0)
     assert at(player, 2.0) == pytest.approx(2.0) and player.state(2.0).speed == 1.0
 
 
-def test_it_stops_at_the_end_and_begins_anew_from_there() -> None:
-    player = made()
+def test_it_stops_at_the_end_and_begins_anew_from_there(player: PlaybackClock) -> None:
     player.play(0.0)
     assert player.state(11.0)[:3] == (10.0, 10.0, False)
     assert at(player, 20.0) == 10.0
@@ -63,8 +66,7 @@ def test_it_stops_at_the_end_and_begins_anew_from_there() -> None:
     assert at(player, 21.0) == pytest.approx(1.0)
 
 
-def test_seeking_goes_on_playing_from_there_and_stays_inside() -> None:
-    player = made()
+def test_seeking_goes_on_playing_from_there_and_stays_inside(player: PlaybackClock) -> None:
     player.play(0.0)
     player.seek(6.0, 1.0)
     assert at(player, 2.0) == pytest.approx(7.0) and player.state(2.0).sought_s == 6.0
@@ -74,15 +76,13 @@ def test_seeking_goes_on_playing_from_there_and_stays_inside() -> None:
     assert at(player, 3.0) == 10.0
 
 
-def test_seeking_back_from_the_end_waits_there() -> None:
-    player = made()
+def test_seeking_back_from_the_end_waits_there(player: PlaybackClock) -> None:
     player.play(0.0)
     player.seek(4.0, 15.0)  # nobody looked since it ended
     assert player.state(16.0)[:3] == (4.0, 10.0, False)
 
 
-def test_steps_go_from_one_to_the_next_and_stand_still() -> None:
-    player = made()
+def test_steps_go_from_one_to_the_next_and_stand_still(player: PlaybackClock) -> None:
     player.play(0.0)
     places = []
     for step in ("next saccade", "next saccade", "next saccade", "previous saccade"):
@@ -96,8 +96,7 @@ def test_steps_go_from_one_to_the_next_and_stand_still() -> None:
     assert at(player, 61.0) == 2.0
 
 
-def test_no_further_step_says_so_and_stays() -> None:
-    player = made()
+def test_no_further_step_says_so_and_stays(player: PlaybackClock) -> None:
     player.seek(8.0, 0.0)
     with pytest.raises(ValueError, match="there is no next saccade"):
         player.step("next saccade", 0.0)
@@ -106,8 +105,7 @@ def test_no_further_step_says_so_and_stays() -> None:
     assert at(player, 0.0) == 8.0
 
 
-def test_what_the_page_asks_for_is_done() -> None:
-    player = made()
+def test_what_the_page_asks_for_is_done(player: PlaybackClock) -> None:
     player.handle_request({"seek_s": 2}, 0.0)
     player.handle_request({"speed": 2.0}, 0.0)
     player.handle_request({"play": True}, 0.0)
@@ -123,8 +121,7 @@ def test_what_the_page_asks_for_is_done() -> None:
      {"step": 3}, {"rewind": True}, {"play": True, "jump": 1}, {"seek_s": float("nan")},
      {"speed": float("inf")}],
 )  # fmt: skip
-def test_what_cannot_be_meant_is_refused(asked: object) -> None:
-    player = made()
+def test_what_cannot_be_meant_is_refused(player: PlaybackClock, asked: object) -> None:
     with pytest.raises(ValueError):
         player.handle_request(asked, 1.0)
     assert player.state(5.0) == (0.0, 10.0, False, 1.0, None)

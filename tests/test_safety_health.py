@@ -61,9 +61,13 @@ def reason(verdict: GuardResult) -> str:
     return verdict.applied(NAME).reason
 
 
+@pytest.fixture
+def world() -> World:
+    return World()
+
+
 @pytest.mark.parametrize("celsius", np.linspace(50.0, 75.0, 101).tolist())
-def test_heat_slows_a_joint_down_before_it_stops_it(celsius: float) -> None:
-    world = World()
+def test_heat_slows_a_joint_down_before_it_stops_it(world: World, celsius: float) -> None:
     verdicts = [world.tick(0.5, temperature_c=celsius) for _ in range(60)]
     share = min(max(1.0 - 0.8 * (celsius - 55.0) / 10.0, 0.0), 1.0)
     speeds = world.speeds()
@@ -79,15 +83,13 @@ def test_heat_slows_a_joint_down_before_it_stops_it(celsius: float) -> None:
     assert verdicts[5].level == "limited"
 
 
-def test_a_hot_joint_goes_on_slowly_when_it_has_cooled() -> None:
-    world = World()
+def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world: World) -> None:
     said = [66.0, 65.0, 64.0, 63.0, 62.0]
     verdicts = [world.tick(0.5, temperature_c=celsius) for celsius in said]
     assert [reason(verdict) for verdict in verdicts] == ["hot"] * 4 + ["starting slowly"]
 
 
-def test_a_hot_joint_lets_the_others_park() -> None:
-    world = World()
+def test_a_hot_joint_lets_the_others_park(world: World) -> None:
     world.guard.go_gently()
     for _ in range(300):
         world.t_s += DT
@@ -100,8 +102,7 @@ def test_a_hot_joint_lets_the_others_park() -> None:
 
 
 @pytest.mark.parametrize("load", [*np.linspace(0.3, 1.0, 29).tolist(), -0.6, -1.0])
-def test_load_slows_a_joint_down_before_it_stops_it(load: float) -> None:
-    world = World()
+def test_load_slows_a_joint_down_before_it_stops_it(world: World, load: float) -> None:
     stopped = slower = None
     for k in range(1000):
         verdict = world.tick(0.001 * k * DT, load=load)
@@ -120,8 +121,7 @@ def test_load_slows_a_joint_down_before_it_stops_it(load: float) -> None:
         assert slower == pytest.approx(0.5 * bearable_s, abs=3 * DT)
 
 
-def test_full_load_is_let_go_before_the_servo_would() -> None:
-    world = World()
+def test_full_load_is_let_go_before_the_servo_would(world: World) -> None:
     verdict = world.tick(0.0, load=0.0)
     while verdict.level != "hold":
         verdict = world.tick(0.08, stray=0.03, load=0.9)  # pushed by less than a stuck joint is
@@ -136,15 +136,13 @@ def test_full_load_is_let_go_before_the_servo_would() -> None:
     assert reason(verdict) == "starting slowly"
 
 
-def test_short_bursts_of_load_strain_nothing() -> None:
-    world = World()
+def test_short_bursts_of_load_strain_nothing(world: World) -> None:
     for k in range(2000):  # a saccade of 60 ms at full load, three times a second
         assert world.tick(0.0, load=1.0 if k % 66 < 12 else 0.1).level == "ok"
 
 
 @pytest.mark.parametrize("volts", np.linspace(3.0, 7.5, 91).tolist())
-def test_voltage_slows_a_joint_down_before_it_stops_it(volts: float) -> None:
-    world = World()
+def test_voltage_slows_a_joint_down_before_it_stops_it(world: World, volts: float) -> None:
     first_hold = None
     for k in range(160):
         verdict = world.tick(0.5, voltage_v=volts)
@@ -161,14 +159,12 @@ def test_voltage_slows_a_joint_down_before_it_stops_it(volts: float) -> None:
     assert world.speeds().max() >= 0.9 * share * NECK.speed_rad_s
 
 
-def test_a_short_sag_of_the_voltage_only_slows() -> None:
-    world = World()
+def test_a_short_sag_of_the_voltage_only_slows(world: World) -> None:
     for k in range(400):
         assert world.tick(0.5, voltage_v=3.4 if k % 100 < 49 else 5.0).level != "hold"
 
 
-def test_a_supply_that_recovers_when_nothing_moves_is_given_a_rest() -> None:
-    world = World()
+def test_a_supply_that_recovers_when_nothing_moves_is_given_a_rest(world: World) -> None:
     while world.tick(0.5, voltage_v=3.3).level != "hold":
         pass
     rest = 0
@@ -177,8 +173,7 @@ def test_a_supply_that_recovers_when_nothing_moves_is_given_a_rest() -> None:
     assert rest * DT == pytest.approx(0.5, abs=2 * DT)
 
 
-def test_unknown_values_strain_nothing() -> None:
-    world = World()
+def test_unknown_values_strain_nothing(world: World) -> None:
     for _ in range(100):
         verdict = world.tick(0.0, temperature_c=None, voltage_v=None, load=nan)
         assert verdict.level == "ok"
@@ -196,8 +191,7 @@ def test_slowing_down_in_flight_brakes_within_the_joints_own_strength() -> None:
         assert abs(speeds[60]) == pytest.approx(0.208 * NECK.speed_rad_s, rel=0.01)
 
 
-def test_torque_off_holds_and_goes_along_with_the_joint() -> None:
-    world = World()
+def test_torque_off_holds_and_goes_along_with_the_joint(world: World) -> None:
     for k in range(100):  # turned by hand at 57 deg/s, then let go
         where = min(0.005 * k, 0.3)
         verdict = world.tick(-0.2, stray=where, torque=False)
@@ -208,8 +202,9 @@ def test_torque_off_holds_and_goes_along_with_the_joint() -> None:
     assert 0.3 - verdict.command_rad[JOINT] <= radians(300.0) * DT * DT + 1e-9
 
 
-def test_torque_off_beyond_the_range_or_faster_than_the_joint_stays_within_its_limits() -> None:
-    world = World()
+def test_torque_off_beyond_the_range_or_faster_than_the_joint_stays_within_its_limits(
+    world: World,
+) -> None:
     for k in range(200):
         world.tick(0.0, stray=[9.0, -9.0, nan, 0.4][k // 40 % 4], torque=False)
     speeds = world.speeds()
@@ -219,8 +214,7 @@ def test_torque_off_beyond_the_range_or_faster_than_the_joint_stays_within_its_l
 
 
 @pytest.mark.parametrize("torque", [{"torque": False}, {}])
-def test_a_latched_fault_is_limp_with_its_words(torque: dict[str, bool]) -> None:
-    world = World()
+def test_a_latched_fault_is_limp_with_its_words(world: World, torque: dict[str, bool]) -> None:
     for _ in range(80):
         verdict = world.tick(0.5, stray=0.1, fault="overload and input voltage", **torque)
         assert verdict.level == "torque_off"
@@ -237,8 +231,9 @@ def test_the_gravest_reasons_stand_by_themselves() -> None:
     assert World().tick(0.0).critical_reasons == ()
 
 
-def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_should() -> None:
-    world = World()
+def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_should(
+    world: World,
+) -> None:
     for _ in range(100):
         verdict = world.tick(0.5, fault="input voltage", torque=True)
         assert verdict.level == "torque_off" and reason(verdict) == "input voltage"
@@ -246,8 +241,7 @@ def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_shoul
     assert World().tick(0.5, fault="encoder", torque=True).command_rad[JOINT] == 0.0
 
 
-def test_a_rearmed_joint_begins_where_it_is() -> None:
-    world = World()
+def test_a_rearmed_joint_begins_where_it_is(world: World) -> None:
     for _ in range(40):
         world.tick(0.4)
     verdict = world.tick(0.4, stray=-0.25, rearmed=True)

@@ -23,8 +23,12 @@ def face(x: float, y: float, kind: str = "face") -> LocalisedDetection:
     )
 
 
-def test_velocity_is_learned_and_the_lag_vanishes() -> None:
-    tracker = Tracker(TrackParams())
+@pytest.fixture
+def tracker() -> Tracker:
+    return Tracker(TrackParams())
+
+
+def test_velocity_is_learned_and_the_lag_vanishes(tracker: Tracker) -> None:
     for k in range(60):
         t = k / 30
         (track,) = tracker.step([face(1.0, 0.3 * t)], CAMERA, t)
@@ -42,8 +46,7 @@ def test_noise_in_distance_hardly_moves_the_place_across() -> None:
     assert max(abs(p[1]) for p in places) < 1e-3
 
 
-def test_two_people_keep_their_identities_when_listed_in_any_order() -> None:
-    tracker = Tracker(TrackParams())
+def test_two_people_keep_their_identities_when_listed_in_any_order(tracker: Tracker) -> None:
     first = tracker.step([face(1.0, -0.3), face(1.0, 0.3)], CAMERA, 0.0)
     ids = {track.p_world_m[1] > 0: track.id for track in first}
     for k in range(1, 30):
@@ -52,8 +55,7 @@ def test_two_people_keep_their_identities_when_listed_in_any_order() -> None:
         assert {track.p_world_m[1] > 0: track.id for track in tracks} == ids
 
 
-def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity() -> None:
-    tracker = Tracker(TrackParams())
+def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker: Tracker) -> None:
     (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
     assert [track.id for track in tracker.step([], CAMERA, 0.1)] == [seen.id]
     assert tracker.step([], CAMERA, 0.6) == ()
@@ -76,15 +78,13 @@ def test_a_face_that_stays_where_it_was_is_known_again_after_long(
     assert (tracker.step([face(1.0, y)], CAMERA, after_s)[0].id == seen.id) is same
 
 
-def test_a_thing_out_of_sight_is_not_remembered() -> None:
-    tracker = Tracker(TrackParams())
+def test_a_thing_out_of_sight_is_not_remembered(tracker: Tracker) -> None:
     (hand,) = tracker.step([face(1.0, 0.0, "hand")], CAMERA, 0.0)
     assert tracker.step([], CAMERA, 3.0) == ()
     assert tracker.step([face(1.0, 0.0, "hand")], CAMERA, 3.1)[0].id != hand.id
 
 
-def test_far_apart_is_somebody_else_and_kinds_never_mix() -> None:
-    tracker = Tracker(TrackParams())
+def test_far_apart_is_somebody_else_and_kinds_never_mix(tracker: Tracker) -> None:
     (one,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
     after = tracker.step([face(1.0, 0.6), face(1.0, 0.01, "hand")], CAMERA, 0.033)
     assert {track.detection.kind for track in after if track.id != one.id} == {"face", "hand"}
@@ -110,8 +110,7 @@ def across(y: float, x: float = 1.5, kind: str = "face") -> LocalisedDetection:
     )
 
 
-def test_an_identity_survives_a_second_behind_something() -> None:
-    tracker = Tracker(TrackParams())
+def test_an_identity_survives_a_second_behind_something(tracker: Tracker) -> None:
     for k in range(30):
         (seen,) = tracker.step([across(0.4 * k / 30)], CAMERA, k / 30)
     for k in range(30, 60):
@@ -137,9 +136,8 @@ def test_people_who_cross_keep_their_identities(apart_m: float) -> None:
     assert {"left": min(tracks, key=_y).id, "right": max(tracks, key=_y).id} == first
 
 
-def test_who_is_hidden_is_not_whoever_appears_nearby() -> None:
+def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker) -> None:
     """A man walks behind a woman; a third person turns up half a metre beside them."""
-    tracker = Tracker(TrackParams())
     near, far = across(0.0, 1.0), across(0.02, 2.0)
     for k in range(30):
         tracks = tracker.step([near, far], CAMERA, k / 30)
@@ -152,9 +150,8 @@ def test_who_is_hidden_is_not_whoever_appears_nearby() -> None:
     assert tracker.step([across(0.5, 2.0)], CAMERA, 1.0)[0].id == alone.id
 
 
-def test_what_the_detector_follows_stays_itself_beside_something_nearer() -> None:
+def test_what_the_detector_follows_stays_itself_beside_something_nearer(tracker: Tracker) -> None:
     """A patch whose middle jumps by half a metre keeps the number that the detector gave it."""
-    tracker = Tracker(TrackParams())
     near, far = across(0.0, 1.9, "thing"), across(0.05, 2.0, "thing")
     near.mark, far.mark = 1, 2
     for k in range(10):
@@ -168,18 +165,18 @@ def _y(track: Track) -> float:
     return track.p_world_m[1]
 
 
-def test_pairs_are_the_likeliest_as_a_whole() -> None:
+def test_pairs_are_the_likeliest_as_a_whole(tracker: Tracker) -> None:
     """Both have moved 0.2 m to the left: the nearest pair alone would swap them."""
-    tracker = Tracker(TrackParams())
     first = tracker.step([face(1.0, 0.0), face(1.0, 0.3)], CAMERA, 0.0)
     after = tracker.step([face(1.0, 0.5), face(1.0, 0.2)], CAMERA, 0.033)
     ids = [track.id for track in first]
     assert [track.id for track in sorted(after, key=_y)] == ids
 
 
-def test_whoever_could_be_anywhere_does_not_take_over_from_who_is_followed() -> None:
+def test_whoever_could_be_anywhere_does_not_take_over_from_who_is_followed(
+    tracker: Tracker,
+) -> None:
     """Seen once and lost, somebody may be near every place; that is no reason to be there."""
-    tracker = Tracker(TrackParams())
     tracker.step([across(-0.5, 1.0), across(0.5, 1.0)], CAMERA, 0.0)
     for k in range(1, 30):
         (followed, *_) = tracker.step([across(-0.5 + 0.8 * k / 30, 1.0)], CAMERA, k / 30)
@@ -187,8 +184,7 @@ def test_whoever_could_be_anywhere_does_not_take_over_from_who_is_followed() -> 
     assert now.id == followed.id
 
 
-def test_a_distance_known_badly_is_no_reason_to_be_somebody_else() -> None:
-    tracker = Tracker(TrackParams())
+def test_a_distance_known_badly_is_no_reason_to_be_somebody_else(tracker: Tracker) -> None:
     (one,) = tracker.step([across(0.0, 3.0)], CAMERA, 0.0)
     (same,) = tracker.step([across(0.0, 3.4)], CAMERA, 0.033)
     assert same.id == one.id
@@ -240,9 +236,8 @@ def test_a_velocity_that_was_measured_is_taken_over_at_once() -> None:
     assert track.v_world_m_s == pytest.approx((0.0, 1.0, 0.0), abs=0.02)
 
 
-def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes() -> None:
+def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker: Tracker) -> None:
     """A child's face looks 20 % farther than it is; through a hole it stays where it is."""
-    tracker = Tracker(TrackParams())
     by_depth = replace(across(0.0, 1.0), depth_measured=True, along_sd_m=0.01, size_depth=1.25)
     for k in range(20):
         (track,) = tracker.step([by_depth], CAMERA, k / 30)
@@ -286,8 +281,9 @@ def dressed(found: LocalisedDetection, *bins: int) -> LocalisedDetection:
 
 
 @pytest.mark.parametrize(("worn", "same"), [(3, True), (7, False)])
-def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(worn: int, same: bool) -> None:
-    tracker = Tracker(TrackParams())
+def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(
+    tracker: Tracker, worn: int, same: bool
+) -> None:
     for k in range(15):
         (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
     tracker.step([], CAMERA, 6.0)
@@ -304,8 +300,9 @@ def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
     assert back.id != gone.id
 
 
-def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_clothes() -> None:
-    tracker = Tracker(TrackParams())
+def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_clothes(
+    tracker: Tracker,
+) -> None:
     for k in range(30):
         both = [dressed(across(-0.3, 2.0), 3), dressed(across(0.3, 2.0), 7)]
         tracks = tracker.step(both, CAMERA, k / 30)
@@ -320,8 +317,7 @@ def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_cl
     assert [track.id for track in sorted(tracks, key=_y)] == [right, left]
 
 
-def test_people_always_in_sight_keep_their_numbers_whatever_they_put_on() -> None:
-    tracker = Tracker(TrackParams())
+def test_people_always_in_sight_keep_their_numbers_whatever_they_put_on(tracker: Tracker) -> None:
     for k in range(120):
         worn = (3, 7) if k < 40 else (7, 3)
         both = [dressed(across(y, 2.0), w) for y, w in zip((-0.4, 0.4), worn, strict=True)]
@@ -331,16 +327,14 @@ def test_people_always_in_sight_keep_their_numbers_whatever_they_put_on() -> Non
     assert [track.id for track in sorted(tracks, key=_y)] == ids
 
 
-def test_a_face_six_metres_farther_away_is_another_person() -> None:
-    tracker = Tracker(TrackParams())
+def test_a_face_six_metres_farther_away_is_another_person(tracker: Tracker) -> None:
     for k in range(10):
         (near,) = tracker.step([replace(across(0.0, 3.0), along_sd_m=0.2)], CAMERA, k / 30)
     far = replace(across(0.0, 9.0), along_sd_m=1.2)
     assert near.id not in {t.id for t in tracker.step([far], CAMERA, 0.36) if t.seen_s == t.at_s}
 
 
-def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people() -> None:
-    tracker = Tracker(TrackParams())
+def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tracker) -> None:
     for k in range(12):
         up = replace(across(0.0, 2.0), p_world_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))
         (one,) = tracker.step([up], CAMERA, k / 30)
@@ -373,8 +367,7 @@ def test_a_hand_before_the_mouth_moves_nobody_and_points_that_jump_are_no_hand()
     assert _seen_with_a_hand(0.15, 180)[1] == 0
 
 
-def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity() -> None:
-    tracker = Tracker(TrackParams())
+def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity(tracker: Tracker) -> None:
     moving = replace(face(2.0, 0.9, "thing"), mark=7)
     (thing,) = tracker.step([moving], CAMERA, 0.0)
     hand = replace(moving, kind="hand", p_world_m=(0.6, 0.27, 0.2))

@@ -19,10 +19,10 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections, ImageArray
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from fakes.runs import play  # noqa: E402
 from film_gaze import gaze_point, in_picture  # noqa: E402
 
 COLUMNS, ROWS = 4, 5
@@ -48,18 +48,7 @@ def main() -> None:
         if due and found is not None and found.image is not None and len(tiles) < COLUMNS * ROWS:
             tiles.append(tile(made, tick, found, found.image))
 
-    made.robot.start(made.clock)
-    try:
-        run(
-            made.robot,
-            made.clock,
-            made.loop,
-            lambda seconds: "seconds" if seconds >= args.seconds else None,
-            watch,
-        )
-    finally:
-        made.robot.stop()
-        made.close()
+    play(made, args.seconds, watch)
     cv2.imwrite(str(args.sheet), sheet(tiles))
 
 

@@ -24,6 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from fakes.runs import play
 from world_rigs import WorldBench, arm, write
 from world_scripts import WORLDS, shipped_world
 
@@ -39,7 +40,6 @@ from gazerig.robot.app import run_bus
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
-from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.true_gaze import gaze_off_rad, true_part
@@ -229,12 +229,7 @@ def _looked(name: str, in_world: bool, seconds: float) -> Loop:
             rows.append([degrees(v) for v in tick.joints.velocity_rad_s])
             efforts.append([one.shaft.effort for one in servos])
 
-    made.robot.start(made.clock)
-    try:
-        run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)
-    finally:
-        made.robot.stop()
-        made.close()
+    play(made, seconds, watch)
     return Loop(np.array(off), np.abs(rows).max(0), np.abs(efforts).max(0))
 
 
