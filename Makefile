@@ -13,8 +13,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 .PHONY: run test check coverage docs package bench links figures clean
 
 # In a living room with physics, where its pictures can be rendered; else one line says what that needs.
+# In a terminal Ctrl-C goes to the program alone (set -m): it parks, and make ends without an error.
 run: $(VENV)/.installed
-	$(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
+	@if [ -t 0 ]; then set -m; fi; $(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
 	  then $(BIN)/python -m gazerig.features.world.run.first_world; \
 	  else echo "a visitor without a room: features/world is not there" >&2; fi)
 
@@ -75,14 +76,15 @@ figures: $(VENV)/.installed-dev
 clean:
 	rm -rf $(VENV) build dist site .links/*.egg-info
 
-# One line that is written over again as an installer goes on; errors stay. Without a terminal, nothing
-# is rewritten.
+# One line that is rewritten while an installer works; errors stay. Without a terminal, a line for each
+# download.
 define progress
 	awk -v tty="$$(test -t 2 && echo 1)" '\
 	  /^ERROR|^error|^  (x|×|╰|├|hint)|Traceback/ { bad = 1 } \
 	  bad { print; next } \
 	  tty && /Collecting|Downloading|Downloaded|Building|Built|Installing|Resolved|Prepared|Installed/ \
 	    { printf "\r\033[K%s", substr($$0, 1, 76); fflush() } \
+	  !tty && /Downloading|Downloaded|Building|Installing|Installed/ { print "  " substr($$0, 1, 76); fflush() } \
 	  END { if (tty) printf "\r\033[K" }'
 endef
 
