@@ -193,7 +193,11 @@ def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:
     lids = [name for name in joints if name in (*_UPPER, *_LOWER)]
     if lids:
         yield "lid_joints:  # deg, each lid shut and fully open"
-        ends = [_lid_ends(name) for name in lids]
+        ends = []
+        for name in lids:
+            shut, wide = _ends_deg(name)
+            key = name.removesuffix("_lid").removesuffix("_upper")
+            ends.append(f"{key}_shut_deg: {shut}, {key}_open_deg: {wide}")
         rows = [", ".join(ends[i : i + 2]) for i in range(0, len(ends), 2)]
         yield "  {" + ",\n   ".join(rows) + "}"
     park = [f"{name}: {_ends_deg(name)[0]}" for name in lids]
@@ -231,12 +235,6 @@ def _range_deg(name: str, board: _Board) -> tuple[int, int]:
 
 def _ends_deg(lid: str) -> tuple[int, int]:
     return _UPPER_ENDS if lid in _UPPER else _LOWER_ENDS
-
-
-def _lid_ends(lid: str) -> str:
-    shut, wide = _ends_deg(lid)
-    key = lid.removesuffix("_lid").removesuffix("_upper")
-    return f"{key}_shut_deg: {shut}, {key}_open_deg: {wide}"
 
 
 def _seeing(new: NewRig, camera: str) -> Iterator[str]:

@@ -55,9 +55,6 @@ class LimitRecovery:
     plans must not advance, or the servo would jump to them as soon as its full speed is restored.
     So each of its answers is marked ``rearmed``, which makes plans begin at its position.
 
-    Args:
-        setups: The servos by id.
-
     places: last position of each such servo by id, None before it was read
     """
 

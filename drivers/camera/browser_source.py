@@ -19,11 +19,7 @@ _LARGEST_PX = 1920
 
 
 class BrowserSource:
-    """Source of the pictures in a slot.
-
-    Args:
-        pictures: Slot of the pictures.
-    """
+    """Source of the pictures in a slot."""
 
     def __init__(self, pictures: JpegSlot) -> None:
         self._pictures = pictures

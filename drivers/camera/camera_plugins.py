@@ -66,12 +66,7 @@ def create_plugin_source(name: str, params: Any) -> FrameSource:
 
 
 class CheckedSource:
-    """A frame source of another package: its results are checked, its errors become one named line.
-
-    Args:
-        source: The package's source.
-        label: Name of the camera in messages.
-    """
+    """A checked frame source of another package; its errors become one named line."""
 
     def __init__(self, source: FrameSource, label: str) -> None:
         self._source, self._label = source, label

@@ -133,12 +133,7 @@ AS_DELIVERED = FrameOrientation()
 
 
 class UprightSource:
-    """A source whose frames are turned upright.
-
-    Args:
-        source: Source of the camera's original frames.
-        orientation: Orientation of the camera.
-    """
+    """A source whose frames are turned upright."""
 
     def __init__(self, source: FrameSource, orientation: FrameOrientation) -> None:
         self._source, self._orientation = source, orientation

@@ -53,10 +53,6 @@ Value = TypeVar("Value")
 class FeedbackColumns:
     """Columns of the current exchange; values that are read in rotation are kept.
 
-    Args:
-        family: Family of the servos.
-        setups: The servos.
-
     places: plausibility check of positions
     now: all columns at present
     """

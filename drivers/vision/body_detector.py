@@ -22,14 +22,7 @@ from gazerig.drivers.vision.people import Floats, Network, PeopleDetector
 
 
 class BodyDetector:
-    """A face detector that also finds people whose face is not visible, and palms.
-
-    Args:
-        detector: Finds faces.
-        people: Finds people; None if it cannot.
-        palms: Finds palms; None if it cannot.
-        faults: Reasons why it cannot, one line each.
-    """
+    """A face detector that also finds people whose face is not visible, and palms."""
 
     def __init__(
         self,

@@ -71,14 +71,7 @@ class ClothingReader:
         faces: tuple[DetectedFace, ...],
         people: tuple[DetectedPerson, ...] = (),
     ) -> tuple[tuple[DetectedFace, ...], tuple[DetectedPerson, ...]]:
-        """Return faces and people with the colours of their clothes, if visible.
-
-        Args:
-            image: BGR image in which they were found.
-            captured_s: Time of its capture, seconds.
-            faces: Detected faces.
-            people: Detected people.
-        """
+        """Return faces and people with the colours of their clothes, if visible."""
         of_faces = [_of_face(one) for one in faces]
         now = [(captured_s, head) for head in of_faces if head is not None]
         self._before = now + [

@@ -35,12 +35,7 @@ _SAME = 0.6
 
 
 class PalmDetector:
-    """Detector of palms of the nearest person.
-
-    Args:
-        params: Rate of searches.
-        network: Runs the network.
-    """
+    """Detector of palms of the nearest person."""
 
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
         self._params, self._network = params, network

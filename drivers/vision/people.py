@@ -59,12 +59,7 @@ class _Square(NamedTuple):
 
 
 class PeopleDetector:
-    """Detector of people, which searches a part of each frame.
-
-    Args:
-        params: Rate of searches and smallest confidence.
-        network: Runs the network.
-    """
+    """Detector of people, which searches a part of each frame."""
 
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
         self._params, self._network = params, network

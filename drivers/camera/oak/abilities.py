@@ -52,14 +52,11 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
     Raises:
         UnusableModel: it is for another chip, or does not detect faces with five landmarks.
     """
-    # Why an archive does not run on a chip, "" if it does.
-    chips = list(archive.getSupportedPlatforms())
+    chips, wrong = list(archive.getSupportedPlatforms()), ""
     if not chips:
         wrong = "its network is not converted for the chip of an OAK camera"
     elif platform not in chips:
         wrong = f"it is made for {', '.join(chip.name for chip in chips)}, this is {platform.name}"
-    else:
-        wrong = ""
     heads = archive.getConfig().model.heads or []
     parsers = [str(head.parser) for head in heads]
     kind: FaceNet | None = None
@@ -67,7 +64,11 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
         if len(heads) != 1:
             wrong = f"its description has {len(heads)} heads, wanted 1"
         elif "yunet" in parsers[0].lower():
-            wrong = _yunet_fault(archive)
+            outputs = archive.getConfig().model.outputs
+            wrong = fault_of_names([str(output.name) for output in outputs])
+            size = archive.getInputSize()
+            if not wrong and (size is None or size[0] % STRIDES[-1] or size[1] % STRIDES[-1]):
+                wrong = f"its frames of {size} are no multiples of {STRIDES[-1]} px"
             kind = None if wrong else "yunet"
         elif "yolo" in parsers[0].lower():
             points = heads[0].metadata.nKeypoints or 0
@@ -82,17 +83,6 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
             f"the face model {file} cannot be used: {wrong}; {_CURE.format(chip=platform.name)}"
         )
     return kind
-
-
-def _yunet_fault(archive: Any) -> str:
-    """Return why the network of an archive is no YuNet, "" if it is."""
-    names = [str(output.name) for output in archive.getConfig().model.outputs]
-    if wrong := fault_of_names(names):
-        return wrong
-    size = archive.getInputSize()
-    if size is None or size[0] % STRIDES[-1] or size[1] % STRIDES[-1]:
-        return f"its frames of {size} are no multiples of {STRIDES[-1]} px"
-    return ""
 
 
 _USB2_BYTES_S = 30e6

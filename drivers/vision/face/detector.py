@@ -77,13 +77,7 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
 
 
 class CheckedDetector:
-    """A detector of another package, replaced by ours after it has failed.
-
-    Args:
-        detector: The package's detector.
-        label: Name of the detector in messages.
-        ours: Creates the replacement.
-    """
+    """A detector of another package, replaced by ours after it has failed."""
 
     def __init__(
         self, detector: FaceDetector, label: str, ours: Callable[[], FaceDetector]

@@ -196,13 +196,7 @@ class MeshNetworks:
     def _eyes(
         self, image: ImageArray, points: NDArray[np.float32], eyes: EyeLandmarkCache | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-        """Return irises and lids of both eyes in pixels of the image, None if unknown.
-
-        Args:
-            image: Image (height, width, 3), BGR.
-            points: Points of the mesh.
-            eyes: Eyes of earlier frames.
-        """
+        """Return irises and lids of both eyes in pixels of the image, None if unknown."""
         maps = [_eye_square_map(points, corners) for corners in _EYE_CORNERS]
         placed = [to_image for to_image in maps if to_image is not None]
         if len(placed) < len(maps):
@@ -258,12 +252,7 @@ def _square_map(middle: Floats, side: float, across: Floats, size_px: int) -> Fl
 
 
 def _eye_square_map(points: NDArray[np.float32], which: tuple[int, int]) -> Floats | None:
-    """Return the map (2, 3) from the crop of an eye to pixels of the image, None if invalid.
-
-    Args:
-        points: Points of the mesh.
-        which: Indices of the corners of the eye.
-    """
+    """Return the map (2, 3) from the crop of an eye to pixels of the image, None if invalid."""
     corners = points[list(which), :2].astype(np.float64)
     across = corners[1] - corners[0]
     side = _EYE_SIDE * float(np.hypot(*across))

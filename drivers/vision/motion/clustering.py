@@ -107,12 +107,9 @@ def _components(mask: Mask, flow: Flow, close_px: int, least: int, most: int = 1
         window = np.s_[top : top + height, left : left + width]
         y, x = np.nonzero((labels[window] == k) & mask[window])
         if len(x) >= least:
-            groups.append(_group(x + left, y + top, flow))
+            x, y = x + left, y + top
+            groups.append(Group(x, y, flow[y, x].astype(np.float64)))
     return groups
-
-
-def _group(x: Indices, y: Indices, flow: Flow) -> Group:
-    return Group(x, y, flow[y, x].astype(np.float64))
 
 
 def _split(group: Group, things: MotionMask, least: int, splits: int) -> list[Group]:

@@ -201,26 +201,26 @@ class MotionDetector:
         things = segment_motion(pair, ego, params, R_now_before is None, still)
         groups = cluster_motion(things, params)
         frames = blur_images(pair) if groups else ()
-        measured = [
-            (group, _measure(group, frames, _background_warp(group, pair, ego))) for group in groups
-        ]
-        measured = [
-            one
-            for one in measured
-            if _motion_px(one[0], one[1][1], now.grey.shape) > params.min_flow_px
-        ]
-        groups, motions = [group for group, _ in measured], [motion for _, motion in measured]
+        moving: list[tuple[Group, Floats, PatchMotion]] = []
+        for group in groups:
+            # The map of a still patch there to the older image.
+            off = np.zeros(2)
+            if pair.shift is not None:
+                off = np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64)
+            centre, motion = _measure(group, frames, BackgroundWarp(ego.B, off))
+            if _motion_px(group, motion, now.grey.shape) > params.min_flow_px:
+                moving.append((group, centre, motion))
         follows = self._tracks.step(
-            [centre for centre, _ in motions],
-            [np.array(motion.slide_px) / dt_s for _, motion in motions],
-            [float(np.sqrt(group.box[2] * group.box[3])) for group in groups],
+            [centre for _, centre, _ in moving],
+            [np.array(motion.slide_px) / dt_s for _, _, motion in moving],
+            [float(np.sqrt(group.box[2] * group.box[3])) for group, _, _ in moving],
             ego.total,
             now.captured_s,
             dt_s,
         )
         blobs = tuple(
             self._blob(group, motion, follow, now, depth, dt_s)
-            for group, (_, motion), follow in zip(groups, motions, follows, strict=True)
+            for (group, _, motion), follow in zip(moving, follows, strict=True)
             if self._tracks.confirmed(follow)
         )
         return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
@@ -340,13 +340,6 @@ def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -
     now, before = np.asarray(R_world_now, float), np.asarray(R_world_before, float)
     out: Floats = now.T @ before
     return out
-
-
-def _background_warp(group: Group, pair: ImagePair, ego: EgoMotion) -> BackgroundWarp:
-    """Return the map of a still patch to the older image."""
-    if pair.shift is None:
-        return BackgroundWarp(ego.B, np.zeros(2))
-    return BackgroundWarp(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
 
 
 def _measure(

@@ -215,10 +215,6 @@ def _outlines_kept(pair: ImagePair, B: Floats) -> float:
 
     Boards and door frames on a plain wall have no corners, so people who walk in front of it have
     all of the texture.
-
-    Args:
-        pair: Two images.
-        B: Homography (3, 3) of the assumed motion of the whole image.
     """
     height, width = pair.now.shape
     y, x = np.mgrid[:height, :width]

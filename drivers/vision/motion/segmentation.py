@@ -203,12 +203,7 @@ def _dot(a: Flow, b: Flow) -> Plane:
 
 
 def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
-    """Return the positions of the still room's pixels in the older image, (h, w, 2).
-
-    Args:
-        B: Homography (3, 3) from pixels of the newer image to those of the older.
-        shape: Shape of the images.
-    """
+    """Return the positions of the still room's pixels in the older image, (h, w, 2)."""
     height, width = shape
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
     (a, b, c), (d, e, f), (g, h, i) = B.astype(np.float32)
