@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from gazerig.errors import HeadEnded, NotFound
@@ -40,12 +39,7 @@ class RemoteHead(Head):
         """Return the head itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Give up control and disconnect."""
         self._client.close()
 
@@ -122,7 +116,7 @@ def connect(
     fitting = [head for head in found if head.rig == rig]
     for head in found:
         if len(fitting) != 1 or head is not fitting[0]:
-            head.__exit__(None, None, None)
+            head.__exit__()
     if len(fitting) == 1:
         return fitting[0]
     there = ", ".join(f"{head.pid} ({head.rig})" for head in found) or "start one: gazerig run ..."

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from present import present
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.video_file import VideoFile
-from gazerig.drivers.camera.video_timestamps import (
+from gazerig.drivers.camera.video_file import (
+    VideoFile,
     VideoTimestamps,
     ascending_times,
     from_frame_times,

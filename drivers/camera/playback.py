@@ -15,7 +15,7 @@ from mcap.records import Channel, Header, Message
 
 from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.video_timestamps import VideoPacing, VideoTimestamps
+from gazerig.drivers.camera.video_file import VideoPacing, VideoTimestamps
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.files.file_input import MAGIC, open_mcap
 
