@@ -8,8 +8,7 @@ or torque limit: with those sim_mock makes single steps.
 from dataclasses import dataclass
 from math import inf, pi
 
-from gazerig.sim_mock.smart_servo.controller import Loop, Motor
-from gazerig.sim_mock.smart_servo.physics import Physics
+from gazerig.sim_mock.smart_servo.physics import Loop, Motor, Physics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
 SMOOTHING = 0.25

@@ -22,7 +22,7 @@ from gazerig.robot.control.loop import Robot
 from gazerig.robot.remote.client import RobotClient
 from gazerig.sim_mock.dynamixel.chain import DynamixelChain
 from gazerig.sim_mock.feetech.chain import FeetechChain
-from gazerig.sim_mock.maestro.faults import COMMANDS as MAESTRO
+from gazerig.sim_mock.maestro.board import COMMANDS as MAESTRO
 from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = needs_all_features  # the documents describe every command

@@ -13,9 +13,8 @@ from stepped_shaft import EYE, LID, NECK, STS, SteppedShaft
 
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH_MODELS
-from gazerig.sim_mock.smart_servo.controller import DISABLED, Loop, Motor
 from gazerig.sim_mock.smart_servo.motor import Shaft
-from gazerig.sim_mock.smart_servo.physics import Physics, check_physics
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Motor, Physics, check_physics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
 DEG = 4096.0 / 360.0

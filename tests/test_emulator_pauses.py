@@ -9,12 +9,11 @@ from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
-from gazerig.sim_mock.smart_servo.controller import Loop
 from gazerig.sim_mock.smart_servo.motor import Shaft
-from gazerig.sim_mock.smart_servo.pauses import PAUSE_MS, long_pause
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import Loop, Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 from gazerig.sim_mock.smart_servo.protection import ServoProtection
+from gazerig.sim_mock.smart_servo.quirks import PAUSE_MS, long_pause
 
 HOUR_S = 3600.0
 GOAL, GOAL_SPEED, MODE = 42, 46, 33

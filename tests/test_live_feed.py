@@ -31,7 +31,7 @@ from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import Snapshot
 from gazerig.robot.remote.request_handler import Pulse
-from gazerig.sim_mock.scenes.picture import ScenePicture
+from gazerig.sim_mock.scenes.scene import ScenePicture
 
 
 class Run(NamedTuple):

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from maestro_world import PROTOCOL, World, acceleration, speed, target
 
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.maestro.channel import EmulatedChannel, largest_braking_step
+from gazerig.sim_mock.maestro.body import EmulatedChannel, largest_braking_step
 from gazerig.sim_mock.maestro.commands import ERRORS, crc7
 
 TIMEOUT = 1 << ERRORS.index("timeout")

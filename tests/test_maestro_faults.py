@@ -10,9 +10,8 @@ from maestro_world import PROTOCOL, World, acceleration, speed, target
 from gazerig.drivers.errors import BusLost
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.maestro.board import SIZES, build_board
+from gazerig.sim_mock.maestro.board import COMMANDS, SIZES, build_board
 from gazerig.sim_mock.maestro.commands import ERRORS
-from gazerig.sim_mock.maestro.faults import COMMANDS
 
 
 @pytest.fixture

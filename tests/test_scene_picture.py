@@ -15,7 +15,7 @@ from gazerig.robot.app.scene_files import load_scene, scene_names
 from gazerig.robot.dashboard.feed.camera_overlay import draw_heat
 from gazerig.robot.dashboard.feed.live_feed import GazeTrail
 from gazerig.robot.model.scene_view import PinholeView
-from gazerig.sim_mock.scenes.picture import ScenePicture
+from gazerig.sim_mock.scenes.scene import ScenePicture
 
 SIZE_PX = (640, 400)
 LENS = intrinsics_of_view(radians(69.0), *SIZE_PX)
@@ -64,7 +64,7 @@ def test_nothing_in_front_of_the_camera_and_a_face_at_the_lens_are_drawn_without
 
 def test_the_control_loop_need_not_load_opencv_to_name_a_picture() -> None:
     script = (
-        "import sys, pickle; from gazerig.sim_mock.scenes.picture import ScenePicture;"
+        "import sys, pickle; from gazerig.sim_mock.scenes.scene import ScenePicture;"
         "from gazerig.robot.app.scene_files import load_scene, scene_names;"
         "pickle.dumps(ScenePicture(load_scene('visitor'))); sys.exit('cv2' in sys.modules)"
     )

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from gazerig.features.world.shaft import ShaftAxis, WorldShaft
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
-from gazerig.sim_mock.smart_servo.controller import STEPS_PER_TURN, Loop
-from gazerig.sim_mock.smart_servo.physics import Physics
+from gazerig.sim_mock.smart_servo.physics import STEPS_PER_TURN, Loop, Physics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
 PHYSICS = Physics(rotor_s=0.008, coulomb_share=0.04, viscous_share=0.0, supply_ohm=0.0)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from gazerig.drivers.types import Feedback, ServoConfig
 from gazerig.features.world.shaft import LIMP, SPEED_UNIT, Effort, ShaftAxis
 from gazerig.sim_mock.ideal.bus import LAG_S, WARM_C, IdealBus
-from gazerig.sim_mock.smart_servo.controller import MS_S
+from gazerig.sim_mock.smart_servo.physics import MS_S
 
 ROTOR_KG_M2 = 2e-4
 FRICTION_NM = 0.006

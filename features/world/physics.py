@@ -17,10 +17,9 @@ from gazerig.features.world.shaft import ShaftAxis, WorldShaft
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
-from gazerig.sim_mock.smart_servo.controller import MS_S, Motor
+from gazerig.sim_mock.smart_servo.integration import whole_ms
 from gazerig.sim_mock.smart_servo.motor import Shaft, own_shaft
-from gazerig.sim_mock.smart_servo.physics import Physics
-from gazerig.sim_mock.smart_servo.span import whole_ms
+from gazerig.sim_mock.smart_servo.physics import MS_S, Motor, Physics
 
 DEVICE_MS = 5
 """Period of the update of all devices, so that no watchdog trips late; their servos check heat and

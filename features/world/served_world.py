@@ -14,7 +14,7 @@ from gazerig.features.world.state_file import StateWriter
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.pty.line import BusSettings
-from gazerig.sim_mock.smart_servo.span import whole_ms
+from gazerig.sim_mock.smart_servo.integration import whole_ms
 
 PUBLISH_MS = 5
 """Period of the states; a camera uses one in six."""

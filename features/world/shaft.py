@@ -14,19 +14,18 @@ from typing import Any
 
 from gazerig.features.world.model import RigIndices, shaft_rad_of
 from gazerig.features.world.rig_in_world import ServoInWorld
-from gazerig.sim_mock.smart_servo.controller import (
+from gazerig.sim_mock.smart_servo.integration import RESOLUTION, SLOWEST, SMOOTHING
+from gazerig.sim_mock.smart_servo.motor import Shaft
+from gazerig.sim_mock.smart_servo.physics import (
     DISABLED,
     MS_S,
     STEPS_PER_RAD,
     STEPS_PER_TURN,
     Loop,
     Motor,
+    Physics,
 )
-from gazerig.sim_mock.smart_servo.integration import RESOLUTION, SLOWEST
-from gazerig.sim_mock.smart_servo.motor import Shaft
-from gazerig.sim_mock.smart_servo.physics import Physics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile
-from gazerig.sim_mock.smart_servo.span import SMOOTHING
 
 JAM_NM = 20.0
 """Dry friction of a jammed joint."""

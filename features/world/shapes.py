@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.features.world.figure import Figures
-from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.other_heads import OtherHeads
 from gazerig.features.world.rig_in_world import RigInWorld
 from gazerig.features.world.rotations import rotation_matrix
+from gazerig.features.world.world_scene import RigFrame
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.gaze.types import Vec3
 from gazerig.robot.description.mesh import Painted

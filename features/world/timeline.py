@@ -1,5 +1,9 @@
-"""Acts of people in a room: their durations by its paths, and their targets."""
+"""Acts of people in a room: durations by its paths, targets, faults that prevent the play."""
 
+from collections.abc import Iterable, Iterator
+from math import hypot
+
+from gazerig.features.world.object_handover import handover_faults
 from gazerig.features.world.room import (
     places_for,
     places_of,
@@ -9,8 +13,8 @@ from gazerig.features.world.room import (
 )
 from gazerig.gaze.types import Vec3
 from gazerig.sim_mock.scenes import timeline
-from gazerig.sim_mock.scenes.script import HEAD, Act, SceneScript
-from gazerig.sim_mock.scenes.timeline import LASTS_S, TimedAct
+from gazerig.sim_mock.scenes.script import HEAD, Act, Fault, PersonScript, SceneScript
+from gazerig.sim_mock.scenes.timeline import LASTS_S, TimedAct, name_faults, overlap_faults
 
 HEAD_M: Vec3 = (0.05, 0.0, 0.125)
 """Gaze target of people who look at the robot: between the eyes of a head on its neck base."""
@@ -46,3 +50,112 @@ def timed_acts(script: SceneScript, name: str, seed: int) -> tuple[TimedAct, ...
         return None if act.to in script.people else place_m(script, act.to)
 
     return timeline.timed_acts(script, name, seed, lasts_s, target)
+
+
+HEADS_APART_M = 0.4
+"""Smallest distance of two necks."""
+
+
+def faults(script: SceneScript) -> Iterable[Fault]:
+    """Yield the faults of a script, each with its key."""
+    if script.room == "none":
+        yield "room", "a world needs one: play the script with --scene, or name a room"
+        return
+    yield from _misplaced_heads(script)
+    found = [*_without_room(script), *name_faults(script, places_of(script))]
+    yield from found
+    if found:
+        return
+    timelines = {name: timed_acts(script, name, 0) for name in script.people}
+    yield from handover_faults(script, timelines)
+    for name, person in script.people.items():
+        yield from overlap_faults(script, f"people.{name}", timelines[name])
+        yield from _legs(script, name, person)
+    yield from _crowded(script)
+
+
+def _misplaced_heads(script: SceneScript) -> Iterator[Fault]:
+    """Find heads with an invalid name or too close to another."""
+    placed = [("", 0.0, 0.0)]
+    for name, head in script.heads.items():
+        key = f"heads.{name}"
+        if not name.isidentifier() or name == HEAD or name in script.people:
+            yield key, "a name has letters, digits and _, begins with a letter and is unique"
+        for other, x_m, y_m in placed:
+            if hypot(head.x_m - x_m, head.y_m - y_m) < HEADS_APART_M:
+                beside = f"head {other}" if other else "the first head"
+                yield key, f"it is less than {HEADS_APART_M} m from {beside}: move it away"
+        placed.append((name, head.x_m, head.y_m))
+
+
+def _without_room(script: SceneScript) -> Iterator[Fault]:
+    """Find what only a script without a room may have, and things that nobody holds."""
+    people = ", ".join(script.people)
+    for name, person in script.people.items():
+        for i, act in enumerate(person.acts):
+            if act.do in ("glance", "spin") or act.frees != "face":
+                yield f"people.{name}.acts.{i}.do", f"{act.do} of this kind needs room: none"
+        for key in ("level", "sway", "wave"):
+            if getattr(person, key) != getattr(PersonScript(""), key):
+                yield f"people.{name}.{key}", "needs room: none"
+    for name, thing in script.things.items():
+        if thing.held_by not in script.people:
+            yield f"things.{name}.held_by", f"no person {thing.held_by!r}; there are {people}"
+        if thing.at or thing.acts or thing.kind not in ("cup", "ball"):
+            yield f"things.{name}", "at, acts, and kinds other than cup and ball need room: none"
+
+
+def _legs(script: SceneScript, name: str, person: PersonScript) -> Iterator[Fault]:
+    """Find a walk of a seated person, a sitting without a seat, or an end of round elsewhere."""
+    places = places_of(script)
+    at = person.start
+    seated = places[at].seat_m is not None
+    for i, act in enumerate(person.acts):
+        key = f"people.{name}.acts.{i}.do"
+        if act.do in ("walk", "step", "turn"):
+            if seated:
+                yield key, f"the person is seated on {at}; add `stand` before {act.do}"
+            if act.do != "turn":
+                at = act.to or "away"
+            seated = False
+        elif act.do == "sit":
+            if seated:
+                yield key, f"is already seated on {at}"
+            elif at not in places or places[at].seat_m is None:
+                yield key, f"there is no seat at {at}; walk to one before it"
+            seated = True
+        elif act.do == "stand":
+            if not seated:
+                yield key, "is already standing"
+            seated = False
+    if any(act.do in ("walk", "sit", "stand") for act in person.acts) and (
+        at != person.start or seated != (places[at].seat_m is not None)
+    ):
+        yield (
+            f"people.{name}.acts",
+            f"ends the round {'on' if seated else 'at'} {at}, began it at {person.start}; "
+            "let it end there",
+        )
+
+
+def _crowded(script: SceneScript) -> Iterator[Fault]:
+    """Find two people at one place at the same time."""
+    stays: dict[str, list[tuple[float, float, str, str]]] = {}
+    for name, person in script.people.items():
+        at, since_s, key = person.start, 0.0, f"people.{name}.start"
+        for i, one in enumerate(timed_acts(script, name, 0)):
+            if one.act.do == "walk" and one.act.to != at:
+                stays.setdefault(at, []).append((since_s, one.start_s, name, key))
+                at, since_s, key = one.act.to, one.end_s, f"people.{name}.acts.{i}.to"
+        stays.setdefault(at, []).append((since_s, script.round_s, name, key))
+    for at, found in stays.items():
+        if places_of(script)[at].outside:
+            continue
+        for k, (start_s, end_s, name, key) in enumerate(found):
+            for other_start_s, other_end_s, other, _ in found[:k]:
+                if name != other and max(start_s, other_start_s) < min(end_s, other_end_s) - 1e-9:
+                    yield key, f"{other} is at {at} then; choose another place or time"
+
+
+CHECKS = (faults,)
+"""Rules between several fields, for ``gazerig.config.load.load`` of a SceneScript."""

@@ -33,7 +33,7 @@ from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.live_server import LiveServer
-from gazerig.sim_mock.scenes.picture import ScenePicture
+from gazerig.sim_mock.scenes.scene import ScenePicture
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder

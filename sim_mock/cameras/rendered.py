@@ -30,9 +30,10 @@ from gazerig.sim_mock.cameras.draw_room import draw_room
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
+    Sensor,
+    SensorParams,
     expose,
 )
-from gazerig.sim_mock.cameras.sensor import Sensor, SensorParams
 from gazerig.sim_mock.scenes.scene import Scene, Thing
 
 _HAND_RADIUS_M = 0.07

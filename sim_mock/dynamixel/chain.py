@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from functools import partial
 
 from gazerig.drivers.dynamixel.control_table import EEPROM_END
-from gazerig.sim_mock.dynamixel.fast_read import fast_reply
-from gazerig.sim_mock.dynamixel.framing import DynamixelFraming
 from gazerig.sim_mock.dynamixel.instructions import (
     BULK_READ,
     BULK_WRITE,
@@ -21,9 +19,14 @@ from gazerig.sim_mock.dynamixel.instructions import (
     obeys_broadcast,
     touches_eeprom,
 )
-from gazerig.sim_mock.dynamixel.packets import HEADER, fast_pieces, status
-from gazerig.sim_mock.dynamixel.quirks import DynamixelQuirks
-from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.dynamixel.packets import (
+    HEADER,
+    DynamixelFraming,
+    fast_pieces,
+    fast_reply,
+    status,
+)
+from gazerig.sim_mock.dynamixel.servo import DynamixelQuirks, DynamixelServo
 from gazerig.sim_mock.replies import Answer, Piece
 from gazerig.sim_mock.smart_servo.chain import GroupAction, ServoChain, build_chain
 from gazerig.sim_mock.smart_servo.faults import commands_of

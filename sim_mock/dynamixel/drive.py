@@ -22,12 +22,11 @@ from gazerig.sim_mock.dynamixel.modes import (
     VELOCITY,
     loop_of,
 )
-from gazerig.sim_mock.smart_servo.controller import DISABLED
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
-from gazerig.sim_mock.smart_servo.noise import LENGTH
-from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
+from gazerig.sim_mock.smart_servo.quirks import LENGTH
 
 TRIPPED = 255
 """Value of Bus Watchdog (98) after it has stopped the servo."""

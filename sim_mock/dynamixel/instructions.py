@@ -9,12 +9,7 @@ from gazerig.drivers.dynamixel.control_table import EEPROM_END
 from gazerig.sim_mock.dynamixel.memory import DATA_RANGE, INSTRUCTION_ERROR
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.smart_servo.framing import ACTION, FACTORY_RESET, REG_WRITE, WRITE
-from gazerig.sim_mock.smart_servo.instructions import (
-    GroupRead,
-    GroupWrite,
-    InstructionSet,
-    Result,
-)
+from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet, Result
 
 CLEAR, BACKUP = 0x10, 0x20
 FAST_SYNC_READ, BULK_READ, BULK_WRITE, FAST_BULK_READ = 0x8A, 0x92, 0x93, 0x9A

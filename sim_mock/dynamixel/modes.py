@@ -10,7 +10,7 @@ from collections.abc import Callable
 from math import inf
 
 from gazerig.drivers.dynamixel.control_table import PWM_FULL, VELOCITY_UNIT_STEPS_S, DynamixelModel
-from gazerig.sim_mock.smart_servo.controller import Loop
+from gazerig.sim_mock.smart_servo.physics import Loop
 
 CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM = 0, 1, 3, 4, 5, 16
 POSITION_MODES = (POSITION, EXTENDED, CURRENT_POSITION)

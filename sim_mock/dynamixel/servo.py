@@ -6,7 +6,8 @@ of register 13.
 """
 
 import struct
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from gazerig.drivers.dynamixel.control_table import (
     BACKUP_SINCE,
@@ -18,23 +19,21 @@ from gazerig.drivers.dynamixel.control_table import (
     DynamixelModel,
 )
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
-from gazerig.sim_mock.dynamixel.live_registers import (
-    MOTION,
-    MOTION_AT,
-    REFERENCE,
-    REFERENCE_AT,
-    SENSED,
-    SENSED_AT,
-    SURROUNDINGS,
-    SURROUNDINGS_AT,
-)
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
     DATA_RANGE,
     GOAL_AT,
     GOAL_END,
     INSTRUCTION_ERROR,
+    MOTION,
+    MOTION_AT,
+    REFERENCE,
+    REFERENCE_AT,
     RESULT_FAIL,
+    SENSED,
+    SENSED_AT,
+    SURROUNDINGS,
+    SURROUNDINGS_AT,
     Backup,
     DynamixelMemory,
     SensedWindow,
@@ -44,7 +43,25 @@ from gazerig.sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
 from gazerig.sim_mock.dynamixel.write_rules import GOALS, WATCHDOG_AT, WriteRules
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
+from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
+
+BadCrc = Literal["silent", "reply"]
+Stuffing = Literal["accept", "strict"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamixelQuirks(ChainQuirks):
+    """Choices of behaviour.
+
+    bad_crc: reply to a wrong CRC: silence, or error number 3
+    stuffing: an instruction with FF FF FD among its parameters that lacks byte stuffing is
+        understood by its length, or dropped
+    """
+
+    bad_crc: BadCrc = "silent"
+    stuffing: Stuffing = "accept"
+
 
 ALERT = 0x80
 WATCHDOG_UNIT_MS = 20

@@ -17,13 +17,11 @@ from gazerig.drivers.feetech.memory_table import (
 )
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
 from gazerig.drivers.feetech.memory_table import TORQUE_FULL as FULL
-from gazerig.sim_mock.feetech.memory import FeetechMemory
+from gazerig.sim_mock.feetech.memory import PWM, SERVO, STEP, WHEEL, FeetechMemory
 from gazerig.sim_mock.feetech.packets import signed, unsigned
-from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
-from gazerig.sim_mock.smart_servo.controller import DISABLED, Loop
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import DISABLED, Loop, Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 CURRENT_UNIT_A = CURRENT_UNIT_MA / 1000.0

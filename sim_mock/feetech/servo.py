@@ -1,12 +1,13 @@
 """One emulated Feetech servo: effects of writes, errors, restarts.
 
 The memory is in gazerig.sim_mock.feetech.memory, the drive of the shaft in its drive,
-undocumented behaviour in its quirks. Not emulated: reversed phases, angle resolution (30), a
-blinking LED, backup (09).
+undocumented behaviour in its ``FeetechQuirks``. Not emulated: reversed phases, angle resolution
+(30), a blinking LED, backup (09).
 """
 
 import struct
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from gazerig.drivers.feetech.memory_table import (
     EEPROM_END,
@@ -14,13 +15,44 @@ from gazerig.drivers.feetech.memory_table import (
     FeetechModel,
 )
 from gazerig.sim_mock.feetech.drive import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
-from gazerig.sim_mock.feetech.memory import FeetechMemory
-from gazerig.sim_mock.feetech.quirks import FeetechQuirks
-from gazerig.sim_mock.feetech.tables import SERVO, model_and_table
+from gazerig.sim_mock.feetech.memory import SERVO, FeetechMemory, model_and_table
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE
+from gazerig.sim_mock.smart_servo.quirks import ChainQuirks
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
+
+BroadcastPing = Literal["answer", "mix", "silence"]
+Goal = Literal["wait", "torque-on"]
+TorqueOn = Literal["old-goal", "present"]
+GoalTime = Literal["obey", "ignore"]
+OverloadEnds = Literal["new-goal", "goal-away", "torque", "restart"]
+Reboot = Literal["mute", "answer"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FeetechQuirks(ChainQuirks):
+    """Choices of behaviour.
+
+    broadcast_ping: all answer in the order of their ids, all at the same time (the bytes mix), or
+        none
+    goal: a goal position written without torque waits for it, or switches the torque on; the
+        maker's own examples never switch it on and move all the same [R]
+    torque_on: when the torque is switched on, the servo follows the old goal, or the goal becomes
+        the present position
+    goal_time: Goal Time (44) sets the duration of a move unless it is 0, or has no effect
+    overload_ends: the overload protection ends with a different goal, with a goal away from the
+        obstacle, only with torque off, or (in addition to all of these) with a restart
+    reboot: a reboot instruction is not answered, or is
+    """
+
+    broadcast_ping: BroadcastPing = "answer"
+    goal: Goal = "wait"
+    torque_on: TorqueOn = "old-goal"
+    goal_time: GoalTime = "obey"
+    overload_ends: OverloadEnds = "new-goal"
+    reboot: Reboot = "mute"
+
 
 MIDDLE = 2048
 TIME_UNIT_S = 0.01

@@ -7,8 +7,31 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from operator import and_
 
+from gazerig.sim_mock.faults.grammar import SWITCH, TIME, Argument, CommandTable, Verb, count
+from gazerig.sim_mock.faults.hobby import channel_word, hobby_verbs
+from gazerig.sim_mock.faults.verbs import counted_command, switch_command
 from gazerig.sim_mock.hobby_servo import HobbyServo
 from gazerig.sim_mock.pca9685.chip import CHANNELS, Chip
+
+CASES = {"oscillator-mhz": "MHZ"}
+
+# fmt: off
+OWN: dict[str, Verb] = {
+    "nack": Verb(counted_command("nack", "transfers are not acknowledged"), (Argument("N", count, True),),
+                 "the next N transfers are not acknowledged", TIME),
+    "stuck": Verb(switch_command("stuck", "the bus is stuck"), (SWITCH,),
+                  "the data line is held low: no transfer is possible", TIME),
+    "absent": Verb(switch_command("absent", "the boards are off the bus"), (SWITCH,),
+                   "the boards are off the bus, pulses continue", TIME),
+    "foreign": Verb(switch_command("foreign", "another chip answers"), (SWITCH,),
+                    "chips of another kind answer", TIME),
+}
+# fmt: on
+
+COMMANDS = CommandTable(
+    hobby_verbs(channel_word(255), "transfers that only write", OWN), CASES, "a channel"
+)
+
 
 STEPS_S = 100
 US_STEPS = 4

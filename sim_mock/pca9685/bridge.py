@@ -13,9 +13,8 @@ from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.faults.hobby import HobbyFaults
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
-from gazerig.sim_mock.pca9685.body import BusStuck, NotAcknowledged, Pca9685Body
+from gazerig.sim_mock.pca9685.body import CASES, COMMANDS, BusStuck, NotAcknowledged, Pca9685Body
 from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
-from gazerig.sim_mock.pca9685.faults import CASES, COMMANDS
 from gazerig.sim_mock.replies import Piece
 
 START, STOP, READ_REGISTER = ord("S"), ord("P"), ord("R")

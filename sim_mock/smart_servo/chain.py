@@ -13,19 +13,13 @@ from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
 from gazerig.sim_mock.smart_servo.addresses import AddressTable, at_baud
 from gazerig.sim_mock.smart_servo.faults import ServoFaults
-from gazerig.sim_mock.smart_servo.framing import (
-    PING,
-    SYNC_READ,
-    SYNC_WRITE,
-    Framing,
-    Instruction,
-)
+from gazerig.sim_mock.smart_servo.framing import PING, SYNC_READ, SYNC_WRITE, Framing, Instruction
 from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet
+from gazerig.sim_mock.smart_servo.integration import whole_ms
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, change_quirk
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
-from gazerig.sim_mock.smart_servo.span import whole_ms
 
 TWIN_AWAY_STEPS = 257
 """Distance of a second servo with a taken id from the first, so that they differ."""

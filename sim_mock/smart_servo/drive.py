@@ -3,12 +3,11 @@
 from abc import ABC, abstractmethod
 from typing import Any
 
-from gazerig.sim_mock.smart_servo.controller import Motor
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
-from gazerig.sim_mock.smart_servo.noise import LENGTH, SEED_APART_MS, noise_table
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
+from gazerig.sim_mock.smart_servo.physics import Motor, Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
+from gazerig.sim_mock.smart_servo.quirks import LENGTH, SEED_APART_MS, noise_table
 
 
 class Drive(ABC):

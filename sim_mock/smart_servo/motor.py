@@ -5,16 +5,16 @@ Readings do not depend on how often they are taken.
 
 from collections.abc import Callable
 
-from gazerig.sim_mock.smart_servo.controller import (
+from gazerig.sim_mock.smart_servo.integration import ShaftMotion
+from gazerig.sim_mock.smart_servo.physics import (
     DISABLED,
     MS_S,
     Loop,
     Motor,
+    Physics,
     is_linear,
     mechanics_of,
 )
-from gazerig.sim_mock.smart_servo.integration import ShaftMotion
-from gazerig.sim_mock.smart_servo.physics import Physics
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 

@@ -7,8 +7,7 @@ read. A heavy load is torque, not duty: a motor at full speed has full duty and 
 from math import inf
 from typing import NamedTuple
 
-from gazerig.sim_mock.smart_servo.controller import Motor
-from gazerig.sim_mock.smart_servo.physics import Physics
+from gazerig.sim_mock.smart_servo.physics import Motor, Physics
 
 CHECK_MS = 20
 CHECK_S = CHECK_MS / 1000.0

@@ -8,13 +8,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
-from gazerig.sim_mock.smart_servo.controller import Motor
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.framing import PING, READ, REBOOT
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.pauses import PAUSE_MS, long_pause
-from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, check_physics
+from gazerig.sim_mock.smart_servo.physics import Motor, Physics, ServoSpec, check_physics
 from gazerig.sim_mock.smart_servo.protection import CHECK_MS, Limits, ServoProtection
+from gazerig.sim_mock.smart_servo.quirks import PAUSE_MS, long_pause
 
 RETURN_DELAY_UNIT_S = 2e-6
 

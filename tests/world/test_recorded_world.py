@@ -12,11 +12,11 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 from gazerig.config.load import load, shipped, shipped_names
 from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.room import HOME
 from gazerig.features.world.run.head_group import compose_group
 from gazerig.features.world.run.recorded_world import recorded_shapes, world_info
 from gazerig.features.world.shapes import ShapesFrom, SpecShapes
+from gazerig.features.world.world_scene import RigFrame
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import compose, run
 from gazerig.robot.dashboard.feed.live_feed import (

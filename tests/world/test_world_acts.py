@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gazerig.features.world.figure import SEGMENTS, Figures
-from gazerig.features.world.script_faults import faults
+from gazerig.features.world.timeline import faults
 from gazerig.gaze.types import Floats
 from gazerig.sim_mock.scenes.script import Act, Do, PersonScript, SceneScript, ThingScript
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from gazerig.config.load import load, shipped
 from gazerig.config.shipped import shipped_names
 from gazerig.features.world.room import HOME
-from gazerig.features.world.script_faults import CHECKS
+from gazerig.features.world.timeline import CHECKS
 from gazerig.sim_mock.scenes.script import SceneScript
 
 WORLDS = shipped_names("worlds", HOME)

@@ -10,13 +10,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.features.world.heads_scene import HeadsScene, RigFrame
 from gazerig.features.world.run.run_world import world_of, world_scene
 from gazerig.features.world.run.shared_world import (
     RealTimeWorld,
     SharedWorld,
     SimulatedWorld,
 )
+from gazerig.features.world.world_scene import HeadsScene, RigFrame
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig

@@ -8,10 +8,10 @@ from gazerig.config.load import ConfigError, load
 from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
-from gazerig.features.world.heads_scene import RigFrame
 from gazerig.features.world.run.run_world import mjcf_of, world_script
-from gazerig.features.world.script_faults import CHECKS
 from gazerig.features.world.shapes import ShapesFrom, script_shapes
+from gazerig.features.world.timeline import CHECKS
+from gazerig.features.world.world_scene import RigFrame
 from gazerig.robot.analysis.mutual_gaze import HeadPlace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.world_shapes import WorldShapes

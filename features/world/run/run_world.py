@@ -33,7 +33,7 @@ from gazerig.config.schema import load_rig, rig_path
 from gazerig.drivers.errors import SetupError, extra_hint
 from gazerig.features.world.figure import Figures
 from gazerig.features.world.room import HOME
-from gazerig.features.world.script_faults import CHECKS
+from gazerig.features.world.timeline import CHECKS
 from gazerig.features.world.world_scene import WorldScene
 from gazerig.features.world.world_spec import WorldSpec
 from gazerig.robot.app.bus_wiring import bus_names

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world.heads_scene import HeadFace, RigFrame
 from gazerig.features.world.run.lockstep import Lockstep
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
 from gazerig.features.world.run.rig_room import RigRoom, served_room, simulated_room
 from gazerig.features.world.run.run_world import RunWorld, ServedRig
+from gazerig.features.world.world_scene import HeadFace, RigFrame
 from gazerig.features.world.world_spec import state_file
 from gazerig.gaze.angles import add, rotate, rotation
 from gazerig.gaze.types import Vec3
