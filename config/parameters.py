@@ -155,7 +155,9 @@ def flattened(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
     """Return changes with mappings written out as their single keys, as a file holds them."""
     out: dict[str, Value] = {}
     for key, value in changes.items():
-        if isinstance(value, Mapping) and _is_group(rig, key):
+        shape = shape_at(_root(rig), key.split("."))
+        group = shape is not None and (shape.params is not None or shape.form == "mapping")
+        if group and isinstance(value, Mapping):
             out |= flattened(rig, {f"{key}.{step}": item for step, item in value.items()})
         else:
             out[key] = value
@@ -273,12 +275,6 @@ def _at(rig: Rig, key: str) -> Value:
         return value_of(rig, key)
     except ConfigError:
         return None
-
-
-def _is_group(rig: Rig, key: str) -> bool:
-    """Return whether a key holds keys of its own in a file."""
-    shape = shape_at(_root(rig), key.split("."))
-    return shape is not None and (shape.params is not None or shape.form == "mapping")
 
 
 def _differing(

@@ -70,7 +70,13 @@ class GuardedCamera:
         self._call.close()
         self._call = BoundedCall(self._label, self._longest_s)
         given_up = threading.Event()
-        outcome = self._call.call_in_order(lambda: self._open(given_up), self._open_s)
+
+        def open_camera() -> None:
+            self.camera.open()
+            if given_up.is_set():
+                self.camera.close()
+
+        outcome = self._call.call_in_order(open_camera, self._open_s)
         if outcome is None:
             given_up.set()
             self._call.close()
@@ -82,17 +88,17 @@ class GuardedCamera:
             raise PluginError(f"{self._label} cannot be opened: {outcome.why}") from error
         self._newest, self._failed, self._asked_s, self._late = None, False, None, False
 
-    def _open(self, given_up: threading.Event) -> None:
-        """Open the camera, and close it if that took too long; may block."""
-        self.camera.open()
-        if given_up.is_set():
-            self.camera.close()
-
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections, None before the first and after a failure."""
         if self._failed:
             return None
-        outcome = self._call(lambda: self._read_camera(now_s))
+
+        def read_camera() -> tuple[Detections | None, str, tuple[str, ...]]:
+            found = self.camera.latest(now_s)
+            wrong = "" if found is self._checked else fault_of(found)
+            return found, wrong, tuple(map(str, self.camera.events()))
+
+        outcome = self._call(read_camera)
         if outcome is None:
             # Record that it has not answered, and report it once.
             if self._asked_s is None:
@@ -120,12 +126,6 @@ class GuardedCamera:
                 for line in self._off_frame.report(found.faces, *size_px):
                     self._log.add(f"{self._label}: {line}")
         return self._newest
-
-    def _read_camera(self, now_s: float) -> tuple[Detections | None, str, tuple[str, ...]]:
-        """Return the camera's detections, its fault, and its events; may block."""
-        found = self.camera.latest(now_s)
-        wrong = "" if found is self._checked else fault_of(found)
-        return found, wrong, tuple(map(str, self.camera.events()))
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""

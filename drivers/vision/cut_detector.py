@@ -45,20 +45,13 @@ class CutDetector:
         if now.std() < _LEAST_CONTRAST:
             return self._scene  # later images are compared with the last one that showed something
         before, self._before = self._before, now
-        if before is not None and _is_cut(before, now):
-            self._scene += 1
+        if before is not None and _correlation(before, now) < _WHOLE:
+            top, left = HEIGHT // _MARGIN, WIDTH // _MARGIN
+            self._scene += all(
+                _correlation(one, other[top:-top, left:-left]) < _MIDDLE
+                for one, other in ((before, now), (now, before))
+            )
         return self._scene
-
-
-def _is_cut(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
-    """Return whether two small images show different scenes."""
-    if _correlation(before, now) >= _WHOLE:
-        return False
-    top, left = HEIGHT // _MARGIN, WIDTH // _MARGIN
-    return all(
-        _correlation(one, other[top:-top, left:-left]) < _MIDDLE
-        for one, other in ((before, now), (now, before))
-    )
 
 
 def _correlation(image: NDArray[np.float32], part: NDArray[np.float32]) -> float:

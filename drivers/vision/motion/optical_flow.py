@@ -86,7 +86,12 @@ class FlowSearch:
             found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # initial guess, then result
             self._dis.calc(now, before, found)
             flow[window] = found
-            known[window] &= _flow_inside(flow[window])
+            # Flow that ends outside the other image is unknown.
+            part = flow[window]
+            height, width = part.shape[:2]
+            at_x = part[..., 0] + np.arange(width, dtype=np.float32)
+            at_y = part[..., 1] + np.arange(height, dtype=np.float32)[:, None]
+            known[window] &= (at_x >= 0) & (at_x <= width - 1) & (at_y >= 0) & (at_y <= height - 1)
         return pair._replace(flow=flow, known=known, windows=windows)
 
 
@@ -190,14 +195,4 @@ def _scale_homography(H: Floats, scale: float) -> Floats:
         [[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5], [0.0, 0.0, 1.0]]
     )
     out: Floats = S @ H @ np.linalg.inv(S)
-    return out
-
-
-def _flow_inside(flow: Flow) -> Mask:
-    """Return a mask of the pixels whose flow ends inside the other image."""
-    height, width = flow.shape[:2]
-    x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
-    at_x: Plane = flow[..., 0] + x
-    at_y: Plane = flow[..., 1] + y
-    out: Mask = (at_x >= 0) & (at_x <= width - 1) & (at_y >= 0) & (at_y <= height - 1)
     return out

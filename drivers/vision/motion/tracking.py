@@ -67,7 +67,16 @@ class MotionTracks:
         self.predict(total, t_s, dt_s)
         found: dict[int, PatchTrack] = {}
         taken: set[int] = set()
-        for _, i, j in sorted(self._pairs(centres, sizes_px)):
+        # Possible pairs of tracks and patches; their distance is a share of the gate.
+        pairs = []
+        for i, follow in enumerate(self._follows):
+            for j, centre in enumerate(centres):
+                gate = max(_LEAST_GATE_PX, _GATE_SIZES * max(follow.size_px, sizes_px[j]))
+                apart = float(np.hypot(*(centre - follow.centre))) / gate
+                ratio = max(follow.size_px, 1.0) / max(sizes_px[j], 1.0)
+                if apart <= 1.0 and 1.0 / _LARGEST_GROWTH <= ratio <= _LARGEST_GROWTH:
+                    pairs.append((apart, i, j))
+        for _, i, j in sorted(pairs):
             follow = self._follows[i]
             if follow.id in taken or j in found:
                 continue
@@ -105,15 +114,3 @@ class MotionTracks:
     def confirmed(self, follow: PatchTrack) -> bool:
         """Return whether a patch has been detected often enough."""
         return follow.seen >= self._params.confirm_frames
-
-    def _pairs(self, centres: list[Floats], sizes_px: list[float]) -> list[tuple[float, int, int]]:
-        """Return possible pairs of tracks and patches; their distance is a share of the gate."""
-        pairs = []
-        for i, follow in enumerate(self._follows):
-            for j, centre in enumerate(centres):
-                gate = max(_LEAST_GATE_PX, _GATE_SIZES * max(follow.size_px, sizes_px[j]))
-                apart = float(np.hypot(*(centre - follow.centre))) / gate
-                ratio = max(follow.size_px, 1.0) / max(sizes_px[j], 1.0)
-                if apart <= 1.0 and 1.0 / _LARGEST_GROWTH <= ratio <= _LARGEST_GROWTH:
-                    pairs.append((apart, i, j))
-        return pairs
