@@ -248,7 +248,7 @@ CLAIMS = (
     Mutant("gaze/attention/shared_attention.py", "_LARGEST_S = 5.0", "_LARGEST_S = 0.0",
            "who was looked at is never ahead",
            ("several_people::test_e88_everybody_of_six_is_looked_at_again_and_again",), ("E88",)),
-    Mutant("drivers/vision/cut_detector.py", "            self._scene += 1", "            pass",
+    Mutant("drivers/vision/cut_detector.py", "            self._scene += all(", "            _ = all(",
            "no cut is found",
            ("cuts::test_e89_identities_end_at_a_cut_and_at_nothing_else",), ("E89",)),
     Mutant("drivers/vision/face/preprocess.py",
