@@ -2,15 +2,14 @@
 
 import json
 import socket
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from email.message import Message
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import viser
+from page_visitor import VISER, fetch
 from websockets.sync.client import ClientConnection, connect
 
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
@@ -20,39 +19,10 @@ from gazerig.robot.dashboard.requests.stop_channel import StopListener, StopSend
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 
 PATIENCE_S = 20.0
-
-
-VISER = [f"viser-v{viser.__version__}"]
-
-
 TOKEN = "what-only-the-terminal-shows"
-
-
 ELSEWHERE = "http://elsewhere.example"
-
-
 OPENED: list[str] = []
 """The addresses of all doors of these tests."""
-
-
-class Opener(urllib.request.HTTPRedirectHandler):
-    """Follows no redirect, so that it can be looked at."""
-
-    def redirect_request(self, *_: object) -> None:
-        return None
-
-
-def fetch(
-    url: str, headers: dict[str, str] | None = None, body: bytes | None = None
-) -> tuple[int, dict[str, str], str]:
-    """Status, headers and text of an answer, whatever the status is."""
-    request = urllib.request.Request(url, data=body, headers=headers or {})
-    try:
-        answer = urllib.request.build_opener(Opener).open(request, timeout=PATIENCE_S)
-    except urllib.error.HTTPError as error:
-        answer = error
-    with answer:
-        return answer.status, dict(answer.headers), answer.read().decode()
 
 
 class Rig:
@@ -93,11 +63,11 @@ class Rig:
         self.stops.append(dict(asked))
         return self.stop_answer
 
-    def get(self, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
+    def get(self, path: str = "", **headers: str) -> tuple[int, Message, str]:
         """Get something as a browser does that has shown the token before."""
         return fetch(self.url + path, {"Cookie": self.cookie, **headers})
 
-    def post(self, body: bytes, **headers: str | None) -> tuple[int, dict[str, str], str]:
+    def post(self, body: bytes, **headers: str | None) -> tuple[int, Message, str]:
         """Ask for something as the page's script does, with other headers as given."""
         given = {"Cookie": self.cookie, "Origin": self.url, **headers}
         words = {k: v for k, v in given.items() if v is not None}
@@ -110,7 +80,7 @@ class Rig:
         return connect(
             f"ws://{self.address}{path}",
             origin=origin,
-            subprotocols=VISER if path == "/view" else None,  # type: ignore[arg-type]
+            subprotocols=[VISER] if path == "/view" else None,
             max_size=None,
             compression=None,
             open_timeout=PATIENCE_S,

@@ -4,6 +4,7 @@ import json
 import socket
 import urllib.error
 import urllib.request
+from email.message import Message
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -45,11 +46,24 @@ def said(data: bytes) -> str:
     return str(unpacked(data))
 
 
-class _Stay(urllib.request.HTTPRedirectHandler):
-    """Follows no redirect."""
+class Opener(urllib.request.HTTPRedirectHandler):
+    """Follows no redirect, so that it can be looked at."""
 
     def redirect_request(self, *_: object) -> None:
         return None
+
+
+def fetch(
+    url: str, headers: dict[str, str] | None = None, body: bytes | None = None
+) -> tuple[int, Message, str]:
+    """Status, headers and text of an answer, whatever the status is."""
+    request = urllib.request.Request(url, data=body, headers=headers or {})
+    try:
+        answer = urllib.request.build_opener(Opener).open(request, timeout=PATIENCE_S)
+    except urllib.error.HTTPError as error:
+        answer = error
+    with answer:
+        return answer.status, answer.headers, answer.read().decode()
 
 
 class Visitor:
@@ -61,13 +75,9 @@ class Visitor:
     def __init__(self, address: str) -> None:
         parts = urlsplit(address)
         self.url = f"{parts.scheme}://{parts.netloc}"
-        opener = urllib.request.build_opener(_Stay())
-        try:
-            with opener.open(address, timeout=PATIENCE_S) as answer:
-                raise AssertionError(f"let in without a cookie: {answer.status}")
-        except urllib.error.HTTPError as answer:
-            assert answer.code == 302, answer.code
-            cookies = answer.headers.get_all("Set-Cookie") or []
+        status, headers, _ = fetch(address)
+        assert status == 302, status
+        cookies = headers.get_all("Set-Cookie") or []
         pairs = "; ".join(cookie.partition(";")[0] for cookie in cookies)
         self.headers = {"Cookie": pairs, "Origin": self.url}
 
@@ -80,13 +90,7 @@ class Visitor:
 
     def ask(self, asked: object) -> int:
         """Ask for something as the page's script does; the status of the answer."""
-        body = json.dumps(asked).encode()
-        request = urllib.request.Request(f"{self.url}/rig/ask", body, self.headers)
-        try:
-            with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
-                return int(answer.status)
-        except urllib.error.HTTPError as error:
-            return error.code
+        return fetch(f"{self.url}/rig/ask", self.headers, json.dumps(asked).encode())[0]
 
     def open(self, path: str = "/view", receive_bytes: int | None = None) -> ClientConnection:
         """Open a websocket: "/view" is that of the view, "/rig/line" that of the stop button."""

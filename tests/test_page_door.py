@@ -16,8 +16,8 @@ from typing import Any
 import msgspec
 import pytest
 import viser
-from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, TOKEN, VISER, Rig, fetch, opened
-from page_visitor import LOOKING
+from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, TOKEN, Rig, opened
+from page_visitor import LOOKING, VISER, fetch
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
@@ -71,7 +71,7 @@ def test_a_browser_gets_what_the_server_sends(near: Rig) -> None:
     near.server.gui.add_html("words for the test")
     with near.knock() as socket_:
         assert isinstance(socket_.recv(timeout=PATIENCE_S), bytes)
-        assert socket_.subprotocol == VISER[0]
+        assert socket_.subprotocol == VISER
 
 
 def test_localhost_by_name_may_come_in(near: Rig) -> None:
@@ -197,12 +197,12 @@ def test_a_browser_that_is_silent_renews_nothing_though_its_connection_stands(ne
 
 
 def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> None:
-    near.door.once = "once-and-no-more"
+    near.door.admission.once = "once-and-no-more"
     assert fetch(f"{near.url}/?token=wrong")[0] == 403
     status, headers, _ = fetch(f"{near.url}/?token=once-and-no-more")
     assert status == 302 and TOKEN in headers["Set-Cookie"] + str(headers)
     assert fetch(f"{near.url}/?token=once-and-no-more")[0] == 403
-    assert fetch(f"{near.url}/?token={TOKEN}")[0] == 302 and near.door.once == ""
+    assert fetch(f"{near.url}/?token={TOKEN}")[0] == 302 and near.door.admission.once == ""
 
 
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:

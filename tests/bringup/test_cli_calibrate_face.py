@@ -21,7 +21,13 @@ from gazerig.config.save import save_rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.features.bringup.cli.calibrate import face as cli_face
-from gazerig.features.bringup.cli.calibration_keys import BUTTONS, PageKeys, key_and_count, keys_of
+from gazerig.features.bringup.cli.calibration_keys import (
+    BUTTONS,
+    Keys,
+    PageKeys,
+    key_and_count,
+    keys_of,
+)
 from gazerig.robot.app.run_observers import only_stops
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -252,7 +258,7 @@ def test_a_page_that_cannot_be_is_said_before_anything_moves(rig: Path) -> None:
     assert "head turns" not in done.err
 
 
-class NoKeys:
+class NoKeys(Keys):
     """Another source, of which nothing comes unless it is given."""
 
     def __init__(self) -> None:

@@ -53,7 +53,6 @@ from gazerig.features.bringup.calibration.linkage_calibration import (
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SingleJoint,
-    SingleServo,
 )
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.robot.app.run_bus import emulated_lines
@@ -94,8 +93,7 @@ class Bench:
         self.said: list[str] = []
         self.agreed = True
         name = "neck_yaw" if joint is NECK else "left_eye_pan"
-        self.servo = SingleServo(name, joint.id, joint.model, self.port)
-        self.joint = SingleJoint(name, joint, self.servo, self.clock, lambda: self.why)
+        self.joint = SingleJoint(name, joint, self.port, self.clock, lambda: self.why)
 
     def get(self, register: str) -> int:
         value = self.registers.read(self.id, register)
@@ -397,7 +395,7 @@ each = pytest.mark.parametrize("joint", [EYE, STS], ids=["dynamixel", "feetech"]
 def test_by_hand_zero_sign_and_range_are_found(joint: JointParams) -> None:
     bench = Bench(joint)
     bench.script = [-400, 850, -440]  # left end at fewer steps: the sign is -1
-    bench.servo.check()
+    bench.joint.check()
     found = calibrate_by_hand(bench.joint, bench, 2.0)
     assert found.sign == -1 and found.zero_step == pytest.approx(2110, abs=2)
     assert found.max_deg == pytest.approx((2110 - 1700) / STEPS_PER_DEG - 2.0, abs=0.2)
@@ -423,7 +421,7 @@ def test_by_hand_over_the_seam_is_refused_with_the_turn_that_helps(start: int) -
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* take the horn off"):
         calibrate_by_hand(bench.joint, bench, 2.0)
     with pytest.raises(SetupError, match="cannot set its middle"):
-        bench.servo.set_middle()
+        bench.joint.set_middle()
 
 
 def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> None:
@@ -431,7 +429,7 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set() -> Non
     bench.script = [600, -1200, 600]
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* --set-middle"):
         calibrate_by_hand(bench.joint, bench, 2.0)
-    bench.servo.set_middle()
+    bench.joint.set_middle()
     bench.script = [600, -1200, 600]
     found = calibrate_by_hand(bench.joint, bench, 2.0)
     assert found.zero_step == pytest.approx(2048, abs=4) and found.max_deg > 45.0
@@ -453,11 +451,11 @@ def test_a_servo_turned_by_whole_turns_before_gives_the_same() -> None:
 
 def test_an_offset_that_was_set_can_be_cleared_for_good() -> None:
     bench = Bench(STS, 3000)
-    bench.servo.set_middle()
+    bench.joint.set_middle()
     offset = bench.get("position_offset")
-    bench.servo.check()
+    bench.joint.check()
     assert offset
-    assert bench.servo.clear_offset() == offset
+    assert bench.joint.clear_offset() == offset
     bench.restart()
     assert bench.get("position_offset") == 0
     assert bench.get("present_position") == pytest.approx(3000, abs=4)
@@ -466,8 +464,8 @@ def test_an_offset_that_was_set_can_be_cleared_for_good() -> None:
 def test_a_homing_offset_can_be_cleared() -> None:
     bench = Bench(EYE)
     bench.put("homing_offset", 300)
-    assert bench.servo.clear_offset() == 300
-    bench.servo.check()
+    assert bench.joint.clear_offset() == 300
+    bench.joint.check()
     assert bench.get("homing_offset") == 0
 
 
@@ -561,7 +559,7 @@ def test_by_motion_is_slow_and_weak() -> None:
     way = [(p, t) for p, t in seen if t > start + 1.0]
     speed = (way[60][0] - way[0][0]) / (way[60][1] - way[0][1]) / STEPS_PER_DEG
     assert 10.0 < speed < 20.0
-    bench.servo.restore()
+    bench.joint.restore()
 
 
 def test_by_motion_a_servo_without_a_watchdog_is_said_to_be_one() -> None:
@@ -570,7 +568,7 @@ def test_by_motion_a_servo_without_a_watchdog_is_said_to_be_one() -> None:
     assert bench.get("torque_limit") == 300
     assert 0 < bench.get("goal_speed") <= 2.0 * 15.0 * STEPS_PER_DEG
     assert "no watchdog" in bench.joint.alone and not Bench(EYE).joint.alone
-    bench.servo.restore()
+    bench.joint.restore()
     calibrate_by_motion(bench.joint, bench, 2.0, GENTLY, "middle")
     assert any("no watchdog" in line for line in bench.said)
 
@@ -612,12 +610,13 @@ def test_a_servo_set_up_in_another_way_is_refused(
     bench = Bench(joint)
     bench.put(register, value)
     with pytest.raises(ServoMissing, match=says):
-        bench.servo.check()
+        bench.joint.check()
 
 
 def test_a_wrong_model_is_named() -> None:
     bench = Bench(EYE)
-    wrong = SingleServo("left_eye_pan", EYE.id, "xc330-m288", bench.port)
+    other = replace(EYE, model="xc330-m288")
+    wrong = SingleJoint("left_eye_pan", other, bench.port, bench.clock, lambda: None)
     with pytest.raises(ServoMissing, match="is xl330-m077, not xc330-m288"):
         wrong.check()
 
@@ -635,10 +634,10 @@ def test_a_servo_that_suffers_or_is_silent_is_named(
     bench = Bench(joint)
     bench.command(fault)
     with pytest.raises(ServoFault, match=says):
-        bench.servo.check()
+        bench.joint.check()
     bench.command("lose {id}")
     with pytest.raises(ServoMissing, match="does not answer"):
-        bench.servo.check()
+        bench.joint.check()
     with pytest.raises(BusLost, match="does not answer any more"):
         bench.joint.position()
 
@@ -646,7 +645,7 @@ def test_a_servo_that_suffers_or_is_silent_is_named(
 def test_a_servo_that_answers_pings_alone_is_brought_to_speak() -> None:
     bench = Bench(EYE)
     bench.put("status_return_level", 0)
-    bench.servo.check()
+    bench.joint.check()
     assert bench.limits() == (0, 4095)
 
 
@@ -690,7 +689,7 @@ def test_a_push_rod_on_a_smart_servo_is_measured_by_hand() -> None:
         STS, min_deg=-20.0, max_deg=20.0, transmission_points=((-25.0, 1800.0), (25.0, 2400.0))
     )
     bench = Reader(STS)
-    single = SingleJoint("left_eye_pan", rod, bench.servo, bench.clock, lambda: None)
+    single = SingleJoint("left_eye_pan", rod, bench.port, bench.clock, lambda: None)
     bench.script = [0, 250, -490, 120, 240]
     bench.angles = [22.0, -21.0, None, 10.0]
     made = calibrate_by_marks(HandMarker(single, bench), bench, 1.0, 1)

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from page_at_the_door import Opener, fetch
+from page_visitor import Opener, fetch
 from shown_page import free_port
 from websockets.sync.client import connect
 from websockets.typing import Origin

@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from page_at_the_door import fetch
+from page_visitor import fetch
 from study_at_the_page import CODE, EXPERIMENTER, PARTICIPANT, Pages, Tab, answers, serving
 
 from gazerig.features.study.design import Condition

@@ -76,7 +76,7 @@ def calibrate_by_hand(single: SingleJoint, person: Operator, margin_deg: float) 
         DriverError: the servo does not answer any more.
         CalibrationStopped: the person ended it.
     """
-    single.servo.disable_torque()
+    single.disable_torque()
     watched = PositionTracker(single)
     positive, negative = ends_of(single.name)
     person.tell(f"{single.who}: torque off, it can be turned by hand")
@@ -126,7 +126,7 @@ def calibrate_by_motion(
         single.go(params, (first + second) // 2)
         marks = Marks(first, second, 0) if sign == way else Marks(second, first, 0)
     finally:
-        single.servo.restore()
+        single.restore()
     person.tell(f"{single.who}: torque off")
     if zero_by == "person" and not is_lid(single.name):
         watched = PositionTracker(single)

@@ -227,7 +227,7 @@ class HandMarker:
 
     def begin(self) -> None:
         """Switch the torque off."""
-        self._single.servo.disable_torque()
+        self._single.disable_torque()
         self._person.tell(f"{self._single.who}: torque off, it can be turned by hand")
 
     def mark(self, where: str) -> float:

@@ -29,17 +29,26 @@ WATCHDOG_S = 0.3
 LIMITS = ("min_position_limit", "max_position_limit")
 
 
-class SingleServo:
-    """The servo of one joint.
+PERIOD_S = 0.02
+"""A search reads 50 times a second if the line is fast enough."""
+
+
+class CalibrationStopped(DriverError):
+    """The user or the system requested the end: torque off. The message names which."""
+
+
+class SingleJoint:
+    """One joint and its servo.
 
     Changes in the servo are restored. Every method raises BusLost if the servo does not answer
     any more.
 
     Args:
         name: the joint's.
-        servo_id: as configured.
-        model: as configured.
+        joint: as configured.
         port: opened.
+        clock: the host's.
+        stopped: called all the time; returns why to stop, None without a reason.
         guardian: switches the torque off should this program die; it has one plan, that of this
             servo, and the port calls its ``beat``. None: nothing does but the servo's watchdog.
 
@@ -48,10 +57,17 @@ class SingleServo:
     """
 
     def __init__(
-        self, name: str, servo_id: int, model: str, port: BusPort, guardian: Guardian | None = None
+        self,
+        name: str,
+        joint: JointParams,
+        port: BusPort,
+        clock: Clock,
+        stopped: Callable[[], str | None],
+        guardian: Guardian | None = None,
     ) -> None:
-        self.who = f"{name} (servo {servo_id})"
-        self._kind = kind_of(model)
+        self.name, self.joint = name, joint
+        self.who = f"{name} (servo {joint.id})"
+        self._kind = kind_of(joint.model)
         if self._kind.driving is None:
             raise SetupError(
                 f"{self.who}: {self._kind.title} servos are not calibrated by this program: turn "
@@ -68,7 +84,8 @@ class SingleServo:
                 else "these servos have no watchdog: should this program die, its guardian "
                 "switches the torque off"
             )
-        self._id, self._model, self._port = servo_id, model, port
+        self._id, self._model, self._port = joint.id, joint.model, port
+        self._clock, self._stopped, self._at_s = clock, stopped, clock.now_s()
         self._registers = Registers(port, self._kind.family)
         self._guardian = guardian
         self._was: dict[str, int] = {}
@@ -153,20 +170,16 @@ class SingleServo:
         if self._value("torque_enable"):
             raise ServoFault(f"{self.who} does not let go: cut the servo power")
 
-    def position(self) -> int:
-        """Return the present position in steps."""
-        return self._value("present_position")
+    def position(self) -> tuple[int, float]:
+        """Return the present position in steps and the time of the reading."""
+        value = self._value("present_position")
+        self._at_s = self._clock.now_s()
+        return value, self._at_s
 
-    def load(self) -> float:
-        """Return the present current as a share of the stall current."""
-        return self._driving.load(self._model, self._value("present_current"))
+    # --- driven gently
 
-    def enable_torque(self, strength: float, speed_steps_s: float) -> None:
+    def enable_torque(self, params: StopSearchParams) -> None:
         """Switch the torque on at its position, weak and slow; goals may be anywhere in the turn.
-
-        Args:
-            strength: share of full drive.
-            speed_steps_s: top speed.
 
         Raises:
             ServoMissing: the position is not within one turn.
@@ -182,7 +195,7 @@ class SingleServo:
             put(self._family.lock, 1)
         wanted = {
             **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
-            **driving.gentle(value, strength, speed_steps_s),
+            **driving.gentle(value, params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG),
         }
         was = {name: value(name) for name in wanted}
         found = dict(was)
@@ -193,7 +206,7 @@ class SingleServo:
         for name, desired in wanted.items():
             if was[name] != desired:
                 put(name, desired)
-        before = self.position()
+        before = value("present_position")
         if not 0 <= before < self._family.steps_per_turn:
             raise ServoMissing(
                 f"{self.who} has been turned over the seam of its encoder (it reads {before}): "
@@ -201,7 +214,7 @@ class SingleServo:
             )
         put("goal_position", before)
         put("torque_enable", 1)
-        now = self.position()
+        now = value("present_position")
         if not value("torque_enable"):
             raise ServoFault(
                 f"{self.who}: the torque does not come on: gazerig doctor names the cause"
@@ -212,22 +225,41 @@ class SingleServo:
         if unit_s is not None:
             put("bus_watchdog", round(WATCHDOG_S / unit_s))
 
-    def torque_is_on(self) -> bool:
-        """Return whether the torque is on."""
-        return self._value("torque_enable") == 1
-
-    def send(self, goal_steps: int) -> None:
-        """Send a goal.
+    def find_stop(self, params: StopSearchParams, direction: int) -> EndStop:
+        """Move it to its stop towards more (1) or fewer (-1) steps, and a little back.
 
         Raises:
-            ServoFault: the program stood still, and the guardian has switched the torque off.
+            ServoFault: it let go during the search, so it was not at a stop.
+            CalibrationStopped: a person or the system requested it.
         """
-        if self._guardian is not None and self._guardian.released(0):
+        stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
+        if not self._value("torque_enable"):
             raise ServoFault(
-                f"{self.who}: the program stood still, so its guardian switched the torque off: "
-                "start again"
+                f"{self.who} let go during the search: it protected itself or restarted; "
+                "check its supply and start again"
             )
-        self._put("goal_position", goal_steps)
+        return stop
+
+    def go(self, params: StopSearchParams, goal_steps: int) -> bool:
+        """Move it slowly to a position; return whether it came there unhindered."""
+        return go(goal_steps, params, self._exchange)
+
+    def _exchange(self, goal: int | None) -> tuple[int, float, float]:
+        """Send a goal, if any; return position, load and time."""
+        why = self._stopped()
+        if why is not None:
+            raise CalibrationStopped(why)
+        self._clock.sleep_until(self._at_s + PERIOD_S)
+        if goal is not None:
+            if self._guardian is not None and self._guardian.released(0):
+                raise ServoFault(
+                    f"{self.who}: the program stood still, so its guardian switched the torque "
+                    "off: start again"
+                )
+            self._put("goal_position", goal)
+        position, at_s = self.position()
+        load = self._driving.load(self._model, self._value("present_current"))
+        return position, load, at_s
 
     def restore(self) -> None:
         """Switch the torque off and put everything else back as it was found."""
@@ -252,82 +284,3 @@ class SingleServo:
     def _put(self, register: str, value: int) -> None:
         if not self._registers.write(self._id, register, value):
             raise BusLost(f"{self.who} does not take {register} {value}: check its cable and power")
-
-
-PERIOD_S = 0.02
-"""A search reads 50 times a second if the line is fast enough."""
-
-
-class CalibrationStopped(DriverError):
-    """The user or the system requested the end: torque off. The message names which."""
-
-
-class SingleJoint:
-    """The servo of one joint. If it does not answer any more, methods raise BusLost.
-
-    Args:
-        name: the joint's.
-        joint: as configured.
-        servo: its servo.
-        clock: the host's.
-        stopped: called all the time; returns why to stop, None without a reason.
-    """
-
-    def __init__(
-        self,
-        name: str,
-        joint: JointParams,
-        servo: SingleServo,
-        clock: Clock,
-        stopped: Callable[[], str | None],
-    ) -> None:
-        self.name = name
-        self.joint = joint
-        self.who = servo.who
-        self.alone = servo.alone
-        self.servo = servo
-        self._clock = clock
-        self._stopped = stopped
-        self._at_s = clock.now_s()
-
-    def position(self) -> tuple[int, float]:
-        """Return the present position and the time of the reading."""
-        value = self.servo.position()
-        self._at_s = self._clock.now_s()
-        return value, self._at_s
-
-    # --- driven gently
-
-    def enable_torque(self, params: StopSearchParams) -> None:
-        """Switch the torque on at its position, weak and slow; see SingleServo."""
-        self.servo.enable_torque(params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG)
-
-    def find_stop(self, params: StopSearchParams, direction: int) -> EndStop:
-        """Move it to its stop towards more (1) or fewer (-1) steps, and a little back.
-
-        Raises:
-            BusLost: it does not answer any more.
-            ServoFault: it let go during the search, so it was not at a stop.
-            CalibrationStopped: a person or the system requested it.
-        """
-        stop = search(params, direction, (0, STEPS_PER_TURN - 1), self._exchange)
-        if not self.servo.torque_is_on():
-            raise ServoFault(
-                f"{self.who} let go during the search: it protected itself or restarted; "
-                "check its supply and start again"
-            )
-        return stop
-
-    def go(self, params: StopSearchParams, goal_steps: int) -> bool:
-        """Move it slowly to a position; return whether it came there unhindered."""
-        return go(goal_steps, params, self._exchange)
-
-    def _exchange(self, goal: int | None) -> tuple[int, float, float]:
-        why = self._stopped()
-        if why is not None:
-            raise CalibrationStopped(why)
-        self._clock.sleep_until(self._at_s + PERIOD_S)
-        if goal is not None:
-            self.servo.send(goal)
-        position, at_s = self.position()
-        return position, self.servo.load(), at_s

@@ -34,7 +34,6 @@ from gazerig.features.bringup.calibration.linkage_calibration import (
 from gazerig.features.bringup.calibration.smart_servo_access import (
     CalibrationStopped,
     SingleJoint,
-    SingleServo,
 )
 from gazerig.features.bringup.cli.jog_prompt import TerminalJogger
 from gazerig.features.bringup.cli.ports import (
@@ -165,12 +164,11 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
 def _calibrate_smart_servo(bench: CalibrationJob, name: str, bus: str) -> JointResult:
     guardian, joint, person = _guardian(bench, name, bus), bench.rig.joints[name], bench.person
     with open_port(bench.rig, bench.wire, bus, guardian) as port:
-        servo = SingleServo(name, joint.id, joint.model, port, guardian)
-        single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
+        single = SingleJoint(name, joint, port, RealClock(), bench.stopped, guardian)
         person.hand = None
         if (buses := bench.wire.buses) is not None:
             person.hand = lambda steps: buses.command(f"turn {joint.id} {steps}", bus)
-        with _torque_off_after(single.who, servo.disable_torque, bench.stopped):
+        with _torque_off_after(single.who, single.disable_torque, bench.stopped):
             return _calibrate(single, bench.how, person)
 
 
@@ -182,17 +180,17 @@ def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
 
 def _calibrate(single: SingleJoint, how: CalibrationOptions, person: TerminalJogger) -> JointResult:
     if how.clear_offset:
-        was = single.servo.clear_offset()
+        was = single.clear_offset()
         if was:
             say(f"{single.who}: its offset {was} -> 0; {_VOID}")
-    single.servo.check()
+    single.check()
     if how.set_middle:
-        single.servo.disable_torque()
+        single.disable_torque()
         person.wait(
             f"turn {single.name} to the middle of its travel, then press Enter",
             lambda: f"{single.name}: step {single.position()[0]}",
         )
-        say(f"{single.who}: its place is 2048 now (offset {single.servo.set_middle()}); {_VOID}")
+        say(f"{single.who}: its place is 2048 now (offset {single.set_middle()}); {_VOID}")
     if single.joint.transmission_points:
         if how.by is ActuationMode.motion:
             raise CalibrationRefused(
