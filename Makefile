@@ -39,7 +39,7 @@ package: $(VENV)/.installed-dev
 	.ci/package $(BIN)/python
 
 bench: $(VENV)/.installed-dev
-	$(BIN)/python tests/bench/bench_run.py
+	$(BIN)/python tests/bench/bench_tick.py --fast
 	$(BIN)/python tests/bench/bench_tick.py
 	$(BIN)/python tests/bench/bench_start.py
 	$(BIN)/python tests/bench/bench_gaze.py

@@ -25,6 +25,7 @@ import gc
 import json
 import os
 import platform
+import resource
 import subprocess
 import sys
 import sysconfig
@@ -186,6 +187,7 @@ def measure(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
         "ticks": len(noted.starts_s),
         "slots skipped": overruns,
         "process, % of a core": 100 * cpu_s / wall_s,
+        "memory at most, MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         **jitter(noted.starts_s, rate_hz),
     }
     figures["peers"] = {name: quantiles(spent) for name, spent in beside.items()}
