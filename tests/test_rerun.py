@@ -14,15 +14,15 @@ from stand_in import StandIn
 
 from gazerig.config.load import load
 from gazerig.config.rig import Rig
-from gazerig.config.schema import load_rig
+from gazerig.config.schema import load_rig, load_rules
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Percept
-from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.assemble import Assembly, assemble, with_options
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import Resimulation, rerun
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Play, Resume, Stop, Tune
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.playback_devices import PlaybackBody
 from gazerig.robot.recording.read import RunRecording
@@ -329,3 +329,61 @@ def test_a_recording_without_ticks_is_refused(once: Once, tmp_path: Path) -> Non
 def test_a_new_run_can_be_recorded_itself(once: Once, again: Again) -> None:
     back = list(RunRecording(again.path).ticks())
     assert list(map(exact, back)) == list(map(exact, once.ticks))
+
+
+# A recorded boxing match is done again to the same bytes: the planner sees what it saw
+
+
+def test_what_the_planner_chose_is_recorded_and_chosen_again(tmp_path: Path) -> None:
+    options = RunOptions(mock=True, fast=True, seed=3, scene="boxing")
+    rig = with_options(load_rig("desk"), options)
+    ticks = record(tmp_path / "run.mcap", rig, 2.7, options)
+    plans = [tick.target.plan for tick in ticks]
+    assert {plan.partition(":")[0] for plan in plans} >= {"wait", "guard"}
+    recording = RunRecording(tmp_path / "run.mcap")
+    recorded = [moment.tick.target.plan for moment in recording.moments()]
+    assert recorded[: len(plans)] == plans
+    again = rerun(recording, joints="emulated")
+    assert again.same and again.tx_same is True
+
+
+# A recorded run with gestures is done again to the same bytes, without the gestures' files
+
+
+PLAYS = {300: Play("mine"), 380: Play("shake", 1.3), 450: Play(""), 500: Play("nod", times=2)}
+
+
+def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(
+        "description: x\nframes:\n  - {time_s: 0.3, head_yaw_deg: 6, lids: {all: 0.5}}\n"
+    )
+    rig = load_rig("desk")
+    rules = load_rules("greeting")
+    rig = replace(
+        rig,
+        gesture_files=(str(mine),),
+        gaze=replace(
+            rig.gaze,
+            top_down=replace(
+                rules,
+                rules={**rules.rules, "wait": replace(rules.rules["wait"], gesture_at="face")},
+            ),
+        ),
+    )
+    path = tmp_path / "run.mcap"
+
+    def ask(number: int, made: Assembly) -> None:
+        if (play := PLAYS.get(number)) is not None:
+            made.robot.command(play)
+
+    ticks = record(path, rig, 3.5, VISIT, ask)
+    events = [line for tick in ticks for line in tick.events]
+    told = [line for line in events if line.startswith("gesture")]
+    assert any("rule wait: nod" in line for line in told)
+    assert any("mine takes 0.7 s" in line for line in told) and len(told) == 4
+    mine.unlink()
+    recording = RunRecording(path)
+    assert "head_yaw_deg: 6" in recording.info.gestures_yaml
+    again = rerun(recording, joints="emulated")
+    assert again.same and again.tx_same is True
