@@ -1,24 +1,20 @@
 """The commands replay, rerun, compare and export on one recorded run."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fakes.runs import VISIT, record
 from replayed_run import RATE_HZ, ticks_of
 from typer.testing import CliRunner
 
-from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import replay as cli_replay
-from gazerig.robot.control.loop import run
 from gazerig.robot.dashboard.feed.page_process import unpack
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
 pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
@@ -31,23 +27,7 @@ pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of two seconds."""
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
-    rig = load_rig("desk")
-    info = RunInfo(
-        "configs/desk.yaml", rig.profile, params_text(rig), 0, RATE_HZ, "2026-01-01T00:00:00+00:00",
-        scene="face-to-face", mock=True, fast=True, versions=versions(),
-    )  # fmt: skip
-    recorder = Recorder(path, info, patient=True)
-    recorder.open()
-    options = RunOptions(mock=True, fast=True, seed=0, scene="face-to-face")
-    made = assemble(rig, options, Substitutes(body=recorder.wrap_body))
-    made.robot.start(made.clock)
-    try:
-        over = recorder.wrap_stop(lambda s: "seconds" if s > 2.0 else None)
-        run(made.robot, made.clock, made.loop, over, recorder.record)
-    finally:
-        made.robot.stop()
-        made.close()
-        recorder.close("seconds", made.sent_digest())
+    record(path, load_rig("desk"), 2.005, replace(VISIT, seed=0, scene="face-to-face"))
     return path
 
 
