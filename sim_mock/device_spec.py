@@ -83,11 +83,7 @@ def _read(part: str) -> tuple[range, str, int]:
 
 
 def _require_one_kind(specs: Iterable[ServoSpec]) -> None:
-    """Reject servos of different protocols on one line.
-
-    Raises:
-        SetupError: the protocols differ; the message names one servo of each.
-    """
+    """Reject servos of different protocols on one line."""
     one: dict[BusKind, ServoSpec] = {}
     for spec in specs:
         one.setdefault(SERVOS[spec.model].bus, spec)

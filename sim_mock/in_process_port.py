@@ -110,11 +110,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return dropped
 
     def _see(self) -> None:
-        """Fetch the bytes that have arrived by now.
-
-        Raises:
-            BusLost: it was unplugged after it was opened.
-        """
+        """Fetch the bytes that have arrived by now."""
         if self.faults.wire.any and self.faults.on("unplug"):
             self._lost = True
         if self._lost:

@@ -69,16 +69,7 @@ Pose = tuple[Floats, Floats]
 
 
 class BodyMotion:
-    """One person over a round.
-
-    Args:
-        script: script of all people.
-        timelines: timed acts of all people.
-        name: name of this person.
-        body: measures of this person.
-        t_s: times of the rows (n,).
-        seed: seed of blinks, sway and gaze wandering.
-    """
+    """One person over a round, at times (n,); the seed is that of blinks, sway and gaze."""
 
     def __init__(
         self,

@@ -30,11 +30,7 @@ MOST_N = 100.0
 
 
 def _push(world: World, body: str, newton: float, to: str, seconds: float = PUSH_S) -> str:
-    """Push a body of a rig; that of a further rig is named with its prefix.
-
-    Raises:
-        ValueError: there is no such body.
-    """
+    """Push a body of a rig; that of a further rig is named with its prefix."""
     rig = next((nth for nth in range(len(world.model.rigs)) if world.has_body(body, nth)), 0)
     placed = world.model.rigs[rig].rig
     x, y, z = DIRECTIONS[to]

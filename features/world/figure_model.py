@@ -34,12 +34,7 @@ def add_people(spec: Any, figures: Figures) -> None:
 
 
 def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Painted]:
-    """Return the shape of every segment and thing in its own frame, in the order of the names.
-
-    Args:
-        figures: the people.
-        fineness: of their heads: 1 for a close look, less for fewer triangles.
-    """
+    """Return the shape of every segment and thing in its own frame, in the order of the names."""
     found: dict[str, Painted] = {}
     for name, person in figures.script.people.items():
         look, body = WORLD_LOOKS[person.look], figures.measures[name]
@@ -61,12 +56,7 @@ def figure_shapes(figures: Figures, fineness: float = FINENESS) -> dict[str, Pai
 
 
 class PeoplePlacer:
-    """Puts people and things where they are: the mocap poses of MuJoCo's data.
-
-    Args:
-        model: compiled, with these people in it.
-        figures: the people.
-    """
+    """Puts people and things where they are: the mocap poses of MuJoCo's data."""
 
     def __init__(self, model: Any, figures: Figures) -> None:
         self._figures = figures

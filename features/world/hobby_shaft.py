@@ -30,11 +30,7 @@ class HobbyMotor(NamedTuple):
 
 
 class DeadBandShaft(WorldShaft):
-    """A shaft that ignores small errors.
-
-    Attributes:
-        dead: largest error that it ignores, in steps of 4096 a turn.
-    """
+    """A shaft that ignores small errors."""
 
     __slots__ = ("dead",)
 

@@ -58,14 +58,7 @@ class IdealShaft:
 
 
 class WorldIdealBus(IdealBus):
-    """All servos of a rig in a world; a gazerig.drivers.types.ServoBus.
-
-    Args:
-        configs: of the servos.
-        shafts: of the servos, in the same order.
-        measured: whether each of them has feedback.
-        now_s: the clock of the world.
-    """
+    """All servos of a rig in a world; a gazerig.drivers.types.ServoBus."""
 
     def __init__(
         self,

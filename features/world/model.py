@@ -56,12 +56,7 @@ class RigIndices(NamedTuple):
 
 
 class WorldModel(NamedTuple):
-    """A compiled world.
-
-    mj: mujoco.MjModel
-    figures: the people in it, None for a world without people
-    rigs: in the given order
-    """
+    """A compiled world."""
 
     mj: Any
     figures: Figures | None
@@ -115,11 +110,7 @@ def _room(figures: Figures | None, rigs: Sequence[RigInWorld]) -> Any:
 
 
 def _spec_of(path: Path) -> Any:
-    """Return a user's MJCF file.
-
-    Raises:
-        SetupError: it is not there, no MJCF, or too large.
-    """
+    """Return a user's MJCF file."""
     refuse_excessive(path)
     try:
         return mujoco.MjSpec.from_file(str(path))
@@ -171,11 +162,7 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
 
 
 def _mount(spec: Any, rig: RigInWorld, path: Path) -> Any:
-    """Return the site or frame of a user's world for the neck base.
-
-    Raises:
-        SetupError: there is none.
-    """
+    """Return the site or frame of a user's world for the neck base."""
     name = mount_name(rig.prefix)
     found = spec.site(name) or spec.frame(name)
     if found is None:

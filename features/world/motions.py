@@ -222,15 +222,7 @@ def act_share(one: TimedAct, t_s: Floats) -> Floats:
 def hand(
     frame: Frame, t_s: Floats, acts: Sequence[TimedAct], at: Sequence[Floats], rest: HandPose
 ) -> HandPose:
-    """Return a hand over a round.
-
-    Args:
-        frame: the body.
-        t_s: times of the rows.
-        acts: of this arm.
-        at: (n, 3) target of each act.
-        rest: the hand without acts.
-    """
+    """Return a hand over a round; ``at``: (n, 3) target of each act of this arm."""
     now = rest
     for one, target in zip(acts, at, strict=True):
         share = act_share(one, t_s)

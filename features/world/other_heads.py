@@ -33,12 +33,7 @@ class HeadInState(NamedTuple):
 
 
 class OtherHeads:
-    """Several heads of a world; small to send.
-
-    Args:
-        state: file of the world's newest state.
-        heads: the heads.
-    """
+    """Several heads of a world; small to send."""
 
     def __init__(self, state: Path, heads: Sequence[HeadInState]) -> None:
         self._state, self._heads = state, tuple(heads)
@@ -56,12 +51,7 @@ class OtherHeads:
         return tuple(head.rig._replace(servos=()) for head in self._heads)
 
     def parts(self, model: "WorldModel", first: int) -> Iterator[WorldPart]:
-        """Yield everything of the heads, each part in the frame of its body.
-
-        Args:
-            model: with ``rigs`` in it.
-            first: number of the first of them in it.
-        """
+        """Yield everything of the heads, each part in the frame of its body."""
         import mujoco
 
         from gazerig.features.world.geom_shapes import body_parts

@@ -65,10 +65,6 @@ class World:
 
     The devices built in it share its time: when a device queries its clock, the world and all other
     devices are simulated up to that time first.
-
-    Args:
-        model: the compiled world.
-        clock_s: returns the time.
     """
 
     def __init__(self, model: WorldModel, clock_s: Callable[[], float]) -> None:
@@ -102,12 +98,6 @@ class World:
 
     def device(self, line: Emulated, bus: str = "", seed: int = 0, rig: int = 0) -> Device:
         """Build the servos of one bus, moved by this world.
-
-        Args:
-            line: the servos on the bus.
-            bus: its name in the rig.
-            seed: seed of the random numbers of its faults.
-            rig: number of the rig in the world.
 
         Raises:
             ValueError: the device cannot exist.

@@ -42,14 +42,6 @@ class RendererParams:
 class Renderer:
     """Renders one model; may be used by several threads, one at a time.
 
-    Args:
-        model: the model to render.
-        width_px: of the largest picture.
-        height_px: of the largest picture.
-        params: content of the pictures.
-        hidden: names of bodies that are not shown, with their descendants: the head that carries
-            the camera.
-
     Raises:
         NoRenderer: nothing on this machine can render.
     """
@@ -192,11 +184,7 @@ def _sides(lens: Intrinsics, width: int, rows: tuple[int, int]) -> Floats:
 
 
 def _geoms_of(model: mujoco.MjModel, bodies: Collection[str]) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the geoms of bodies with these names and of their descendants.
-
-    Raises:
-        ValueError: there is no such body.
-    """
+    """Return a mask (n,) of the geoms of bodies with these names and of their descendants."""
     hidden = np.zeros(model.nbody, bool)
     for name in bodies:
         number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)

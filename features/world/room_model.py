@@ -26,13 +26,7 @@ _TABLE_BELOW_M = 0.20
 def add_room(
     spec: Any, script: SceneScript, plinths_m: Sequence[Vec3] = ((0.0, 0.0, 0.0),)
 ) -> None:
-    """Add the room of a script to a specification, with its light.
-
-    Args:
-        spec: of the world.
-        script: gives the room, the height of the neck base, and the brightness.
-        plinths_m: the neck bases of all rigs, each of which gets a base.
-    """
+    """Add the room of a script to a specification, with its light."""
     room = _Room(spec, -script.neck_height_m)
     {"living-room": _living_room, "gym": _gym, "hall": _hall}[script.room](room)
     for x, y, z in plinths_m:

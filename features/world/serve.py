@@ -14,10 +14,6 @@ if TYPE_CHECKING:
 def serve(folder: Path, clock_s: Callable[[], float]) -> "ServedWorld":
     """Return the world of a server, as of ``SentSurroundings.make``.
 
-    Args:
-        folder: with what ``WorldSpec.write`` has written.
-        clock_s: the host's time.
-
     Raises:
         SetupError: MuJoCo is not installed, or a user's own world cannot be used.
     """

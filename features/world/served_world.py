@@ -23,11 +23,6 @@ PUBLISH_MS = 5
 class ServedWorld:
     """The world of all buses of a server.
 
-    Args:
-        spec: content of the world.
-        state: the file of its newest state.
-        clock_s: the host's monotonic clock.
-
     Attributes:
         commands: the first words of the commands for ``obey``.
 

@@ -45,12 +45,6 @@ class ShaftAxis:
 
     Its position is in steps of an encoder with 4096 a turn, as inside emulated servos.
 
-    Args:
-        mj: mujoco.MjModel.
-        data: mujoco.MjData.
-        rig: rig of the servo.
-        servo: the servo.
-
     Attributes:
         actuator: its number in the model.
         zero, slope: its position at joint angle 0 and the steps per radian, for a linear
@@ -148,13 +142,7 @@ class ShaftAxis:
 
 
 class WorldShaft(Shaft):
-    """A shaft with position and speed from the world.
-
-    Args:
-        model: motor and gear.
-        physics: friction of the gear, rotor, supply; inertia, stops and gravity are the world's.
-        axis: the shaft in the world.
-    """
+    """A shaft with position and speed from the world."""
 
     __slots__ = (
         "_free_nm_s",

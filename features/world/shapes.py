@@ -71,12 +71,7 @@ class SpecShapes(NamedTuple):
 
 
 def shapes_of(spec: WorldSpec, others: OtherHeads | None = None) -> SpecShapes:
-    """Return the shapes of a world; they are small to send.
-
-    Args:
-        spec: of the world, with its rigs.
-        others: all of its rigs but the first, None if they are not shown.
-    """
+    """Return the shapes of a world; they are small to send."""
     joints = {rig.prefix + name for rig in spec.rigs for name in rig.stops_rad}
     places = tuple(
         rig._replace(body=_no_body, stops_rad={}, start_rad={}, servos=()) for rig in spec.rigs
@@ -85,11 +80,7 @@ def shapes_of(spec: WorldSpec, others: OtherHeads | None = None) -> SpecShapes:
 
 
 def script_shapes(figures: Figures) -> SpecShapes:
-    """Return the shapes of a script's world without any rig; they are small to send.
-
-    Args:
-        figures: the people of the script.
-    """
+    """Return the shapes of a script's world without any rig; they are small to send."""
     first = RigInWorld(_no_body, {}, {}, ())
     heads = [
         first._replace(
@@ -109,12 +100,7 @@ def _finish(segment: str) -> WorldFinish:
 
 
 class ShapesFrom(NamedTuple):
-    """The shapes of a world in the frame of a rig.
-
-    Attributes:
-        shapes: in the world's own frame.
-        frame: of the rig.
-    """
+    """The shapes of a world in the frame of a rig."""
 
     shapes: WorldShapes
     frame: RigFrame

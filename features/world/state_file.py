@@ -32,12 +32,7 @@ class HostState(NamedTuple):
 
 
 class StateWriter:
-    """The one process that writes states.
-
-    Args:
-        path: the file to create.
-        size: number of coordinates in a state.
-    """
+    """The one process that writes states."""
 
     def __init__(self, path: Path, size: int) -> None:
         with path.open("xb+") as file:
@@ -60,9 +55,6 @@ class StateWriter:
 
 class StateReader:
     """Reads the newest state; the file must exist.
-
-    Args:
-        path: of the file.
 
     Raises:
         OSError: there is no such file.

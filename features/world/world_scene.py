@@ -25,12 +25,7 @@ _SPIN_WITHIN_S = 0.01
 
 
 class WorldScene:
-    """A Scene of gazerig.sim_mock.scenes whose people are a world's.
-
-    Args:
-        name: of the world.
-        figures: its people.
-    """
+    """A Scene of gazerig.sim_mock.scenes whose people are a world's."""
 
     def __init__(self, name: str, figures: Figures) -> None:
         script = figures.script
@@ -165,12 +160,6 @@ class HeadsScene:
     """A scene in the world's frame and the faces of other heads, in the frame of one rig.
 
     The events of a scene state expectations of the first head only.
-
-    Args:
-        scene: the people of the script.
-        frame: of the rig that looks.
-        faces: each returns the face of another head now.
-        first: whether this is the first head.
     """
 
     def __init__(

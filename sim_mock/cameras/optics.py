@@ -43,12 +43,7 @@ class SensorParams:
 
 
 class Sensor:
-    """Adds noise to pictures and distances.
-
-    Args:
-        params: fidelity of the picture to the light.
-        rng: for the noise.
-    """
+    """Adds noise to pictures and distances."""
 
     def __init__(self, params: SensorParams, rng: np.random.Generator) -> None:
         self._params, self._rng = params, rng

@@ -50,11 +50,7 @@ _RAMP_UNIT = ACCELERATION_UNIT_STEPS_S2 / 1e6
 
 
 class DynamixelDrive(Drive):
-    """Drives the shaft of a Dynamixel servo.
-
-    Attributes:
-        follows: whether a goal position is followed immediately.
-    """
+    """Drives the shaft of a Dynamixel servo."""
 
     memory: DynamixelMemory
 

@@ -126,13 +126,7 @@ def channel_word(highest: int) -> Argument:
 
 # fmt: off
 def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str, Verb]:
-    """Return the fault commands of a board of hobby servos.
-
-    Args:
-        one: parses a channel.
-        writes: name of data sent without an answer, for "lose-writes".
-        own: further commands of this make of board.
-    """
+    """Return the fault commands of a board of hobby servos."""
     label = Argument(one.shown, or_all(one.read))
     return {
         **line_verbs(one),

@@ -35,14 +35,7 @@ class FaultTarget(Protocol):
 
 
 class LineFaults(ABC):
-    """Faults of a line and the device at its end; a device adds its own.
-
-    Args:
-        chain: the device.
-        commands: its fault commands.
-        seed: of the random numbers that faults draw.
-        header: first bytes of its packets; ``fragment`` and ``babble`` send them.
-    """
+    """Faults of a line and the device at its end; a device adds its own."""
 
     noun = "servo"
     """Name of the object of an id, for messages."""

@@ -53,11 +53,7 @@ MotionWords = tuple[int, int, int, int, int, bool]
 
 
 class FeetechDrive(Drive):
-    """Drives the shaft of a Feetech servo.
-
-    Attributes:
-        most: share of the duty that a protection leaves.
-    """
+    """Drives the shaft of a Feetech servo."""
 
     memory: FeetechMemory
 

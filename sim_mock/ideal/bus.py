@@ -37,14 +37,7 @@ class _Motion(NamedTuple):
 
 
 class IdealBus:
-    """All servos of a rig; a gazerig.drivers.types.ServoBus.
-
-    Args:
-        configs: configurations of the servos.
-        start_steps: initial positions of their shafts, in the same order.
-        measured: whether each of them has feedback.
-        now_s: the clock.
-    """
+    """All servos of a rig; a gazerig.drivers.types.ServoBus."""
 
     def __init__(
         self,

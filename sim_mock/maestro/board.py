@@ -100,14 +100,7 @@ ASKING = (GET_POSITION, GET_MOVING, GET_ERRORS, GET_SCRIPT)
 
 
 class EmulatedMaestro:
-    """One board and its servos.
-
-    Args:
-        servos: one for each channel, in their order.
-        device: its number in the Pololu protocol.
-        settings: its configuration over USB.
-        seed: of the random generator of faults.
-    """
+    """One board and its servos."""
 
     def __init__(
         self,

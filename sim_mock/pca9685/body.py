@@ -101,11 +101,7 @@ class Pca9685Body:
         self._settle()
 
     def _addressed(self, address: int) -> list[Chip]:
-        """Return the chips that answer at an address.
-
-        Raises:
-            NotAcknowledged: no chip has it.
-        """
+        """Return the chips that answer at an address."""
         chips = [c for own, c in self.chips.items() if address in (own, *c.further_addresses)]
         if self.absent or not chips:
             raise NotAcknowledged

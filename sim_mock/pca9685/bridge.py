@@ -31,13 +31,7 @@ class _Part(NamedTuple):
 
 
 class Bridge:
-    """One bus behind a bridge; a servo's id is sixteen times its board's number plus its channel.
-
-    Args:
-        servos: sixteen for each board.
-        addresses: of the boards, in their order.
-        seed: of the random generator of faults.
-    """
+    """One bus behind a bridge; a servo's id is 16 times its board's number plus its channel."""
 
     def __init__(
         self,

@@ -205,10 +205,6 @@ class PtyBuses(_ServerProcess):
     ) -> dict[str, str]:
         """Start a server for the devices of every bus; return the path of each, by the same names.
 
-        Args:
-            devices: by the name of their bus.
-            surroundings: surroundings of all their servos; None: each has its own mechanics.
-
         Raises:
             SetupError: the surroundings cannot be used; the message gives the reason.
             RuntimeError: the server did not start; its message is on standard error.

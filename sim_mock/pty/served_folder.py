@@ -17,11 +17,7 @@ _HELD = "held"
 
 
 class ServedFolder:
-    """A new folder of this user, deleted by ``remove`` or by a later start.
-
-    Args:
-        parent: its parent folder; None: the folder for temporary files.
-    """
+    """A new folder of this user, deleted by ``remove`` or by a later start."""
 
     def __init__(self, parent: Path | None = None) -> None:
         parent = parent or Path(tempfile.gettempdir())
@@ -40,22 +36,14 @@ class ServedFolder:
 
 
 def sweep(parent: Path) -> None:
-    """Remove this user's folders of processes that have ended.
-
-    Args:
-        parent: their parent folder.
-    """
+    """Remove this user's folders of processes that have ended."""
     for path in parent.glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):  # another process may remove it, too
             _sweep_one(path)
 
 
 def _sweep_one(path: Path) -> None:
-    """Remove a folder without an owner.
-
-    Raises:
-        OSError: it has an owner, is not a folder of this program, or is gone.
-    """
+    """Remove a folder without an owner."""
     if path.is_symlink() or path.stat().st_uid != os.getuid():
         return
     # Without the file, its owner has just created the folder, or it belongs to another program.

@@ -72,13 +72,7 @@ class _Change(NamedTuple):
 
 
 class FacesScene:
-    """The people and things of a script without a room.
-
-    Args:
-        name: of the scene.
-        script: checked by ``faults``.
-        seed: of acts with a random time.
-    """
+    """The people and things of a script without a room."""
 
     def __init__(self, name: str, script: SceneScript, seed: int = 0) -> None:
         self.name, self.round_s = name, script.round_s

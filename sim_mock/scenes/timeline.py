@@ -86,15 +86,7 @@ def timed_acts(
     lasts_s: Callable[[Act, str], float],
     target: Callable[[Act], Vec3 | None],
 ) -> tuple[TimedAct, ...]:
-    """Return the acts of a person, in the script's order, with random times from the seed.
-
-    Args:
-        script: with the person.
-        name: of the person.
-        seed: of the random times.
-        lasts_s: returns the duration of an act that begins at a place.
-        target: returns the fixed target of an act, None for a person.
-    """
+    """Return the acts of a person, in the script's order, with random times from the seed."""
     person = script.people[name]
     rng = np.random.default_rng([seed, list(script.people).index(name)])
     at, found = person.start, []
@@ -109,13 +101,7 @@ def timed_acts(
 def name_faults(
     script: SceneScript, places: Collection[str], robot: tuple[str, ...] = (HEAD,)
 ) -> Iterator[Fault]:
-    """Find names of people, places and things that are not there.
-
-    Args:
-        script: whose names are checked.
-        places: of its room and its own.
-        robot: names of the robot's parts that can be looked at.
-    """
+    """Find names of people, places and things that are not there."""
     seats, people = ", ".join(sorted(places)), ", ".join(script.people)
     targets = {*robot, *script.people, *places}
     for name, person in script.people.items():
@@ -161,13 +147,7 @@ def _act_faults(
 
 
 def overlap_faults(script: SceneScript, key: str, acts: tuple[TimedAct, ...]) -> Iterator[Fault]:
-    """Find simultaneous acts on one track, and acts that last beyond the round.
-
-    Args:
-        script: with the acts.
-        key: of the person or thing that does them.
-        acts: in the script's order, begun as if none varied.
-    """
+    """Find simultaneous acts on one track, and acts that last beyond the round."""
     busy: dict[str, tuple[float, int]] = {}
     for i, one in enumerate(acts):
         at, spare_s = f"{key}.acts.{i}.at_s", one.act.vary_s

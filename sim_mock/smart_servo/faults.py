@@ -95,14 +95,7 @@ def _quantity_command(attribute: str, unit: str) -> Do:
 def commands_of(
     highest_id: int, quirks: type[ChainQuirks], without: Sequence[str] = (), reset: str = ""
 ) -> CommandTable:
-    """Return the fault commands of one make of servos.
-
-    Args:
-        highest_id: of a servo.
-        quirks: of this make.
-        without: commands that do not apply to it.
-        reset: effect of the command ``reset``.
-    """
+    """Return the fault commands of one make of servos."""
     one = Argument("ID", whole(0, highest_id, "a servo id"))
     some = Argument("ID", or_all(one.read))
     verbs = {

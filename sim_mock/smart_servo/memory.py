@@ -28,11 +28,7 @@ R = TypeVar("R", bound=RegisterPlace)
 
 
 class ServoMemory(ABC, Generic[R]):
-    """One servo's registers.
-
-    Attributes:
-        bytes: the bytes that a read returns.
-    """
+    """One servo's registers."""
 
     def __init__(self, registers: Iterable[R], size: int) -> None:
         self._by_name = {register.name: register for register in registers}

@@ -19,13 +19,7 @@ from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
 
 class Shaft(ShaftMotion):
-    """Position and speed of one output shaft, advanced in whole milliseconds.
-
-    Args:
-        model: motor and gear.
-        physics: friction, load, stops, play, supply.
-        position_steps: initial position.
-    """
+    """Position and speed of one output shaft, advanced in whole milliseconds."""
 
     __slots__ = ("_held", "_low_high")
 

@@ -35,13 +35,7 @@ _ENOUGH = 0.7
 def overload_message(
     runs: Iterable[tuple[str, Mapping[str, Any] | None]], pictures_hz: float, rendered: bool
 ) -> str:
-    """Return a line with the heads that could not keep up in real time, "" if all did.
-
-    Args:
-        runs: name of each head and the figures of its run, None if it did not begin.
-        pictures_hz: requested pictures a second.
-        rendered: whether pictures were rendered, so that the user can disable them.
-    """
+    """Return a line with the heads that could not keep up in real time, "" if all did."""
     slow = []
     for name, figures in runs:
         if figures is None or figures["seconds"] < _SHORTEST_S:
@@ -63,13 +57,7 @@ FIRST = "first"
 
 
 class _Member(NamedTuple):
-    """One head of a group.
-
-    Attributes:
-        name: in the script; the first one's is ``FIRST``.
-        composed: its assembled robot.
-        frame: pose of its neck base.
-    """
+    """One head of a group."""
 
     name: str
     composed: ComposedRun
@@ -149,11 +137,7 @@ def other_head_file(path: Path, name: str) -> Path:
 
 
 class LinkedInterrupts(Interrupts):
-    """Requests to end a head that ends with another one: its own, and those to the other.
-
-    Args:
-        lead: requests to end the other head.
-    """
+    """Requests to end a head that ends with another one: its own, and those to the other."""
 
     def __init__(self, lead: Interrupts) -> None:
         super().__init__(also=lead, signals=False)
@@ -173,9 +157,6 @@ class HeadGroup:
         world: the world of the heads.
         pictures: in real time the rate of each camera in pictures a second, and whether they are
             rendered; None: time is simulated and waits for them.
-
-    Attributes:
-        members: the heads.
     """
 
     def __init__(

@@ -40,10 +40,6 @@ class RigInState(NamedTuple):
 class WorldPoses:
     """The head of a rig in a world of another process, from the state that this writes.
 
-    Args:
-        path: the file of the newest state.
-        rig: the joints of the rig in the state.
-
     Attributes:
         state: the state of the last read, None before the first.
     """
@@ -89,11 +85,6 @@ class WorldPoses:
 
 class SimulatedPoses:
     """The head of a rig in a world of this process, on the clock of the run.
-
-    Args:
-        world: simulated up to the current time at each access.
-        clock: of the run.
-        rig: the joints of the rig in the state.
 
     Attributes:
         begin_s: start time of the people's script.

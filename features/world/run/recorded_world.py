@@ -22,10 +22,6 @@ from gazerig.sim_mock.scenes.script import SceneScript
 def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
     """Return the recording's entry for the world of a run, without its start time; None without.
 
-    Args:
-        options: of the run.
-        seed: of the world's people; that of the first head if there are several.
-
     Raises:
         gazerig.config.load.ConfigError: the script is at fault.
     """
@@ -38,10 +34,6 @@ def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
 
 def recorded_shapes(info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
     """Return the shapes of the world of a recorded run, in the frame of its head's neck base.
-
-    Args:
-        info: of the world.
-        stands: pose of the head in it, as of ``RunInfo.stands``.
 
     Raises:
         SetupError: the world cannot be shown; the message gives the reason.

@@ -35,17 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RigRoom:
-    """A ``RunRoom`` of gazerig.robot.app.surroundings: a world as one of its rigs is in it.
-
-    Attributes:
-        world: the world.
-        clock: of the run.
-        wires: the bus of the rig.
-        head: pose of its head.
-        heads: the world's other heads, None if they are not shown.
-        info: recording's entry for the world without its start time, None without a recording.
-        stands: as of ``RunRoom.stands``.
-    """
+    """A ``RunRoom`` of gazerig.robot.app.surroundings: a world as one of its rigs is in it."""
 
     world: RunWorld
     clock: Clock
@@ -116,16 +106,7 @@ def simulated_room(
     computed: "World",
     stands: tuple[float, ...] = (),
 ) -> RigRoom:
-    """Return a rig in a world of this process, on the clock of the run.
-
-    Args:
-        rig: the rig.
-        options: whether its servos are ideal, and whether the run is recorded.
-        clock: of the run.
-        world: the world of the rig.
-        computed: the same world in this process.
-        stands: as of ``RunRoom.stands``.
-    """
+    """Return a rig in a world of this process, on the clock of the run."""
     if options.bus == "ideal":
         wires = without_wires(rig, world_ideal_bus(rig, computed, world.number))
     else:
@@ -145,16 +126,7 @@ def served_room(
     served: ServedRig,
     stands: tuple[float, ...] = (),
 ) -> RigRoom:
-    """Return a rig in a world of another process.
-
-    Args:
-        rig: the rig.
-        options: whether the run is recorded.
-        clock: the host's.
-        world: the world of the rig.
-        served: the terminals of the rig.
-        stands: as of ``RunRoom.stands``.
-    """
+    """Return a rig in a world of another process."""
     buses, number = served.buses, world.number
     wires = RunBus(guarded_rig_bus(rig, served.paths), close=served.close, fault=buses.command)
     state = state_file(buses.folder)

@@ -57,15 +57,7 @@ def rig_in_world(
     yaw_rad: float = 0.0,
     looks: bool = True,
 ) -> RigInWorld:
-    """Return a rig for a world.
-
-    Args:
-        rig: the rig.
-        prefix: prefix of its names, for a second rig in the same world.
-        p_m: position of its neck base in the world.
-        yaw_rad: its turn to the left there.
-        looks: whether to include its visible parts; the bare mechanism is built quickly.
-    """
+    """Return a rig for a world."""
     stops = {name: _stop_rad(rig, name) for name in rig.names}
     servos = tuple(_servo(rig, name) for name in rig.names)
     return RigInWorld(
@@ -84,13 +76,7 @@ def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
 
 
 def world_ideal_bus(rig: Rig, world: "World", number: int = 0) -> "WorldIdealBus":
-    """Return all servos of a rig in a world without bytes.
-
-    Args:
-        rig: the rig.
-        world: the world of the rig.
-        number: number of the rig in the world.
-    """
+    """Return all servos of a rig in a world without bytes."""
     # Imports MuJoCo, which only runs in a world need.
     from gazerig.features.world.ideal_bus import WorldIdealBus
 
@@ -119,13 +105,7 @@ MJCF = (".xml", ".mjcf")
 
 
 class ServedRig(NamedTuple):
-    """The terminals of one of the rigs of a world that another process computes.
-
-    Attributes:
-        buses: of that process.
-        paths: of this rig's terminals, by the names of its buses.
-        close: ends the process; does nothing if other rigs are in it.
-    """
+    """The terminals of one of the rigs of a world that another process computes."""
 
     buses: "PtyBuses"
     paths: Mapping[str, str]
@@ -133,15 +113,7 @@ class ServedRig(NamedTuple):
 
 
 class RunWorld(NamedTuple):
-    """The world of a run.
-
-    Attributes:
-        spec: content of the world, for the processes that compute and render it.
-        scene: its people, for the run and its score.
-        camera: size, rate and fidelity of the pictures of cameras.
-        number: number of the run's rig in the world.
-        others: the world's other rigs with all of their visible parts.
-    """
+    """The world of a run."""
 
     spec: WorldSpec
     scene: Scene
@@ -150,22 +122,14 @@ class RunWorld(NamedTuple):
     others: tuple[RigInWorld, ...] = ()
 
     def computed(self, now_s: Callable[[], float]) -> "World":
-        """Return the world in this process.
-
-        Args:
-            now_s: returns the time of the run.
-        """
+        """Return the world in this process."""
         model = self.spec.compiled()  # imports MuJoCo, whatever library can render here
         from gazerig.features.world.physics import World
 
         return World(model, now_s)
 
     def served(self, folder: Path) -> "RunWorld":
-        """Return the same world, which shares the people's motion with its server.
-
-        Args:
-            folder: of the server.
-        """
+        """Return the same world, which shares the people's motion with its server."""
         spec = self.spec.sharing(folder)
         if spec.figures is None:
             return self
@@ -214,10 +178,6 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
 def other_rigs(rig: Rig, script: SceneScript) -> dict[str, Rig]:
     """Return the rigs of the other heads of a script, by the heads' names.
 
-    Args:
-        rig: rig of heads that name none.
-        script: with the heads.
-
     Raises:
         gazerig.config.load.ConfigError: one of them is at fault.
     """
@@ -230,13 +190,7 @@ def other_rigs(rig: Rig, script: SceneScript) -> dict[str, Rig]:
 def placed_rigs(
     rigs: Mapping[str, Rig], script: SceneScript, looks: bool
 ) -> tuple[RigInWorld, ...]:
-    """Return the rigs of a script's other heads at their poses.
-
-    Args:
-        rigs: rigs by the heads' names.
-        script: script with the heads.
-        looks: whether to include their visible parts.
-    """
+    """Return the rigs of a script's other heads at their poses."""
     return tuple(
         rig_in_world(
             rigs[name], f"{name}_", (head.x_m, head.y_m, 0.0), radians(head.facing_deg), looks
@@ -286,11 +240,7 @@ def _read(path: Path, version: tuple[int, int, int] | None) -> SceneScript:
 
 
 def _resolve_rig(world: Path, rig: str) -> str:
-    """Return a rig that a world's file names; a path is relative to the working folder.
-
-    Raises:
-        gazerig.config.load.ConfigError: there is no such rig.
-    """
+    """Return a rig that a world's file names; a path is relative to the working folder."""
     if not rig:
         return rig
     found = rig_path(rig)

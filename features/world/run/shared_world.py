@@ -33,13 +33,7 @@ SceneOfHead = Callable[[Scene], Scene]
 
 @dataclass(frozen=True)
 class FacePoseSource:
-    """Source of the current pose of a face in the world; can be sent to another process.
-
-    Attributes:
-        poses: of the head.
-        frame: pose of its neck base.
-        nose_m: tip of its nose in the head's own frame.
-    """
+    """Source of the current pose of a face in the world; can be sent to another process."""
 
     poses: WorldPoses | SimulatedPoses
     frame: RigFrame
@@ -55,9 +49,6 @@ class SimulatedWorld:
     """The world of several heads in this process, on one simulated clock.
 
     The number of a head is the number of its rig in the world.
-
-    Args:
-        found: the world.
     """
 
     def __init__(self, found: RunWorld) -> None:
@@ -75,14 +66,7 @@ class SimulatedWorld:
         return FacePoseSource(poses, self.frames[number], _nose_m(rig))
 
     def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
-        """Return the world from the view of one of the heads.
-
-        Args:
-            number: of the head.
-            rig: of the head.
-            options: of its run.
-            before: returns the scene before the head, given the world's people.
-        """
+        """Return the world from the view of one of the heads."""
         world = self._found._replace(scene=before(self._found.scene), number=number)
         stands = HeadPlace(*self.frames[number]).numbers
         return simulated_room(
@@ -103,10 +87,6 @@ class SimulatedWorld:
 
 class RealTimeWorld:
     """The world of several heads in the emulator's process, in real time.
-
-    Args:
-        found: the world.
-        rigs: rigs of all heads, the first head's first, each with the head's name.
 
     Raises:
         SetupError: the world cannot be used; the message gives the reason.

@@ -122,15 +122,6 @@ class RenderedWorld(NamedTuple):
     """Everything that a process needs to render the pictures of the rig's camera in a world.
 
     It can be sent to the process.
-
-    Attributes:
-        spec: content of the world.
-        scene: its people.
-        mount: pose of the camera on the head.
-        camera: its field of view and lens.
-        rng: random numbers of the noise.
-        params: size, rate and fidelity of its pictures.
-        number: number of the rig with the camera in the world.
     """
 
     spec: WorldSpec
@@ -203,14 +194,7 @@ def world_view(
     params: WorldCameraParams,
     number: int = 0,
 ) -> "SceneView":
-    """Return the renderer's view of a world.
-
-    Args:
-        spec: of the world.
-        newest: returns its state, None before the first.
-        params: of the camera.
-        number: number of the rig with the camera.
-    """
+    """Return the renderer's view of a world."""
     model = spec.compiled()
     from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.picture import WorldPicture
@@ -250,19 +234,7 @@ def world_camera(
     own: ProgramParts,
     say: Callable[[str], None],
 ) -> Camera:
-    """Return the rig's camera in a world.
-
-    Args:
-        rig: with the parameters of the detectors.
-        options: whether pictures are rendered, and whether time is simulated.
-        world: the world to render.
-        poses: pose of the head.
-        locate: converts detections to the camera's axes.
-        clock: of the run.
-        turns: rotation of the camera over time, in real time.
-        own: camera and detector of a program.
-        say: receives messages to the user.
-    """
+    """Return the rig's camera in a world."""
     scene_params = SceneCameraParams(horizontal_field_deg=world.camera.horizontal_field_deg)
 
     def ideal(begin_s: float) -> SceneCamera:
