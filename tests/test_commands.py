@@ -20,8 +20,7 @@ from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.robot.app.session import shut_down
 from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.gesture_choices import GestureChoices
-from gazerig.robot.model.command_checks import check
-from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.command_json import as_json, check, from_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from gazerig.robot.description import head_mesh
 from gazerig.robot.description.head_shape import JAW_BOUNDS, JAW_HALF
-from gazerig.robot.description.mesh import ellipsoid
-from gazerig.robot.description.paint import Painted, merged, painted
+from gazerig.robot.description.mesh import Painted, ellipsoid, merged, painted
 from gazerig.robot.description.solid import cut
 
 BALL = painted(ellipsoid((0.3, 0.5, 0.4)), (200, 100, 50))

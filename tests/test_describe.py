@@ -37,8 +37,8 @@ from gazerig.robot.description.mass import (
     skull,
     turned,
 )
+from gazerig.robot.description.mesh import merged
 from gazerig.robot.description.mjcf import mjcf
-from gazerig.robot.description.paint import merged
 from gazerig.robot.description.urdf import urdf
 from gazerig.robot.model.coupling_params import CouplingParams
 

@@ -13,10 +13,9 @@ from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
 from gazerig.gaze.types import Target
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.dashboard.panels.animation_panel import AnimationPanel
+from gazerig.robot.dashboard.panels.controls import AnimationPanel
 from gazerig.robot.dashboard.widgets.widgets import Widgets
-from gazerig.robot.model.command_checks import check
-from gazerig.robot.model.command_json import as_json, as_recorded, from_json, from_recording
+from gazerig.robot.model.command_json import as_json, as_recorded, check, from_json, from_recording
 from gazerig.robot.model.commands import Ask, Command, Jog, Play, Resume, Stop
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 

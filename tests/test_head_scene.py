@@ -23,8 +23,7 @@ from gazerig.robot.dashboard.view.scene_node import turned_up
 from gazerig.robot.dashboard.view.viewpoints import BOTH, FACE, SHOULDER, View, view
 from gazerig.robot.description import head_mesh
 from gazerig.robot.description.head_shape import EYE_RADIUS, eye_rim, field, measures_of, surface
-from gazerig.robot.description.mesh import Mesh, grid
-from gazerig.robot.description.paint import Painted, merged
+from gazerig.robot.description.mesh import Mesh, Painted, grid, merged
 from gazerig.robot.description.parts import LOWER_LID, UPPER_LID
 from gazerig.robot.description.person_shape import hand, head, torso
 from gazerig.robot.model.types import JointState, Snapshot

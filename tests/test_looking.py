@@ -16,8 +16,7 @@ from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose
 from gazerig.robot.app.session import run as run_session
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.model.command_checks import check
-from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.command_json import as_json, check, from_json
 from gazerig.robot.model.commands import (
     Command,
     Jog,

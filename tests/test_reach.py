@@ -18,7 +18,7 @@ from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.reachability import look_reply
 from gazerig.robot.model.commands import Jog, LookAt
-from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import JointAngles, JointState
 

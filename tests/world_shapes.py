@@ -6,8 +6,7 @@ from math import sin
 import numpy as np
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.mesh import Mesh, grid
-from gazerig.robot.description.paint import Painted, painted
+from gazerig.robot.description.mesh import Mesh, Painted, grid, painted
 from gazerig.robot.description.person_shape import head, torso
 from gazerig.robot.description.texture import textured
 from gazerig.robot.description.world_shapes import WorldPart

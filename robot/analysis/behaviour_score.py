@@ -133,8 +133,10 @@ class BehaviourScore:
                 self._over(i)
         for i, event in enumerate(self._events):
             if event.start_s <= phase_s < event.end_s:
-                watch = self._watches.setdefault(i, _Watch())
-                watch.update(_looks_at(tick, event), phase_s - event.start_s, dt_s)
+                watch, target = self._watches.setdefault(i, _Watch()), tick.target
+                away_m = dist(target.p_world_m, event.place_world_m)
+                on = target.kind == event.kind and away_m <= event.within_m
+                watch.update(on, phase_s - event.start_s, dt_s)
             elif i in self._watches:
                 self._over(i)
 
@@ -150,14 +152,6 @@ class BehaviourScore:
         share: part of the events' time in which the expected target was looked at
         """
         return {name: _figure(answers) for name, answers in self._answers.items()}
-
-
-def _looks_at(tick: Tick, event: Happening) -> bool:
-    """Return whether the current target is the expected one."""
-    target = tick.target
-    if target.kind != event.kind:
-        return False
-    return dist(target.p_world_m, event.place_world_m) <= event.within_m
 
 
 def _figure(answers: list[_Answer]) -> dict[str, float | int | None]:
@@ -245,15 +239,26 @@ class PlannerScore:
         """
         if not self._guards and not self._attacks:
             return {}
-        answered = [self._lead_s(punch, start) for start, punch in self._rounds(self._punches)]
-        leads = [lead for lead in answered if lead is not None]
+        # Of all punches that are over: by how much a guard came before the fist.
+        leads, punches = [], 0
+        for number in range(int(self._last_s // self._round_s) + 1):
+            start_s = self._round_s * number
+            for punch in self._punches:
+                if start_s + punch.end_s > self._last_s:
+                    continue
+                punches += 1
+                due_s = start_s + (punch.end_s if punch.due_s is None else punch.due_s)
+                # A tick before it is over is as good as its end.
+                in_force = [at_s for at_s, end_s in self._guards if at_s <= due_s <= end_s + 0.05]
+                if in_force:
+                    leads.append(due_s - max(in_force))
         false = sum(not self._during(at_s, self._punches, 0.0, _LATE_S) for at_s, _ in self._guards)
         opens = sum(self._during(one.start_s, self._openings, 0.1, 0.0) for one in self._attacks)
         counters = sum(
             self._during(one.start_s, self._punches, 0.0, _COUNTER_S) for one in self._attacks
         )
         return {
-            "punches": len(answered),
+            "punches": punches,
             "guards_in_time": len(leads),
             "lead_ms": round(1e3 * median(leads), 1) if leads else None,
             "false_guards_per_min": round(60.0 * false / max(self._last_s, 1e-9), 2),
@@ -262,19 +267,6 @@ class PlannerScore:
             "counters": counters,
             "looked_at": sum(one.looked for one in self._attacks),
         }
-
-    def _rounds(self, events: tuple[Bout, ...]) -> list[tuple[float, Bout]]:
-        """Return the beginning of the round and the event, for all events that are over."""
-        rounds = range(int(self._last_s // self._round_s) + 1)
-        starts = [self._round_s * number for number in rounds]
-        return [(s, e) for s in starts for e in events if s + e.end_s <= self._last_s]
-
-    def _lead_s(self, punch: Bout, round_start_s: float) -> float | None:
-        """Return by how much a guard came before the fist, None where none did."""
-        due_s = round_start_s + (punch.end_s if punch.due_s is None else punch.due_s)
-        # A tick before it is over is as good as its end.
-        in_force = [start for start, end in self._guards if start <= due_s <= end + 0.05]
-        return due_s - max(in_force) if in_force else None
 
     def _during(
         self, at_s: float, events: tuple[Bout, ...], before_s: float, after_s: float

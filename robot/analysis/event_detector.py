@@ -102,17 +102,17 @@ class EventDetector:
         self._flight: _Flight | None = None
         self._rest = _Rest(None)
 
-    @property
-    def in_saccade(self) -> bool:
-        """Return whether the measured gaze is jumping, as known some 10 ms late."""
-        return self._saccades.under_way
-
     def update(self, tick: Tick) -> tuple[Event, ...]:
         """Add a tick; return the events that have ended, in the order of their onset."""
         if tick.stopped or (
             tick.joints.missing and not _EYE_JOINTS.isdisjoint(tick.joints.missing)
         ):
-            self._lost(tick)
+            # The eyes were not measured, or not moved by the models.
+            if tick.stopped:
+                self._blinks.clear()
+            self._saccades.clear()
+            self._flight = None
+            self._rest = _Rest(None)
             return ()
         self._note_command(tick)
         t_s = tick.t_s
@@ -132,14 +132,6 @@ class EventDetector:
         events.append(SaccadeEvent(*jump[:5], self._command_of(jump.onset_s)))
         self._rest = _Rest(jump.onset_s + jump.duration_s)
         return tuple(events)
-
-    def _lost(self, tick: Tick) -> None:
-        """Reset after the eyes were not measured, or not moved by the models."""
-        if tick.stopped:
-            self._blinks.clear()
-        self._saccades.clear()
-        self._flight = None
-        self._rest = _Rest(None)
 
     def _note_command(self, tick: Tick) -> None:
         """Follow the current saccade of the models."""

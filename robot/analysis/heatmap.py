@@ -258,8 +258,14 @@ def heatmap(
     shares = share_per_part(points, times)
     canvas = draw_face() if image is None else face_from(image)
     per_m2 = density_s_m2(points, times)
-    painted = _painted(canvas, per_m2)
-    whole = with_legend(painted, float(per_m2.max()) / 1e4, float(times.sum()), shares)
+    # Laid over the canvas: from nothing over purple and orange to yellow.
+    top = float(per_m2.max())
+    share = per_m2 / top if top > 0.0 else per_m2
+    colours = cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_PLASMA)
+    cover = _COVER * np.clip((share - _FAINT) / (_PLAIN - _FAINT), 0.0, 1.0) ** 0.7
+    mixed = canvas * (1.0 - cover[..., None]) + colours * cover[..., None]
+    painted = np.asarray(np.rint(mixed), dtype=np.uint8)
+    whole = with_legend(painted, top / 1e4, float(times.sum()), shares)
     ok, data = cv2.imencode(".png", whole)
     if not ok:
         raise SetupError(f"{out}: the image cannot be written as PNG")
@@ -311,16 +317,6 @@ def face_from(photo: Path) -> Image:
     # Pale and grey, so that the colours of the map are the only ones.
     grey = cv2.cvtColor(cv2.cvtColor(shown, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
     return np.asarray(cv2.addWeighted(grey, 0.8, grey, 0.0, 40.0), dtype=np.uint8)
-
-
-def _painted(canvas: Image, density: Floats) -> Image:
-    """Lay the map over the canvas: from nothing over purple and orange to yellow."""
-    top = float(density.max())
-    share = density / top if top > 0.0 else density
-    colours = cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_PLASMA)
-    cover = _COVER * np.clip((share - _FAINT) / (_PLAIN - _FAINT), 0.0, 1.0) ** 0.7
-    mixed = canvas * (1.0 - cover[..., None]) + colours * cover[..., None]
-    return np.asarray(np.rint(mixed), dtype=np.uint8)
 
 
 def _checked(points_face_m: ArrayLike, seconds: ArrayLike) -> tuple[Floats, Floats]:

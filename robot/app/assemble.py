@@ -218,18 +218,15 @@ def assemble(
             robot.attention.close()
         wires.close()
 
-    return Assembly(
-        robot, clock, sight.mount, sight.poses, scene, wires.digest, close,
-        (*notes, *_walk_notes(walk, rig, options)), live,
-        wires.fault, room,
-    )  # fmt: skip
-
-
-def _walk_notes(walk: Walk, rig: Rig, options: RunOptions) -> tuple[str, ...]:
-    """Return notes on a walk of the user's own; on a shipped one only if verbose."""
+    # A shipped walk is noted only if verbose.
     shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
     note = row_sums_note(walk) if options.verbose or not shipped else None
-    return () if note is None else (note,)
+    if note is not None:
+        notes = (*notes, note)
+    return Assembly(
+        robot, clock, sight.mount, sight.poses, scene, wires.digest, close, notes, live,
+        wires.fault, room,
+    )  # fmt: skip
 
 
 class _Generators(NamedTuple):

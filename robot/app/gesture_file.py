@@ -77,7 +77,13 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
     keys = {track: _mean(found) for track, found in keys.items() if found}
     if not keys:
         raise SetupError(f"nothing moves; movements below {TOLERANCE_DEG:g} deg count as jitter")
-    return _text(keys, description)
+    frames: dict[float, dict[str, float]] = {}
+    for track, found in keys.items():
+        for time_s, value in found:
+            frames.setdefault(time_s, {})[track] = value
+    lines = [f"description: {written(description)}", "space: joint", "fit: slow", "frames:"]
+    lines += [f"  - {{{', '.join(_frame(t, frames[t]))}}}" for t in sorted(frames)]
+    return "\n".join(lines) + "\n"
 
 
 def write_gesture(
@@ -155,17 +161,6 @@ def _mean(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:
     for time_s, value in sorted(keys):
         at.setdefault(time_s, []).append(value)
     return [(time_s, round(sum(them) / len(them), 3)) for time_s, them in at.items()]
-
-
-def _text(keys: Keys, description: str) -> str:
-    """Return the YAML of a gesture in joint space."""
-    frames: dict[float, dict[str, float]] = {}
-    for track, found in keys.items():
-        for time_s, value in found:
-            frames.setdefault(time_s, {})[track] = value
-    lines = [f"description: {written(description)}", "space: joint", "fit: slow", "frames:"]
-    lines += [f"  - {{{', '.join(_frame(t, frames[t]))}}}" for t in sorted(frames)]
-    return "\n".join(lines) + "\n"
 
 
 def _frame(time_s: float, values: Mapping[str, float]) -> list[str]:

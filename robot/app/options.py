@@ -173,47 +173,31 @@ class RunOptions:
         Raises:
             SetupError: the message names the missing option.
         """
-        clashes = (
-            (
-                self.port is not None and self.mock,
-                "--port and --mock exclude each other: --mock has a port of its own",
-            ),
-            (
-                self.fast and not self.mock,
-                "--fast needs --mock: real servos cannot be hurried",
-            ),
-            (
-                self.fast and (self.camera is not None or self.oak),
-                "--fast needs a scene, a film or a recording: a camera has real time",
-            ),
-            (
-                self.world is not None and not self.mock,
-                "--world needs --mock: real servos are in the real world",
-            ),
-            (
-                self.world is not None and self.bus == "ideal" and not self.fast,
-                "--world with --bus ideal needs --fast: in real time servos have bytes",
-            ),
-            (
-                self.world is not None and self.pixels,
-                "--world and --pixels exclude each other: a world is rendered in any case",
-            ),
-            (
-                self.no_pictures and self.world is None,
-                "--no-pictures needs --world: of a scene pictures are drawn with --pixels alone",
-            ),
-            (
-                self.pixels and scene is None,
-                "--pixels draws a scene: it cannot be used with a film or a camera",
-            ),
-            (
-                self.fast and self.seconds is None and scene is None and self.world is None,
-                "--fast needs --seconds S with a film: it would never end",
-            ),
-        )
-        for clash, message in clashes:
-            if clash:
-                raise SetupError(message)
+        world, camera = self.world is not None, self.camera is not None or self.oak
+        if self.port is not None and self.mock:
+            raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
+        if self.fast and not self.mock:
+            raise SetupError("--fast needs --mock: real servos cannot be hurried")
+        if self.fast and camera:
+            raise SetupError("--fast needs a scene, a film or a recording: a camera has real time")
+        if world and not self.mock:
+            raise SetupError("--world needs --mock: real servos are in the real world")
+        if world and self.bus == "ideal" and not self.fast:
+            raise SetupError(
+                "--world with --bus ideal needs --fast: in real time servos have bytes"
+            )
+        if world and self.pixels:
+            raise SetupError(
+                "--world and --pixels exclude each other: a world is rendered in any case"
+            )
+        if self.no_pictures and not world:
+            raise SetupError(
+                "--no-pictures needs --world: of a scene pictures are drawn with --pixels alone"
+            )
+        if self.pixels and scene is None:
+            raise SetupError("--pixels draws a scene: it cannot be used with a film or a camera")
+        if self.fast and self.seconds is None and scene is None and not world:
+            raise SetupError("--fast needs --seconds S with a film: it would never end")
 
 
 def host_port(text: str) -> tuple[str, int]:

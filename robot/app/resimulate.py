@@ -168,31 +168,27 @@ class _Resimulator:
         made = self._made
         for moment in moments:
             made.clock.sleep_until(moment.tick.t_s)
+            was = moment.tick
+            if self._body is not None:
+                self._body.play(moment)
+            self._perception.percept = was.percept
+            for command in was.commands:
+                try:
+                    made.robot.replay_command(command)
+                except ValueError as error:
+                    self._notes.append(f"a command could not be given again: {error}")
             try:
-                tick = self._tick(moment)
+                tick = made.robot.tick(was.t_s, moment.dt_s)
             except DriverError as error:
                 return f"fault: {error}"
-            self._compared.update(moment.tick, tick)
+            if self._body is not None:  # events of bus and camera are of the recorded machine
+                tick = tick._replace(events=was.events)
+            self._compared.update(was, tick)
             if self._on_tick is not None:
                 self._on_tick(tick)
             if tick.guard_result.level == "torque_off" and not tick.stopped and self._body is None:
                 return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
         return None
-
-    def _tick(self, moment: TickRecord) -> Tick:
-        """Run one tick."""
-        was = moment.tick
-        if self._body is not None:
-            self._body.play(moment)
-        self._perception.percept = was.percept
-        for command in was.commands:
-            try:
-                self._made.robot.replay_command(command)
-            except ValueError as error:
-                self._notes.append(f"a command could not be given again: {error}")
-        tick = self._made.robot.tick(was.t_s, moment.dt_s)
-        # Events of the bus and the camera belong to the recorded machine.
-        return tick if self._body is None else tick._replace(events=was.events)
 
 
 class _Comparison:
@@ -283,7 +279,14 @@ def _rig(
         return load_rig(rig, character)
     text = params_text(rig) if rig is not None else recording.info.config_yaml
     whole = _write(text, folder / "recorded.yaml")
-    base = rig if rig is not None else _read(recording, whole)
+    try:
+        base = rig if rig is not None else load(whole, Rig)
+    except ConfigError as error:
+        first = error.faults[0]
+        raise BadRecording(
+            f"{recording.path} was made with a configuration that this version does not know "
+            f"({first.key}: {first.rule}): give another rig"
+        ) from None
     found = base
     if character is not None:
         by_path = "/" in character or character.endswith((".yaml", ".yml"))
@@ -303,18 +306,6 @@ def _rig(
     return replace(
         found, gaze=replace(found.gaze, scanpath=replace(scanpath, transition_matrix=walk))
     )
-
-
-def _read(recording: RunRecording, whole: Path) -> Rig:
-    """Read the recorded configuration."""
-    try:
-        return load(whole, Rig)
-    except ConfigError as error:
-        first = error.faults[0]
-        raise BadRecording(
-            f"{recording.path} was made with a configuration that this version does not know "
-            f"({first.key}: {first.rule}): give another rig"
-        ) from None
 
 
 def _write(text: str, file: Path) -> Path:

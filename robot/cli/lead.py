@@ -66,27 +66,22 @@ def look(
                 return
             reply = rig.give(command._replace(who=rig.who, stay=stay))
             until = "Ctrl-C" if seconds is None else f"{seconds:g} s have passed"
+            say(f"{reply.text()}, until: {'gazerig ctl look free' if stay else until}")
             if stay:
-                until = "gazerig ctl look free"
-            say(f"{reply.text()}, until: {until}")
-            if not stay:
-                _lead_on(rig, inf if seconds is None else seconds)
-
-
-def _lead_on(rig: RobotClient, seconds: float) -> None:
-    """Control the gaze for a time, until Ctrl-C or until another client does; then release it."""
-    clock = RealClock()
-    end_s = clock.now_s() + seconds
-    with contextlib.suppress(KeyboardInterrupt):
-        while rig.leads and clock.now_s() < end_s:
-            clock.sleep_until(min(end_s, clock.now_s() + _LEADS_EVERY_S))
-    if rig.leads:
-        rig.look_freely()
-        say("it looks freely")
-        return
-    now = rig.status()
-    stopped = f"it was stopped: {now['stopped']}" if now["stopped"] else "it looks freely"
-    say(f"led by {now['led']}" if now["led"] else stopped)
+                return
+            # Until Ctrl-C or until another client controls the gaze.
+            clock = RealClock()
+            end_s = clock.now_s() + (inf if seconds is None else seconds)
+            with contextlib.suppress(KeyboardInterrupt):
+                while rig.leads and clock.now_s() < end_s:
+                    clock.sleep_until(min(end_s, clock.now_s() + _LEADS_EVERY_S))
+            if rig.leads:
+                rig.look_freely()
+                say("it looks freely")
+                return
+            now = rig.status()
+            stopped = f"it was stopped: {now['stopped']}" if now["stopped"] else "it looks freely"
+            say(f"led by {now['led']}" if now["led"] else stopped)
 
 
 @app.command()

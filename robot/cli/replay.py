@@ -104,53 +104,46 @@ def export(
             raise SetupError("export takes one of --csv and --bids")
         if csv and (subject is not None or task is not None):
             raise SetupError("--subject and --task name files of --bids")
-        _export(file, bids, out, subject, task, force)
+        from gazerig.robot.control.feedback_basis import ESTIMATED
+        from gazerig.robot.recording.export_bids import DatasetDescription, write_bids
+        from gazerig.robot.recording.export_csv import csv_files, write_csv
+        from gazerig.robot.recording.gaze_angles import collect_gaze_angles
+        from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
+        from gazerig.robot.recording.read import RunRecording, used
 
-
-def _export(
-    file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None, force: bool
-) -> None:
-    """Write one kind of export and print the names of its files."""
-    from gazerig.robot.control.feedback_basis import ESTIMATED
-    from gazerig.robot.recording.export_bids import DatasetDescription, write_bids
-    from gazerig.robot.recording.export_csv import csv_files, write_csv
-    from gazerig.robot.recording.gaze_angles import collect_gaze_angles
-    from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
-    from gazerig.robot.recording.read import RunRecording, used
-
-    recording = RunRecording(file)
-    stem = out or file.with_suffix("")
-    if not bids:
-        refuse_existing(*csv_files(stem), force=force)
-    _warn(recording.note)
-    with used(file):
-        with _progress("reading", recording.duration_s) as read:
-            trace = collect_gaze_angles(_with_progress(recording.ticks(), read))
-        labels = label_samples(trace)
-        stretches = find_intervals(trace, labels)
-    if bids:
-        info = recording.info
-        about = DatasetDescription(
-            subject or Path(info.rig).stem,
-            task or info.scene or "live",
-            info.rate_hz,
-            info.started_utc,
-            ", ".join(f"{name} {version}" for name, version in sorted(info.versions.items())),
+        recording = RunRecording(file)
+        stem = out or file.with_suffix("")
+        if not bids:
+            refuse_existing(*csv_files(stem), force=force)
+        _warn(recording.note)
+        with used(file):
+            with _progress("reading", recording.duration_s) as read:
+                trace = collect_gaze_angles(_with_progress(recording.ticks(), read))
+            labels = label_samples(trace)
+            stretches = find_intervals(trace, labels)
+        if bids:
+            info = recording.info
+            about = DatasetDescription(
+                subject or Path(info.rig).stem,
+                task or info.scene or "live",
+                info.rate_hz,
+                info.started_utc,
+                ", ".join(f"{name} {version}" for name, version in sorted(info.versions.items())),
+            )
+            root = out or file.with_name(f"{file.stem}_bids")
+            made = write_bids(trace, labels, stretches, about, root, force)
+            say(f"{len(made)} files in {root}")
+        else:
+            made = write_csv(trace, labels, stretches, stem, force)
+            say("\n".join(map(str, made)))
+        found = {kind: sum(s.event == kind for s in stretches) for kind in _EVENTS}
+        say(
+            f"{len(trace.time_s)} samples in {trace.time_s[-1]:.1f} s, "
+            + ", ".join(f"{n} {kind}s" for kind, n in found.items())
+            + f"; labels are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
         )
-        root = out or file.with_name(f"{file.stem}_bids")
-        made = write_bids(trace, labels, stretches, about, root, force)
-        say(f"{len(made)} files in {root}")
-    else:
-        made = write_csv(trace, labels, stretches, stem, force)
-        say("\n".join(map(str, made)))
-    found = {kind: sum(s.event == kind for s in stretches) for kind in _EVENTS}
-    say(
-        f"{len(trace.time_s)} samples in {trace.time_s[-1]:.1f} s, "
-        + ", ".join(f"{n} {kind}s" for kind, n in found.items())
-        + f"; labels are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
-    )
-    if trace.estimated:
-        say(f"{', '.join(trace.estimated)}: {ESTIMATED}")
+        if trace.estimated:
+            say(f"{', '.join(trace.estimated)}: {ESTIMATED}")
 
 
 _EVENTS = ("saccade", "fixation", "pursuit", "blink")

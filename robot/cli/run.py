@@ -27,7 +27,7 @@ from gazerig.robot.cli.terminal import (
 from gazerig.robot.control.joint_faults import JointFault, joints_text
 
 if TYPE_CHECKING:
-    from gazerig.robot.app.surroundings import GroupRun
+    pass
 
 app = typer.Typer()
 
@@ -82,7 +82,11 @@ def run(
         browse = open_page if not no_browser and desktop_here() else None
         opening = Opening("" if fast else what_runs(asked))
         with tidied_up():
-            group = _group(asked)
+            group = None
+            if asked.world is not None:
+                from gazerig.robot.app.surroundings import surroundings
+
+                group = surroundings(asked.world).group(asked)  # None: it has one head
             if group is not None:
                 carry_out = group.run
             else:
@@ -90,18 +94,14 @@ def run(
                 carry_out = partial(session.run, session.compose(asked), summarised=told)
         with signals() as stopped:
             figures = carry_out(stopped, opening.say, shows, opening.saw, browse)
-        _write_summary(figures, summary, force)
+        if summary is not None:
+            text = json.dumps(figures, indent=2) + "\n"
+            if summary == "-":
+                print(text, end="")
+            else:
+                write_file(Path(summary), text, force)
     if had_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
-
-
-def _group(asked: RunOptions) -> "GroupRun | None":
-    """Return the heads of a world that has several, None without."""
-    if asked.world is None:
-        return None
-    from gazerig.robot.app.surroundings import surroundings
-
-    return surroundings(asked.world).group(asked)
 
 
 class Opening:
@@ -152,13 +152,3 @@ def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
         say(f"the run had faults: {'; '.join(held)}{busy if share >= BUSY_SHARE else ''}")
     failed = str(figures["stopped_by"]).startswith("fault") or "torque_off_unconfirmed" in figures
     return bool(held) or failed
-
-
-def _write_summary(figures: dict[str, object], where: str | None, force: bool) -> None:
-    if where is None:
-        return
-    text = json.dumps(figures, indent=2) + "\n"
-    if where == "-":
-        print(text, end="")
-    else:
-        write_file(Path(where), text, force)

@@ -217,7 +217,10 @@ def ask(
         if menu is not None and menu not in menus:
             raise SetupError(f"{menu}: no menu of this rig; there is {', '.join(menus)}")
         shown = menus if menu is None else {menu: menus[menu]}
-        _tell(f"{name}: {_choices(choices)}" for name, choices in shown.items())
+        _tell(
+            f"{name}: {', '.join((f'{first} (in force)', *others))}"
+            for name, (first, *others) in shown.items()
+        )
 
 
 @ctl.command()
@@ -292,11 +295,6 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         f"not saved: {_count(unsaved)}; gazerig ctl save keeps" if unsaved else "all saved",
         *(f"said: {text}" for text in now["said"][-_LAST_SAID:]),
     ]
-
-
-def _choices(choices: Sequence[str]) -> str:
-    """Write a menu's choices, the active one first."""
-    return ", ".join((f"{choices[0]} (in force)", *choices[1:]))
 
 
 def _table(

@@ -29,7 +29,7 @@ from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import stopped_result
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.command_checks import check
+from gazerig.robot.model.command_json import check
 from gazerig.robot.model.commands import Ask, Command, Jog, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics

@@ -8,9 +8,8 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor, ReachableGaze
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, Target
 from gazerig.robot.model.commands import Jog
-from gazerig.robot.model.gaze_error import gaze_error
-from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.kinematics import NECK, Kinematics
+from gazerig.robot.model.joint import JointLimit
+from gazerig.robot.model.kinematics import NECK, Kinematics, gaze_error
 from gazerig.robot.model.reply import CommandReply, JointReply
 from gazerig.robot.model.types import JointAngles, JointState
 

@@ -8,7 +8,7 @@ from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import ORDERED, PART_NAMES, Target
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.leader import Leader, leader_of, sentence, title
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.egomotion_residual import ResidualFigures

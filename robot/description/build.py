@@ -118,14 +118,23 @@ class _Builder:
                 joint = self._joint(name, axis)
                 self._links.append(parts.further(link_of(name), HEAD, place, joint, self._measures))
         self._links.insert(first, self._head(neck, self._links[first:]))
-        camera = self._add_camera()
+        camera = rig.camera
+        x, y, z = camera.position_mm
+        angles = radians(camera.yaw_deg), radians(camera.pitch_deg), radians(camera.roll_deg)
+        holder = HEAD if camera.mount == "head" else BASE
+        self._links.append(
+            parts.camera(CAMERA, holder, (x / 1e3, y / 1e3, z / 1e3), rotation(angles))
+        )
+        self._links.append(Link(OPTICAL_FRAME, CAMERA, R=OPTICAL))
+        field = radians(camera.horizontal_field_deg)
+        frame = CameraFrame(CAMERA, OPTICAL_FRAME, field, *rig.image_px)
         # The links of the neck overlap each other, the shoulders and the head.
         necks = [link.name for link in self._links[1:first]]
         inside = [HEAD, *(link.name for link in self._links if link.parent == HEAD)]
         touching = [*combinations((BASE, *necks), 2), *product(necks, inside)]
         if not necks:
             touching += product((BASE,), inside)
-        return Description(rig.name, tuple(self._links), camera, tuple(touching))
+        return Description(rig.name, tuple(self._links), frame, tuple(touching))
 
     def _joint(
         self, name: str, axis: Vec3, of: str = "", follows: Follows | None = None
@@ -246,18 +255,6 @@ class _Builder:
             )
         ]
         return parts.meeting_rad(spans[0], spans[1])
-
-    def _add_camera(self) -> CameraFrame:
-        camera = self._rig.camera
-        x, y, z = camera.position_mm
-        angles = radians(camera.yaw_deg), radians(camera.pitch_deg), radians(camera.roll_deg)
-        parent = HEAD if camera.mount == "head" else BASE
-        place = (x / 1e3, y / 1e3, z / 1e3)
-        self._links.append(parts.camera(CAMERA, parent, place, rotation(angles)))
-        self._links.append(Link(OPTICAL_FRAME, CAMERA, R=OPTICAL))
-        width, height = self._rig.image_px
-        field = radians(camera.horizontal_field_deg)
-        return CameraFrame(CAMERA, OPTICAL_FRAME, field, width, height)
 
 
 def link_of(joint: str) -> str:

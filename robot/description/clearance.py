@@ -76,9 +76,20 @@ def _bodies(description: Description) -> Iterator[Collision]:
             return
         poses = _placed_links(description, angles)
         for one, other in left:
-            if _depth_m(description, poses, one, other) > _DEEP_M:
-                found.add((one, other))
-                yield _of_bodies(_first(description, angles, one, other), one, other)
+            if _depth_m(description, poses, one, other) <= _DEEP_M:
+                continue
+            found.add((one, other))
+            first = _first(description, angles, one, other)
+            named = {joint: degrees(angle) for joint, angle in first.items()}
+            joint, angle = max(named.items(), key=lambda item: abs(item[1]))
+            key = "min_deg" if angle < 0.0 else "max_deg"
+            cure = f"set joints.{joint}.{key} to {int(angle)} where the real one has no more room"
+            if len(named) > 1:
+                cure = (
+                    f"forbid {' and '.join(named)} together (guard.collisions) where the real "
+                    "ones have no more room"
+                )
+            yield Collision(named, (one, other), cure)
 
 
 def _placed_links(description: Description, angles: Mapping[str, float]) -> dict[str, Pose]:
@@ -96,17 +107,6 @@ def _first(
         deep = _depth_m(description, poses, one, other) > _DEEP_M
         free, met = (free, middle) if deep else (middle, met)
     return {name: met * angle for name, angle in angles.items()}
-
-
-def _of_bodies(angles: Mapping[str, float], one: str, other: str) -> Collision:
-    named = {joint: degrees(angle) for joint, angle in angles.items()}
-    joint, angle = max(named.items(), key=lambda item: abs(item[1]))
-    key = "min_deg" if angle < 0.0 else "max_deg"
-    cure = f"set joints.{joint}.{key} to {int(angle)} where the real one has no more room"
-    if len(named) > 1:
-        both = " and ".join(named)
-        cure = f"forbid {both} together (guard.collisions) where the real ones have no more room"
-    return Collision(named, (one, other), cure)
 
 
 def _pairs(description: Description) -> list[tuple[str, str]]:

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import Mesh, grid
-from gazerig.robot.description.paint import Colour, Painted, painted
+from gazerig.robot.description.mesh import Colour, Mesh, Painted, grid, painted
 from gazerig.robot.description.solid import Solid
 
 _COLUMNS, _ROWS = 31, 7

@@ -71,7 +71,16 @@ def gltf(description: Description) -> bytes:
         for node in tree["nodes"]:
             if node["name"] in joints:
                 node["extras"] = joints[node["name"]]
-        _add_camera(tree, description)
+        # The camera: glTF's looks along -z with y up, the optical frame along z with y down.
+        camera = description.camera
+        share = camera.width_px / camera.height_px
+        field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) / share)
+        perspective = {"aspectRatio": share, "yfov": field_y, "znear": 0.01}
+        tree["cameras"] = [{"name": "camera", "type": "perspective", "perspective": perspective}]
+        view = {"name": "camera_view", "camera": 0, "rotation": [1.0, 0.0, 0.0, 0.0]}
+        tree["nodes"].append(view)
+        (optical,) = (node for node in tree["nodes"] if node["name"] == camera.optical)
+        optical.setdefault("children", []).append(len(tree["nodes"]) - 1)
         # Which parts of the buffer are vertices and which are faces; trimesh leaves that open.
         views, accessors = tree["bufferViews"], tree["accessors"]
         for primitive in (one for mesh in tree["meshes"] for one in mesh["primitives"]):
@@ -83,19 +92,6 @@ def gltf(description: Description) -> bytes:
         scene, include_normals=True, tree_postprocessor=complete
     )
     return bytes(exported)
-
-
-def _add_camera(tree: dict[str, Any], description: Description) -> None:
-    """Add the camera: glTF's looks along -z with y up, the optical frame along z with y down."""
-    camera = description.camera
-    share = camera.width_px / camera.height_px
-    field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) / share)
-    perspective = {"aspectRatio": share, "yfov": field_y, "znear": 0.01}
-    tree["cameras"] = [{"name": "camera", "type": "perspective", "perspective": perspective}]
-    node = {"name": "camera_view", "camera": 0, "rotation": [1.0, 0.0, 0.0, 0.0]}
-    tree["nodes"].append(node)
-    (optical,) = (node for node in tree["nodes"] if node["name"] == camera.optical)
-    optical.setdefault("children", []).append(len(tree["nodes"]) - 1)
 
 
 def _mesh(visual: Visual) -> Any:

@@ -10,17 +10,21 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.description.face_features import brow as bow
 from gazerig.robot.description.face_features import lips
 from gazerig.robot.description.head_shape import HEAD, JAW_BOUNDS, JAW_HALF, MOUTH, eye_rim, surface
-from gazerig.robot.description.mesh import Mesh, ellipsoid, grid, smooth_normals, turned
-from gazerig.robot.description.paint import (
+from gazerig.robot.description.mesh import (
     Colour,
+    Mesh,
     Painted,
+    ellipsoid,
+    grid,
     merged,
     mirrored,
     mix,
     painted,
     plain,
+    smooth_normals,
     spot,
     step,
+    turned,
 )
 from gazerig.robot.description.solid import cut
 
@@ -76,7 +80,11 @@ def skin() -> HeadSkin:
         stays.append(beyond)
     upper, lower, line = lips(HEAD, MOUTH, _LIPS, _MOUTH_LINE)
     sides = [_jaw_side(jaw, sign, 0.8, SKIN) for sign in (1.0, -1.0)]
-    cheeks = [_turned_over(_jaw_side(jaw, sign, 0.4, _MOUTH)) for sign in (1.0, -1.0)]
+    cheeks = []  # with their normals reversed
+    for sign in (1.0, -1.0):
+        side = _jaw_side(jaw, sign, 0.4, _MOUTH)
+        mesh = Mesh(side.mesh.vertices, side.mesh.faces[:, ::-1])
+        cheeks.append(Painted(mesh, side.colours, smooth_normals(mesh)))
     return HeadSkin(
         merged([*stays, *_rims(), upper, line]), merged([jaw, *sides, lower]), merged(cheeks)
     )
@@ -111,12 +119,6 @@ def _jaw_side(jaw: Painted, sign: float, deep: float, within: Colour) -> Painted
     colours = np.broadcast_to(np.array((SKIN, within), float)[:, None], points.shape)
     mesh = grid(points, closed=False)
     return Painted(mesh, colours.reshape(-1, 3), smooth_normals(mesh))
-
-
-def _turned_over(one: Painted) -> Painted:
-    """Return a surface with its normals reversed."""
-    mesh = Mesh(one.mesh.vertices, one.mesh.faces[:, ::-1])
-    return Painted(mesh, one.colours, smooth_normals(mesh))
 
 
 @lru_cache(maxsize=1)

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.mesh import Painted
 
 IDENTITY: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ORIGIN: Vec3 = (0.0, 0.0, 0.0)

@@ -75,7 +75,12 @@ def sheet(vertices: Floats, faces: np.ndarray, thickness_m: float = _LID_M) -> I
     masses = areas * thickness_m * _PRINTED_KG_M3
     # Three points at the middles of its edges have the moments of a triangle.
     points = np.concatenate(((a + b) / 2, (b + c) / 2, (c + a) / 2))
-    return _of_points(points, np.tile(masses / 3.0, 3))
+    masses = np.tile(masses / 3.0, 3)
+    mass = float(masses.sum())
+    com = masses @ points / mass
+    off = points - com
+    second = (off * masses[:, None]).T @ off
+    return Inertia(mass, _vector(com), _matrix(np.trace(second) * np.eye(3) - second))
 
 
 def balanced(shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, at_m: Vec3) -> Inertia:
@@ -134,14 +139,6 @@ def about(one: Inertia, point_m: Vec3) -> Mat3:
 def diagonal(x: float, y: float, z: float) -> Mat3:
     """Return a tensor with these moments."""
     return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
-
-
-def _of_points(points: Floats, masses: Floats) -> Inertia:
-    mass = float(masses.sum())
-    com = masses @ points / mass
-    off = points - com
-    second = (off * masses[:, None]).T @ off
-    return Inertia(mass, _vector(com), _matrix(np.trace(second) * np.eye(3) - second))
 
 
 def _steiner(off: Floats, mass_kg: float) -> Floats:

@@ -12,8 +12,7 @@ import cv2
 import numpy as np
 
 from gazerig.gaze.types import Floats, Mat3
-from gazerig.robot.description.mesh import Mesh
-from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.mesh import Mesh, Painted
 from gazerig.robot.description.texture import textured
 
 

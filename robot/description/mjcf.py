@@ -5,7 +5,6 @@ under the world is the rig's base. Lids collide with lids, other parts with ever
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from math import atan, degrees, tan
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ from gazerig.robot.description.links import (
     IDENTITY,
     CollisionShape,
     Description,
-    Visual,
+    Link,
     turn_about,
 )
 from gazerig.robot.description.mesh_files import mesh_files, numbers
@@ -69,35 +68,7 @@ def mjcf(
     for link in description.links:
         body = ET.SubElement(bodies[link.parent or ""], "body", name=prefix + link.name)
         bodies[link.name] = body
-        at_rad, R = 0.0, link.R
-        if awake and link.joint is not None and link.joint.awake_rad:
-            at_rad = link.joint.awake_rad
-            R = compose(R, turn_about(link.joint.axis, at_rad))
-        _place(body, link.p_m, R)
-        if link.inertia is not None:
-            inertia = link.inertia
-            (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor_kg_m2
-            ET.SubElement(
-                body, "inertial", pos=numbers(inertia.com_m), mass=numbers((inertia.mass_kg,)),
-                fullinertia=numbers((xx, yy, zz, xy, xz, yz)),
-            )  # fmt: skip
-        if link.joint is not None:
-            joint = link.joint
-            element = ET.SubElement(
-                body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
-                range=numbers((joint.low_rad, joint.high_rad)),
-            )  # fmt: skip
-            if at_rad:
-                element.set("ref", numbers((at_rad,)))
-        for shape in link.collisions:
-            _add_shape(body, shape)
-        for visual in link.visuals:
-            geom = ET.SubElement(
-                body, "geom", name=f"{prefix}{visual.name}", type="mesh", mesh=prefix + visual.name,
-                material=prefix + visual.name, contype="0", conaffinity="0", group=_LOOKS_GROUP,
-                mass="0",
-            )  # fmt: skip
-            _place(geom, visual.p_m, visual.R)
+        _fill(body, link, prefix, awake)
         if link.name == description.camera.optical:
             # MuJoCo's camera looks along -z with y up, the optical frame along z, y down.
             camera = description.camera
@@ -119,7 +90,7 @@ def mjcf(
 def _add_assets(
     parent: ET.Element, description: Description, prefix: str, assets: dict[str, bytes]
 ) -> None:
-    for visual in _visuals(description):
+    for visual in (one for link in description.links for one in link.visuals):
         name = prefix + visual.name
         files = mesh_files(name, visual.painted)
         assets |= {file: data for file, data in files.items() if not file.endswith(".mtl")}
@@ -130,9 +101,37 @@ def _add_assets(
         ET.SubElement(parent, "mesh", name=name, file=f"{name}.obj", inertia="shell")
 
 
-def _visuals(description: Description) -> Iterator[Visual]:
-    for link in description.links:
-        yield from link.visuals
+def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
+    """Write what a body consists of, its joint first."""
+    at_rad, R = 0.0, link.R
+    if awake and link.joint is not None and link.joint.awake_rad:
+        at_rad = link.joint.awake_rad
+        R = compose(R, turn_about(link.joint.axis, at_rad))
+    _place(body, link.p_m, R)
+    if link.inertia is not None:
+        inertia = link.inertia
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor_kg_m2
+        ET.SubElement(
+            body, "inertial", pos=numbers(inertia.com_m), mass=numbers((inertia.mass_kg,)),
+            fullinertia=numbers((xx, yy, zz, xy, xz, yz)),
+        )  # fmt: skip
+    if link.joint is not None:
+        joint = link.joint
+        element = ET.SubElement(
+            body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
+            range=numbers((joint.low_rad, joint.high_rad)),
+        )  # fmt: skip
+        if at_rad:
+            element.set("ref", numbers((at_rad,)))
+    for shape in link.collisions:
+        _add_shape(body, shape)
+    for visual in link.visuals:
+        geom = ET.SubElement(
+            body, "geom", name=f"{prefix}{visual.name}", type="mesh", mesh=prefix + visual.name,
+            material=prefix + visual.name, contype="0", conaffinity="0", group=_LOOKS_GROUP,
+            mass="0",
+        )  # fmt: skip
+        _place(geom, visual.p_m, visual.R)
 
 
 def _place(element: ET.Element, p_m: tuple[float, ...], R: object) -> None:

@@ -14,9 +14,8 @@ import numpy as np
 
 from gazerig.gaze.angles import rotation
 from gazerig.robot.description.links import Description, Visual
-from gazerig.robot.description.mesh import Mesh
+from gazerig.robot.description.mesh import Mesh, Painted
 from gazerig.robot.description.mesh_params import MeshParams
-from gazerig.robot.description.paint import Painted
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,15 @@ from gazerig.robot.description.links import (
     LinkJoint,
     Visual,
 )
-from gazerig.robot.description.mesh import Mesh, ellipsoid
-from gazerig.robot.description.paint import Painted, merged, mirrored, moved, painted
+from gazerig.robot.description.mesh import (
+    Mesh,
+    Painted,
+    ellipsoid,
+    merged,
+    mirrored,
+    moved,
+    painted,
+)
 
 FLOOR_M = -0.09
 """Height of the table the rig stands on, below the neck base."""

@@ -13,11 +13,12 @@ import numpy as np
 
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.description.face_features import Mouth, brow, lips
-from gazerig.robot.description.mesh import Mesh, cap, grid
-from gazerig.robot.description.mesh import ellipsoid as ellipsoid_mesh
-from gazerig.robot.description.paint import (
+from gazerig.robot.description.mesh import (
     Colour,
+    Mesh,
     Painted,
+    cap,
+    grid,
     merged,
     mirrored,
     mix,
@@ -26,6 +27,7 @@ from gazerig.robot.description.paint import (
     spot,
     step,
 )
+from gazerig.robot.description.mesh import ellipsoid as ellipsoid_mesh
 from gazerig.robot.description.solid import Field, Solid, Surface, capsule, carve, ellipsoid, union
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 
@@ -126,14 +128,11 @@ def head_parts(number: int, fineness: float = 1.0) -> HeadParts:
     look = LOOKS[number % len(LOOKS)]
     solid = _head_solid(look, fineness)
     red, dark = _toward(look.skin, (186, 62, 66), 0.55), _toward(look.skin, (70, 24, 24), 0.8)
-    return HeadParts(
-        solid,
-        moved(
-            merged([*_eyes(look, fineness), *lips(_HEAD, _MOUTH, red, dark)]),
-            (0.0, 0.0, 0.0),
-            PUPIL_DISTANCE_M,
-        ),
-    )
+    # Both eyes with their lids' edges, and the brows.
+    eye, glint, lid, still = _eye_parts(look, fineness)
+    left = [*(moved(part, _EYE) for part in (*eye, glint, lid)), *still]
+    face = merged([*left, *map(mirrored, left), *lips(_HEAD, _MOUTH, red, dark)])
+    return HeadParts(solid, moved(face, (0.0, 0.0, 0.0), PUPIL_DISTANCE_M))
 
 
 def _head_solid(look: PersonLook, fineness: float) -> Painted:
@@ -208,13 +207,6 @@ def _complexion(points: Floats, look: PersonLook) -> Floats:
     return mix(colours, shade, 0.6 * step(-z - 1.25, 0.3))
 
 
-def _eyes(look: PersonLook, fineness: float) -> list[Painted]:
-    """Return both eyes with their lids' edges, and the brows."""
-    eye, glint, lid, still = _eye_parts(look, fineness)
-    parts = [*(moved(part, _EYE) for part in (*eye, glint, lid)), *still]
-    return [*parts, *(mirrored(part) for part in parts)]
-
-
 class _EyeParts(NamedTuple):
     """An eyeball's layers, its glint and its upper lid about its centre; lower lid and brow."""
 
@@ -243,7 +235,9 @@ def _eye_parts(look: PersonLook, fineness: float, around: int = 48) -> _EyeParts
     lids = []
     for edge_deg, end_deg, dark in ((20.0, 118.0, 1.0), (-25.0, -84.0, 0.35)):
         lid = painted(_shell(1.09 * _EYE_RADIUS, edge_deg, end_deg), tone)
-        edge = step(0.05 - np.abs(_lift(lid.mesh.vertices) - radians(edge_deg)), 0.05)
+        x, _, up = lid.mesh.vertices.T
+        swept = np.arctan2(up, x)  # about the y axis, from straight ahead
+        edge = step(0.05 - np.abs(swept - radians(edge_deg)), 0.05)
         lids.append(lid._replace(colours=mix(lid.colours, (40, 28, 26), dark * edge)))
     share = np.linspace(0.0, 1.0, 12)
     y, z = 0.20 + 0.62 * share, 0.90 + 0.13 * np.sin(pi * (0.2 + 0.6 * share))
@@ -265,11 +259,6 @@ def _shell(radius: float, edge_deg: float, end_deg: float) -> Mesh:
         axis=-1,
     )
     return grid(radius * (points if end_deg > edge_deg else points[:, ::-1]), closed=False)
-
-
-def _lift(points: Floats) -> Floats:
-    """Return how far points are swept up about the y axis, from straight ahead."""
-    return np.asarray(np.arctan2(points[:, 2], points[:, 0]))
 
 
 @lru_cache(maxsize=4)

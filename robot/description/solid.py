@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.mesh import Mesh
-from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.mesh import Mesh, Painted
 
 Field = Callable[[Floats], Floats]
 

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.description.mesh import quads, smooth_normals
-from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.mesh import Painted, quads, smooth_normals
 
 _PATCH = 4
 """Texels along the side of the square that two triangles share."""

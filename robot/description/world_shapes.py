@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.model.frames import Quaternion
 

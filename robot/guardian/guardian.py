@@ -148,7 +148,11 @@ class Guardian:
         for i in range(len(self.plans)):
             if self.releasing(i):  # the dead guardian cannot finish
                 self._heartbeat.set_state(i, RELEASED)
-        why = "did not respond" if code is None else f"ended by itself ({_exit_text(code)})"
+        if code is None:
+            why = "did not respond"
+        else:
+            ended = f"signal {-code}" if code < 0 else f"exit code {code}"
+            why = f"ended by itself ({ended})"
         self._events.append(f"the guardian {why}: started again")
         try:
             self._start()
@@ -214,10 +218,6 @@ class Guardian:
         )
 
 
-def _exit_text(code: int) -> str:
-    return f"signal {-code}" if code < 0 else f"exit code {code}"
-
-
 class GuardedBus:
     """Servo bus with heartbeats and a guardian; implements ``ServoBus``.
 
@@ -267,7 +267,13 @@ class GuardedBus:
                 return self._silent
             self._restore_torque(now_s)
         feedback = self._bus.read(now_s)
-        return self._mark_rearmed(feedback) if self._rearmed else feedback
+        if not self._rearmed:
+            return feedback
+        # Each servo's first answer after torque-on.
+        here = self._rearmed.difference(feedback.missing)
+        self._rearmed -= here
+        rearmed = [reset or i in here for i, reset in enumerate(feedback.rearmed)]
+        return feedback._replace(rearmed=tuple(rearmed))
 
     def enable_torque(self) -> tuple[int, ...]:
         """Arm the guardian and switch torque on at the present positions.
@@ -350,10 +356,3 @@ class GuardedBus:
         self._lost_hold = False
         self._rearmed = set(self._silent.missing)
         self._events.append("torque on again where the joints are: going on slowly")
-
-    def _mark_rearmed(self, feedback: Feedback) -> Feedback:
-        """Return feedback with each servo's first answer after torque-on marked ``rearmed``."""
-        here = self._rearmed.difference(feedback.missing)
-        self._rearmed -= here
-        rearmed = [reset or i in here for i, reset in enumerate(feedback.rearmed)]
-        return feedback._replace(rearmed=tuple(rearmed))

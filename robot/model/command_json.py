@@ -1,7 +1,181 @@
-"""Commands as plain JSON, between processes and in recordings."""
+"""Commands as plain JSON, between processes and in recordings, and checks of their values.
 
-from gazerig.robot.model.command_checks import MAX_WORDS, check
-from gazerig.robot.model.commands import COMMANDS, Command, Leading, Play, Renew, Resume, Stop
+Every receiver of commands calls these checks first.
+"""
+
+from math import pi
+
+from gazerig.gaze.gesture.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
+from gazerig.robot.model.commands import (
+    COMMANDS,
+    Ask,
+    Command,
+    Express,
+    Jog,
+    Leading,
+    Look,
+    LookAt,
+    LookAtDirection,
+    LookAtInHead,
+    LookAtPerson,
+    LookAtPixel,
+    Play,
+    Renew,
+    Resume,
+    SetLevel,
+    Stop,
+    Tune,
+)
+from gazerig.robot.model.types import JOINT_NAME
+
+MAX_COORDINATE_M = 1000.0
+"""Largest coordinate of a point to look at."""
+MAX_ANGLE_RAD = 2.0 * pi
+"""Largest angle of a joint command to either side."""
+MAX_JOINTS = 64
+"""Largest number of joints in a command."""
+MAX_WORDS = 200
+"""Longest name or reason in a command, in characters."""
+MAX_LEAD_S = 86400.0
+"""Longest duration of a client's control."""
+MAX_PIXEL = 20000.0
+"""Largest coordinate of a pixel."""
+_MAX_TIME_S = 1e12
+
+
+def check(command: Command) -> None:
+    """Check that a command's values are valid.
+
+    Raises:
+        ValueError: A value is invalid; the message states the rule.
+    """
+    match command:
+        case Ask(menu, choice):
+            if not isinstance(menu, str) or not isinstance(choice, str):
+                raise ValueError("menu and choice are names")
+        case LookAt() | LookAtInHead() | LookAtDirection() | LookAtPerson() | LookAtPixel():
+            _check_look(command)
+            _check_lead(command)
+        case Jog(angles):
+            if not isinstance(angles, tuple) or len(angles) > MAX_JOINTS:
+                raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
+            for pair in angles:
+                if not (
+                    isinstance(pair, tuple) and len(pair) == 2 and _within(pair[1], MAX_ANGLE_RAD)
+                ):
+                    raise ValueError(
+                        "angles are pairs of a joint and a finite angle in radians within +-360 deg"
+                    )
+                if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
+                    raise ValueError(f"{pair[0]!r:.40} is not a joint name such as neck_yaw or jaw")
+            _check_lead(command)
+        case Express(expression, strength):
+            _check_share("an expression", "strength", expression, strength)
+        case SetLevel(level, value):
+            _check_share("a level", "value", level, value)
+        case Play(gesture, speed, times, who):
+            if not isinstance(gesture, str) or len(gesture) > MAX_WORDS:
+                raise ValueError("a gesture is given by its name")
+            if not _within(speed, MAX_SPEED) or speed < MIN_SPEED:
+                raise ValueError(f"the speed of a gesture is a number {MIN_SPEED:g}..{MAX_SPEED:g}")
+            if type(times) is not int or not 0 <= times <= MAX_COUNT:
+                raise ValueError(f"the times of a gesture are a whole number 0..{MAX_COUNT}")
+            _check_who(who)
+        case Renew(who):
+            _check_who(who)
+        case Stop(why, who):
+            if not isinstance(why, str) or len(why) > MAX_WORDS:
+                raise ValueError(f"the reason of a stop is text of at most {MAX_WORDS} characters")
+            _check_who(who)
+        case Resume(who, confirmed):
+            _check_who(who, confirmed)
+        case Tune(changes):
+            pairs = isinstance(changes, tuple) and all(
+                isinstance(c, tuple) and len(c) == 2 and isinstance(c[0], str) for c in changes
+            )
+            if not pairs:
+                raise ValueError("changes are pairs of a dotted key and a value")
+
+
+def _check_look(command: Look) -> None:
+    """Check the target of a look command."""
+    match command:
+        case LookAt(pointer=pointer) if not isinstance(pointer, bool):
+            raise ValueError("pointer is true or false")
+        case LookAt(None):
+            pass
+        case LookAt(p) | LookAtInHead(p):
+            _check_point(p)
+        case LookAtDirection(direction, frame, distance):
+            if not (_numbers(direction, 2, pi) and -pi / 2 <= direction[1] <= pi / 2):
+                raise ValueError(
+                    "a direction is a finite yaw within +-180 deg (left above 0) and a pitch "
+                    "within +-90 deg (up above 0)"
+                )
+            if frame not in ("world", "head"):
+                raise ValueError(f"frame {frame!r:.40}: expected world or head")
+            _check_distance(distance)
+        case LookAtPerson(person):
+            if isinstance(person, bool) or not isinstance(person, int) or person < 0:
+                raise ValueError(
+                    f"a person is named by a whole number from 0 on, not {person!r:.40}"
+                )
+        case LookAtPixel(pixel, distance, captured_s, p):
+            if not _numbers(pixel, 2, MAX_PIXEL):
+                raise ValueError("a pixel is two finite numbers, x right and y down")
+            if distance is not None:
+                _check_distance(distance)
+            if captured_s is not None and not _within(captured_s, _MAX_TIME_S):
+                raise ValueError("captured_s is the time of a frame in seconds")
+            if p is not None:
+                _check_point(p)
+
+
+def _check_point(p: object) -> None:
+    if not _numbers(p, 3, MAX_COORDINATE_M):
+        raise ValueError(
+            "a point is three finite numbers in metres, x ahead, y left, z up, none "
+            f"beyond +-{MAX_COORDINATE_M:g} m"
+        )
+
+
+def _check_distance(distance: object) -> None:
+    if not (_within(distance, MAX_COORDINATE_M) and distance > 0.0):  # type: ignore[operator]
+        raise ValueError(f"a distance is above 0 and at most {MAX_COORDINATE_M:g} m")
+
+
+def _check_lead(command: Leading) -> None:
+    _check_who(command.who, command.stay)
+    for_s = command.for_s
+    if for_s is not None and not (_within(for_s, MAX_LEAD_S) and for_s > 0.0):
+        raise ValueError(f"for_s is above 0 and at most {MAX_LEAD_S:g} s")
+
+
+def _check_who(who: object, flag: object = False) -> None:
+    if not isinstance(who, str) or len(who) > MAX_WORDS:
+        raise ValueError(f"who asks is text of at most {MAX_WORDS} characters")
+    if not isinstance(flag, bool):
+        raise ValueError("stay and confirmed are true or false")
+
+
+def _check_share(what: str, key: str, name: object, value: object) -> None:
+    if not isinstance(name, str) or len(name) > MAX_WORDS:
+        raise ValueError(f"{what} is given by its name")
+    if not _within(value, 1.0) or value < 0.0:  # type: ignore[operator]
+        raise ValueError(f"the {key} of {what} is a number 0..1")
+
+
+def _numbers(values: object, count: int, most: float) -> bool:
+    """Return whether this is a tuple of ``count`` finite numbers within +-most."""
+    of_them = isinstance(values, tuple) and len(values) == count
+    return of_them and all(_within(value, most) for value in values)  # type: ignore[attr-defined]
+
+
+def _within(value: object, most: float) -> bool:
+    # A comparison is false for NaN, and accepts integers too large for a float.
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and -most <= value <= most  # type: ignore[operator]
+
 
 _NAMES = {kind: name for name, kind in COMMANDS.items()}
 

@@ -78,7 +78,15 @@ def forbidden_pairs(
             limits[span.joint].low_rad > span.below and limits[span.joint].high_rad < span.above
             for span in pair
         ):
-            raise ValueError(_no_pose(pair, margin_deg, limits, joints))
+            halves = [
+                f"{joints[span.joint]} {degrees(span.low):g}..{degrees(span.high):g} deg of "
+                f"{degrees(limits[span.joint].low_rad):g}..{degrees(limits[span.joint].high_rad):g}"
+                for span in pair
+            ]
+            raise ValueError(
+                f"the collision of {' with '.join(halves)} leaves no pose, with its margin of "
+                f"{margin_deg:g} deg; narrow one of the two"
+            )
     return pairs
 
 
@@ -94,23 +102,6 @@ def _index(name: str, joints: tuple[str, ...]) -> int:
 def _range(joint: int, low_deg: float, high_deg: float, margin_deg: float) -> ForbiddenRange:
     low, high, margin = radians(low_deg), radians(high_deg), radians(margin_deg)
     return ForbiddenRange(joint, low, high, low - margin, high + margin)
-
-
-def _no_pose(
-    pair: tuple[ForbiddenRange, ForbiddenRange],
-    margin_deg: float,
-    limits: tuple[JointLimit, ...],
-    joints: tuple[str, ...],
-) -> str:
-    halves = [
-        f"{joints[span.joint]} {degrees(span.low):g}..{degrees(span.high):g} deg of "
-        f"{degrees(limits[span.joint].low_rad):g}..{degrees(limits[span.joint].high_rad):g}"
-        for span in pair
-    ]
-    return (
-        f"the collision of {' with '.join(halves)} leaves no pose, with its margin of "
-        f"{margin_deg:g} deg; narrow one of the two"
-    )
 
 
 @dataclass(frozen=True)

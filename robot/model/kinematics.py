@@ -13,7 +13,19 @@ from math import asin, atan2, hypot, pi, sqrt
 from operator import itemgetter
 from typing import Annotated, Any, NamedTuple
 
-from gazerig.gaze.angles import add, compose, dot, norm, rotate, rotate_back, rotation, scale, sub
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    compose,
+    dot,
+    norm,
+    rotate,
+    rotate_back,
+    rotation,
+    scale,
+    sub,
+)
+from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_order
@@ -187,7 +199,9 @@ class Kinematics:
         left = atan2(y_left, x), atan2(z, hypot(x, y_left))
         right = atan2(y_right, x), atan2(z, hypot(x, y_right))
         if self.one_pan:
-            yaw = _between(left[0], right[0])
+            yaw = 0.5 * (left[0] + right[0])
+            if abs(left[0] - right[0]) > pi:  # midway along the shorter arc
+                yaw = yaw - pi if yaw > 0.0 else yaw + pi
             left, right = (yaw, left[1]), (yaw, right[1])
         if self.one_tilt:
             pitch = 0.5 * (left[1] + right[1])
@@ -274,9 +288,33 @@ def _make_picker(places: Sequence[int]) -> Callable[[Sequence[float]], JointAngl
     return chosen
 
 
-def _between(one: float, other: float) -> float:
-    """Return the direction midway between two within -pi..pi, along the shorter arc."""
-    middle = 0.5 * (one + other)
-    if abs(one - other) <= pi:
-        return middle
-    return middle - pi if middle > 0.0 else middle + pi
+class GazeError(NamedTuple):
+    """The gaze error in rad.
+
+    Attributes:
+        left, right: Angle between each eye's line of sight and the point.
+        whole: The larger of both; if one linkage pans both eyes, that of their mean line of
+            sight, from midway between them.
+    """
+
+    left: float
+    right: float
+    whole: float
+
+
+def gaze_error(p_world_m: Vec3, pose: GazeState, converges: bool = True) -> GazeError:
+    """Return the angular error between a point and the lines of sight.
+
+    Args:
+        p_world_m: The point.
+        pose: Poses of head and eyes.
+        converges: Whether each eye pans separately.
+    """
+    left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
+    to_left = sub(p_world_m, pose.p_world_eye_left_m)
+    to_right = sub(p_world_m, pose.p_world_eye_right_m)
+    error_left, error_right = angle_between(left, to_left), angle_between(right, to_right)
+    whole = max(error_left, error_right)
+    if not converges:
+        whole = angle_between(add(left, right), add(to_left, to_right))
+    return GazeError(error_left, error_right, whole)

@@ -20,7 +20,7 @@ from gazerig.robot.model.commands import (
     LookAtPixel,
     Renew,
 )
-from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.leader import NOBODY_LEADS, LeadState
 from gazerig.robot.model.types import JointAngles
 

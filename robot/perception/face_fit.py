@@ -104,7 +104,10 @@ def fit_face(seen: Points, noise: float) -> FittedFace | None:
         0.0,
     )
     width = hypot(ex - cx, ey - cy) / eyes
-    believed = _accepted_width(width, variance / (eyes * eyes))
+    # The believed part of its excess over the usual one; width: over the distance of the eyes.
+    ratio = width / _USUAL_WIDTH
+    unsure = 2.0 * (variance / (eyes * eyes)) * (1.0 / _USUAL_WIDTH**2 + ratio * ratio)
+    believed = _WIDTH_SPREAD**2 / (_WIDTH_SPREAD**2 + unsure)
     wider, frontal = 0.0, _FRONTAL_M
     height_weight = variance / (variance + (_MOUTH_HEIGHT_OF_EYES * eyes) ** 2)
     R = rotation_by(turn)
@@ -138,18 +141,6 @@ def fit_face(seen: Points, noise: float) -> FittedFace | None:
             return FittedFace(R, (x, y, z), length)
         before = moved
     return None
-
-
-def _accepted_width(width: float, variance: float) -> float:
-    """Return the believed excess of a mouth's width over the usual one.
-
-    Args:
-        width: seen, over the distance of the eyes.
-        variance: of a coordinate of a point, over that distance squared.
-    """
-    ratio = width / _USUAL_WIDTH
-    unsure = 2.0 * variance * (1.0 / _USUAL_WIDTH**2 + ratio * ratio)
-    return _WIDTH_SPREAD**2 / (_WIDTH_SPREAD**2 + unsure)
 
 
 def _smile_landmarks(wider: float) -> tuple[Vec3, ...]:

@@ -78,7 +78,11 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
     if found is None:
         return None
     p = rotate_back(R_face_camera, found.p_m)
-    R = compose(transpose(R_face_camera), _face_axes(found.R))
+    # A face that looks straight into a camera has its left at the image's right, its up at the
+    # image's up, and its outward axis points to the camera.
+    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = found.R
+    axes = (-r02, r00, -r01), (-r12, r10, -r11), (-r22, r20, -r21)
+    R = compose(transpose(R_face_camera), axes)
     outwards = (R[0][0], R[1][0], R[2][0])
     if dot(outwards, p) > -cos(_MOST_TURNED_RAD) * norm(p):
         return None
@@ -117,13 +121,3 @@ def _project(R_face_camera: Mat3, rays: list[Vec3]) -> Points:
         z = g * x + h * y + i
         found.append(((a * x + b * y + c) / z, (d * x + e * y + f) / z))
     return tuple(found)
-
-
-def _face_axes(R: Mat3) -> Mat3:
-    """Return a turned face's axes from its turn.
-
-    A face that looks straight into a camera has its left at the image's right, its up at the
-    image's up, and its outward axis points to the camera.
-    """
-    (a, b, c), (d, e, f), (g, h, i) = R
-    return (-c, a, -b), (-f, d, -e), (-i, g, -h)

@@ -43,8 +43,10 @@ def without_own_motion(
         owner = _owner(thing, known, p_camera)
         if owner is None:
             others.append(thing)
-        elif owner < len(faces) and _on_head(thing, known[owner][0], p_camera):
-            spins[owner] = max(spins[owner], thing.spin_rad_s, key=abs)
+        elif owner < len(faces):
+            off = _off(thing, known[owner][0], p_camera)
+            if off is not None and hypot(*off) < _HEAD_M:
+                spins[owner] = max(spins[owner], thing.spin_rad_s, key=abs)
     turned = [
         replace(face, spin_rad_s=spin) if spin != 0.0 else face
         for face, spin in zip(faces, spins, strict=True)
@@ -57,15 +59,12 @@ def known_faces(faces: list[LocalisedDetection], before: Iterable[Known]) -> lis
 
     A face that the detector has just missed still owns its body's motion.
     """
-    tracked = list(before)
-    return [*[(face.p_world_m, _velocity(face, tracked)) for face in faces], *tracked]
-
-
-def _velocity(face: LocalisedDetection, tracked: list[Known]) -> Vec3 | None:
-    """Return the velocity of the tracked face at a detection's position, None without one."""
-    near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
-    away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
-    return v if away < _HEAD_M else None
+    tracked, found = list(before), []
+    for face in faces:
+        near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
+        away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
+        found.append((face.p_world_m, v if away < _HEAD_M else None))
+    return [*found, *tracked]
 
 
 def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int | None:
@@ -81,12 +80,6 @@ def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int
         if on_body and _moves_along(thing, p_face, v_face, p_camera):
             return k
     return None
-
-
-def _on_head(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> bool:
-    """Return whether a patch's middle is on the head."""
-    off = _off(thing, p_face, p_camera)
-    return off is not None and hypot(*off) < _HEAD_M
 
 
 def _off(thing: LocalisedDetection, p_face: Vec3, p_camera: Vec3) -> tuple[float, float] | None:

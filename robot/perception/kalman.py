@@ -259,7 +259,8 @@ class TrackFilter:
         angle = aside / range_m
         if angle > _TINY_RAD:
             way = scale(across_m, 1.0 / aside)
-            there, onward = _turn(here, way, angle)
+            c, s = cos(angle), sin(angle)
+            there, onward = add(scale(here, c), scale(way, s)), sub(scale(way, c), scale(here, s))
             v = self.v_m_s
             seen, gone = dot(v, here), dot(v, way)
             self.v_m_s = add(v, add(scale(sub(there, here), seen), scale(sub(onward, way), gone)))
@@ -306,9 +307,3 @@ def _interpolate(C: Variances, D: Variances, share: float) -> Variances:
 def _scale(C: Variances, factor: float) -> Variances:
     """Return a covariance in larger or smaller units."""
     return Variances(factor * C.p, factor * C.pv, factor * C.v)
-
-
-def _turn(view: Vec3, way: Vec3, angle_rad: float) -> tuple[Vec3, Vec3]:
-    """Return two unit vectors at right angles, the first turned towards the second."""
-    c, s = cos(angle_rad), sin(angle_rad)
-    return add(scale(view, c), scale(way, s)), sub(scale(way, c), scale(view, s))

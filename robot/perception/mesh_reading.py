@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import FaceMesh, FaceSigns
-from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.intrinsics import rays
 from gazerig.robot.perception.face_pose import FacePose
@@ -102,7 +102,8 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
     signs = FaceSigns(opening, lips / apart * PUPIL_DISTANCE_M)
     shut = opening is None or opening < EYES_SHUT
     gaze = None if shut else _gaze(mesh, R, p, intrinsics)
-    return MeshReading(FacePose(_vector(p), _matrix(R), length, sd), gaze, signs)
+    x, y, z = (_vector(row) for row in R)
+    return MeshReading(FacePose(_vector(p), (x, y, z), length, sd), gaze, signs)
 
 
 def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
@@ -177,9 +178,4 @@ def _gaze(mesh: FaceMesh, R: Floats, p: Floats, intrinsics: Intrinsics) -> Vec3 
 
 def _vector(v: NDArray[np.float64]) -> Vec3:
     x, y, z = v.tolist()
-    return x, y, z
-
-
-def _matrix(R: NDArray[np.float64]) -> Mat3:
-    x, y, z = (_vector(row) for row in R)
     return x, y, z

@@ -242,8 +242,11 @@ class Tracker:
             for found in detections
         ]
         coast_s = self._params.coast_ms / 1e3
-        tracks = [
-            TrackRow(
+        tracks = []
+        for track in self._tracks:
+            unseen_s, person = track.at_s - track.seen_s, track.is_person
+            gone_m = self._params.gate_speed_m_s * unseen_s
+            row = TrackRow(
                 kinds.get(track.detection.kind, -1),
                 _mark(track.detection),
                 *track.filter.view,
@@ -252,28 +255,19 @@ class Tracker:
                 track.filter.along.p,
                 track.detection.radius_m,
                 1.0 if track.depth_s is None else track.face_size,
-                self._moved_m(track),
-                track.at_s - track.seen_s <= coast_s,
-                self._params.gate_speed_m_s * (track.at_s - track.seen_s),
-                _FASTEST_M_S * (track.at_s - track.seen_s) if track.is_person else inf,
-                _UPRIGHT_M2 + (_STOOPS_M_S * (track.at_s - track.seen_s)) ** 2
-                if track.is_person
-                else inf,
+                0.0 if self._is_remembered(track) else gone_m,
+                unseen_s <= coast_s,
+                gone_m,
+                _FASTEST_M_S * unseen_s if person else inf,
+                _UPRIGHT_M2 + (_STOOPS_M_S * unseen_s) ** 2 if person else inf,
                 track.frames >= _PROVED,
             )
-            for track in self._tracks
-        ]
+            tracks.append(row)
         self._worn = clothing_costs(
             [track.clothes.colours for track in self._tracks],
             [found.clothing for found in detections],
         )
         return pair_costs(tracks, rows, self._params, self._worn)
-
-    def _moved_m(self, track: Track) -> float:
-        """Return the extra distance that a track may have from its expected position if unseen."""
-        if self._is_remembered(track):
-            return 0.0
-        return self._params.gate_speed_m_s * (track.at_s - track.seen_s)
 
     def _begin(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
         track = Track(

@@ -64,8 +64,17 @@ def label_samples(trace: GazeAngles) -> Labels:
     lag_s = estimate_lag(trace)
     source = np.searchsorted(trace.time_s, trace.time_s - lag_s + 1e-9, side="right") - 1
     source = np.maximum(source, 0)
-    movement = _relabel_short(trace.movement[source], trace.time_s)
-    return Labels(lag_s, movement, trace.blink[source], trace.looked_at[source])
+    out, time_s = trace.movement[source], trace.time_s
+    # Short pursuits become fixations, and short fixations within a pursuit become pursuit.
+    for wanted, other in ((_PURSUIT, _FIXATION), (_FIXATION, _PURSUIT)):
+        for first, last in _runs(out):
+            if out[first] != wanted or time_s[last] - time_s[first] >= SHORTEST_PURSUIT_S:
+                continue
+            before = out[first - 1] if first else 0
+            after = out[last + 1] if last + 1 < len(out) else 0
+            if wanted == _PURSUIT or (before == other and after == other):
+                out[first : last + 1] = other
+    return Labels(lag_s, out, trace.blink[source], trace.looked_at[source])
 
 
 def estimate_lag(trace: GazeAngles) -> float:
@@ -110,20 +119,6 @@ def find_intervals(trace: GazeAngles, labels: Labels) -> tuple[LabelledInterval,
         if labels.blink[first]
     ]
     return tuple(sorted(found, key=lambda s: (s.onset_s, s.event)))
-
-
-def _relabel_short(movement: Ints, time_s: Floats) -> Ints:
-    """Relabel short pursuits as fixations, and short fixations within a pursuit as pursuit."""
-    out = movement.copy()
-    for wanted, other in ((_PURSUIT, _FIXATION), (_FIXATION, _PURSUIT)):
-        for first, last in _runs(out):
-            if out[first] != wanted or time_s[last] - time_s[first] >= SHORTEST_PURSUIT_S:
-                continue
-            before = out[first - 1] if first else 0
-            after = out[last + 1] if last + 1 < len(out) else 0
-            if wanted == _PURSUIT or (before == other and after == other):
-                out[first : last + 1] = other
-    return out
 
 
 def _runs(key: Ints) -> list[tuple[int, int]]:

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.errors import HeadEnded, NotFound, Refused
-from gazerig.robot.model.command_checks import check
-from gazerig.robot.model.command_json import as_json
+from gazerig.robot.model.command_json import as_json, check
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     Ask,

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from gazerig.drivers.errors import DriverError, SetupError
-from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.errors import DriverError, SetupError, extra_hint
 from gazerig.robot.remote.steering import STOP, Stick
 
 # Codes of the kernel's input-event-codes.h.

@@ -116,25 +116,20 @@ class Collisions:
         held: Sequence[bool],
     ) -> None:
         """Set the goal of one joint of a pair inside its box to the nearest exit."""
-        paths = [
-            (abs(exit_rad - motion.command[span.joint]), span.joint, exit_rad)
-            for span in pair
-            if not held[span.joint]
-            for exit_rad in (span.below, span.above)
-            if motion.low[span.joint] <= exit_rad <= motion.high[span.joint]
-            and self._same_direction(span.joint, exit_rad, motion)
-        ]
+        paths = []
+        for span in pair:
+            joint, now = span.joint, motion.command[span.joint]
+            for exit_rad in (span.below, span.above):
+                # In the direction of the joint's exit from another box.
+                same = (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
+                if same and not held[joint] and motion.low[joint] <= exit_rad <= motion.high[joint]:
+                    paths.append((abs(exit_rad - now), joint, exit_rad))
         self.still.update(span.joint for span in pair)
         if paths:
             _, joint, exit_rad = min(paths)
             now = motion.command[joint]
             farther = [exit_rad, self.exits.get(joint, exit_rad)]
             self.exits[joint] = max(farther, key=lambda angle: abs(angle - now))
-
-    def _same_direction(self, joint: int, exit_rad: float, motion: MotionLimiter) -> bool:
-        """Return whether an exit has the same direction as the joint's exit from another box."""
-        now = motion.command[joint]
-        return (self.exits.get(joint, exit_rad) - now) * (exit_rad - now) >= 0.0
 
 
 def _side(span: ForbiddenRange, motion: MotionLimiter) -> int:

@@ -15,8 +15,7 @@ from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
 from gazerig.robot.safety.collisions import Collisions
 from gazerig.robot.safety.health import JointHealth, StallDetector
-from gazerig.robot.safety.late_ticks import LateTicks
-from gazerig.robot.safety.motion_limiter import LimitChange, MotionLimiter
+from gazerig.robot.safety.motion_limiter import LateTicks, LimitChange, MotionLimiter
 
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9

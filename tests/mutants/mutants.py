@@ -109,7 +109,7 @@ MUTANTS = (
            "a hand becomes a face", ("tracks", "perception")),
     Mutant("robot/perception/data_association.py", "(t[0] != d[0]) | (aside", "(aside",
            "among many a hand becomes a face", ("assignment",)),
-    Mutant("robot/perception/tracker.py", "track.at_s - track.seen_s <= coast_s", "True",
+    Mutant("robot/perception/tracker.py", "unseen_s <= coast_s", "True",
            "who has left stays in sight", ("tracks", "perception")),
     Mutant("robot/perception/frame_locator.py", "(z, spread) if spread <= _MOST_SPREAD_M else None", "(z, spread)",
            "a depth that is two things at once is believed", ("camera_depth", "perception")),

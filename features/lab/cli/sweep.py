@@ -11,7 +11,6 @@ import typer
 from gazerig.config.export import suggestion
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
-from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.app.options import BUSES, DEFAULT_SCENE, RunOptions
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.progress_bar import progress_bar
@@ -261,6 +260,8 @@ def _column(name: str) -> str:
     Raises:
         SetupError: there is no measure of that name.
     """
+    from gazerig.robot.analysis.human_norms import BY_KEY  # with NumPy
+
     if name in BY_KEY or name in _COLUMNS[:2]:
         return f"report.{name}"
     if name in _COLUMNS:
