@@ -9,7 +9,7 @@ from gazerig.features.bringup.manual_control import ManualControl, MoveResult, S
 from gazerig.gaze.angles import angle_between, norm, sub
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
-from gazerig.gaze.types import GazeState, Target, Vec3
+from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import Kinematics, gaze_error
 from gazerig.robot.model.types import JointAngles, JointState
@@ -85,17 +85,7 @@ def look_at(
         return "arrived" if step.t_s - start_s[0] >= seconds else None
 
     moved = control.follow(desired, over, seconds + 1.0)
-    converges = TOGETHER not in kinematics.names
-    return measure_gaze(p_world_m, kinematics.forward(moved.last.joints), moved, converges)
-
-
-def measure_gaze(
-    p_world_m: Vec3, pose: GazeState, moved: MoveResult, converges: bool = True
-) -> GazeResult:
-    """Return the gaze error of a measured pose.
-
-    converges: as in GazeResult
-    """
+    converges, pose = TOGETHER not in kinematics.names, kinematics.forward(moved.last.joints)
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     to_left = sub(p_world_m, pose.p_world_eye_left_m)
     to_right = sub(p_world_m, pose.p_world_eye_right_m)

@@ -85,10 +85,6 @@ class RigPorts(NamedTuple):
     paths: Mapping[str, str]
     buses: PtyBuses | None
 
-    def unopened_ports(self) -> dict[str, BusPort]:
-        """Return the ports, not opened yet."""
-        return {name: port_of(path) for name, path in self.paths.items()}
-
 
 def refuse_packages(rig: Rig, command: str) -> None:
     """Refuse a command that speaks to servos of our kinds alone.

@@ -24,7 +24,7 @@ _LARGEST = 1_000_000  # bytes of a file of answers
 
 
 class Lines:
-    """Lines of a file, or of standard input as they come."""
+    """Lines of a file, or of standard input as they come; is_scripted: of a file."""
 
     def __init__(self, answers: Path | None) -> None:
         """Read the answers of a file at once; None: standard input.
@@ -33,18 +33,13 @@ class Lines:
             OSError: the file cannot be read.
             SetupError: it is no text.
         """
-        self._file, self._rest = answers, b""
+        self.is_scripted, self._rest = answers is not None, b""
         self._ready: list[str] = []
         if answers is not None:
             try:
                 self._ready = read_limited(answers, _LARGEST).decode().splitlines()
             except UnicodeDecodeError:
                 raise SetupError(f"{answers}: is no UTF-8 text; write one answer a line") from None
-
-    @property
-    def is_scripted(self) -> bool:
-        """Return whether they come from a file."""
-        return self._file is not None
 
     def next(self, wait_s: float) -> str | None:
         """Return the next line, None if none came in time.
@@ -54,7 +49,7 @@ class Lines:
         """
         if self._ready:
             return self._ready.pop(0).strip()
-        if self._file is not None:
+        if self.is_scripted:
             raise EOFError
         if not select.select([sys.stdin.fileno()], [], [], wait_s)[0]:
             return None

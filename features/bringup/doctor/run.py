@@ -118,7 +118,16 @@ def check(
         BusLost: it has gone away.
     """
     presence = find_servos(port, kind, setups, baud, tell)
-    findings = list(judge_presence(presence, kind, baud))
+    if presence.missing and not presence.there and not presence.elsewhere:
+        return [ADVICE["nobody"].at("the bus", baud=baud, kind=kind)]
+    at = {found.id: found for found in presence.elsewhere}
+    findings = []
+    for setup in presence.missing:
+        other = at.pop(setup.id, None)
+        cause = "elsewhere" if other else "pieces" if setup.id in presence.corrupt else "silent"
+        findings.append(ADVICE[cause].at(servo_label(setup), setup=setup, found=other, baud=baud))
+    findings += [ADVICE["new"].at("the bus", found=found) for found in at.values()]
+    findings += [ADVICE["stranger"].at("the bus", found=found) for found in presence.strangers]
     for setup in setups:
         if setup.id in presence.there:
             tell(f"reading {servo_label(setup)}")
@@ -169,22 +178,6 @@ def find_servos(
 def _open(port: BusPort, baud: int) -> None:
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 57600 or 1000000")
-
-
-def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Diagnostic]:
-    """Return findings about servos that are missing and servos that are not in the YAML."""
-    if presence.missing and not presence.there and not presence.elsewhere:
-        yield ADVICE["nobody"].at("the bus", baud=baud, kind=kind)
-        return
-    at = {found.id: found for found in presence.elsewhere}
-    for setup in presence.missing:
-        found = at.pop(setup.id, None)
-        cause = "elsewhere" if found else "pieces" if setup.id in presence.corrupt else "silent"
-        yield ADVICE[cause].at(servo_label(setup), setup=setup, found=found, baud=baud)
-    for found in at.values():
-        yield ADVICE["new"].at("the bus", found=found)
-    for found in presence.strangers:
-        yield ADVICE["stranger"].at("the bus", found=found)
 
 
 # --- fixes
