@@ -43,18 +43,11 @@ def test_drift_is_followed_for_ten_minutes(drift):
     assert np.abs(errors[30 * 30 :]).max() < 0.0015  # untouched it would be 30 ms
 
 
-def test_device_that_starts_anew_is_noticed_at_once():
+@pytest.mark.parametrize(("before_s", "after_s"), [(500.0, 0.0), (0.0, 1000.0)])
+def test_device_that_starts_anew_or_is_set_ahead_is_noticed_at_once(before_s, after_s):
     bridge = ClockSync(0.02)
-    run(bridge, 30.0, offset_s=500.0)
-    errors = run(bridge, 10.0, offset_s=0.0, start_s=31.0, seed=2)
-    assert bridge.jumps == 1
-    assert np.abs(errors[60:]).max() < 0.001
-
-
-def test_clock_set_ahead_is_noticed_at_once():
-    bridge = ClockSync(0.02)
-    run(bridge, 30.0)
-    errors = run(bridge, 10.0, offset_s=1000.0, start_s=31.0, seed=2)
+    run(bridge, 30.0, offset_s=before_s)
+    errors = run(bridge, 10.0, offset_s=after_s, start_s=31.0, seed=2)
     assert bridge.jumps == 1
     assert np.abs(errors[60:]).max() < 0.001
 

@@ -6,12 +6,14 @@ from math import radians
 
 import numpy as np
 import pytest
+from present import present
 from seeing import row_09_identities as row
 from test_perception import Neck, face_at
 
 from gazerig.drivers.camera.process import offset_ids
 from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.drivers.vision.cut_detector import CutDetector
+from gazerig.gaze.types import Percept
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.frame_locator import FrameLocator
@@ -49,46 +51,38 @@ def test_a_covered_lens_shows_the_same_scene_afterwards() -> None:
     assert [cuts.scene(image) for image in (black, row.room(rng))] == [0, 1]
 
 
+def turned(*frames: tuple[float, int, int]) -> list[Percept]:
+    """See a face ahead of a head at yaws (deg), with the scene and the starts of the camera."""
+    mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
+    perception, poses, percepts = (
+        Perception(mount, 69.0, Tracker(TrackParams())), PoseHistory(Neck()), []
+    )  # fmt: skip
+    for number, (yaw_deg, scene, starts) in enumerate(frames, start=1):
+        yaw = radians(yaw_deg)
+        poses.remember(number / 30, (yaw, 0.0, 0.0))
+        face = face_at((np.sin(yaw), 0.0, np.cos(yaw)))
+        found = Detections(number / 30, number, 640, 400, (face,), scene=scene)
+        percepts.append(present(perception.see(offset_ids(found, starts), poses)))
+    return percepts
+
+
 @pytest.mark.parametrize(("turned_deg", "ends"), [(0.0, True), (2.0, True), (30.0, False)])
 def test_a_head_that_turned_sees_another_part_of_the_same_room(
     turned_deg: float, ends: bool
 ) -> None:
     """Pictures of a saccade are as unlike as those about a cut; the joints tell which it was."""
-    mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
-    perception, poses = Perception(mount, 69.0, Tracker(TrackParams())), PoseHistory(Neck())
-    ids = []
-    for number, (yaw_deg, scene) in enumerate(((0.0, 0), (0.0, 0), (turned_deg, 1)), start=1):
-        yaw = radians(yaw_deg)
-        poses.remember(number / 30, (yaw, 0.0, 0.0))
-        face = face_at((np.sin(yaw), 0.0, np.cos(yaw)))
-        found = Detections(number / 30, number, 640, 400, (face,), scene=scene)
-        percept = perception.see(found, poses)
-        assert percept is not None
-        ids.append([face.id for face in percept.faces])
+    percepts = turned((0.0, 0, 0), (0.0, 0, 0), (turned_deg, 1, 0))
+    ids = [[face.id for face in percept.faces] for percept in percepts]
     assert ids[0] == ids[1] and len(ids[2]) == 1
     assert (ids[2] != ids[1]) is ends
 
 
 def test_a_camera_process_that_was_started_again_shows_another_scene() -> None:
     """Each process counts from 0; where the head has turned meanwhile, there is no saccade."""
-    perception, poses = (
-        Perception(
-            CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0))), 69.0, Tracker(TrackParams())
-        ),
-        PoseHistory(Neck()),
-    )
-    ids, scenes = [], []
-    for number, (starts, yaw_deg) in enumerate(((0, 0.0), (1, 0.0), (1, 0.0), (2, 30.0)), start=1):
-        yaw = radians(yaw_deg)
-        poses.remember(number / 30, (yaw, 0.0, 0.0))
-        face = face_at((np.sin(yaw), 0.0, np.cos(yaw)))
-        found = Detections(number / 30, number, 640, 400, (face,), scene=2 if starts == 0 else 0)
-        percept = perception.see(offset_ids(found, starts), poses)
-        assert percept is not None
-        ids.append(percept.faces[0].id)
-        scenes.append(percept.scene)
+    percepts = turned((0.0, 2, 0), (0.0, 0, 1), (0.0, 0, 1), (30.0, 0, 2))
+    ids = [percept.faces[0].id for percept in percepts]
     assert ids[1] == ids[2] and len({*ids}) == 3
-    assert scenes == [0, 1, 1, 2]
+    assert [percept.scene for percept in percepts] == [0, 1, 1, 2]
 
 
 def test_a_hand_at_rest_ends_with_its_scene() -> None:

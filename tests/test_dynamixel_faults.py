@@ -219,18 +219,18 @@ def test_an_alert_that_was_there_before_opening_is_named():
     assert rig.bus.faults() == ("servo 3: overheating",)
 
 
-def test_engaging_a_latched_servo_names_it_and_leaves_all_without_torque():
+@pytest.mark.parametrize(
+    ("spoil", "error", "told"),
+    [
+        (lambda chain: chain[3].fail("overload"), ServoFault, "servo 3: overload: let it cool"),
+        (lambda chain: chain[2].restart(), ServoMissing, "servo 2 does not answer"),
+    ],
+    ids=["latched", "silent"],
+)
+def test_engaging_such_a_servo_names_it_and_leaves_all_without_torque(spoil, error, told):
     rig = Rig().open()
-    rig.chain[3].fail("overload")
-    with pytest.raises(ServoFault, match="servo 3: overload: let it cool"):
-        rig.bus.enable_torque()
-    assert not any(servo.torque for servo in rig.chain.servos)
-
-
-def test_engaging_a_silent_servo_names_it_and_leaves_all_without_torque():
-    rig = Rig().open()
-    rig.chain[2].restart()
-    with pytest.raises(ServoMissing, match="servo 2 does not answer"):
+    spoil(rig.chain)
+    with pytest.raises(error, match=told):
         rig.bus.enable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 

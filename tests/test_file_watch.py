@@ -93,23 +93,18 @@ def test_the_same_content_back_after_a_moment_is_no_news(rig: Rig) -> None:
     assert rig.looks(10) == []
 
 
-def test_an_editor_that_empties_it_first(rig: Rig) -> None:
-    rig.write("")
+@pytest.mark.parametrize("first", ["", "name: ne"], ids=["empties it", "cuts a line"])
+def test_an_editor_that_empties_it_first_or_writes_in_pieces(rig: Rig, first: str) -> None:
+    rig.write(first)
     assert rig.looks(4) == []
     rig.write(NEW)
     assert rig.looks(3) == [NEW]
 
 
-def test_a_text_cut_within_a_line_waits_for_its_rest(rig: Rig) -> None:
-    rig.write("name: ne")
-    assert rig.looks(4) == []
-    rig.write(NEW)
-    assert rig.looks(3) == [NEW]
-
-
-def test_a_text_that_never_ends_its_line_is_told_later(rig: Rig) -> None:
-    rig.write("name: newest")
-    assert rig.looks(20) == ["name: newest"]
+@pytest.mark.parametrize("text", ["name: newest", ""], ids=["no end of the line", "empty"])
+def test_a_text_that_stays_unfinished_is_told_later(rig: Rig, text: str) -> None:
+    rig.write(text)
+    assert rig.looks(20) == [text]
 
 
 def test_a_file_that_grows_is_told_when_it_has_stopped(rig: Rig) -> None:
@@ -124,11 +119,6 @@ def test_a_file_that_stays_away_is_told_once_and_so_is_its_return(rig: Rig) -> N
     assert rig.looks(20) == ["(gone)"]
     rig.write(OLD)
     assert rig.looks(20) == ["(gone)", OLD]
-
-
-def test_a_file_that_stays_empty_is_told(rig: Rig) -> None:
-    rig.write("")
-    assert rig.looks(20) == [""]
 
 
 def test_a_file_without_rights_counts_as_missing(rig: Rig) -> None:

@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
+from fakes.films import write_film
 from light_python import LightPython
 
 ALLOWED = {
@@ -58,11 +57,7 @@ def test_the_process_of_the_loop_imports_little(
 ) -> None:
     options: dict[str, object] = {"scene": "visitor"}
     if eyes != "scene":
-        film = tmp_path / "film.avi"
-        writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
-        for _ in range(5):
-            writer.write(np.zeros((48, 64, 3), np.uint8))
-        writer.release()
+        film = write_film(tmp_path / "film.avi", 5, 25.0)
         options = {"video": film, "page": "127.0.0.1:8770"}
     text, _ = python.run(RUN.format(options=options, later=LATER), tmp_path)
     said = {line.split()[0]: set(line.split()[1:]) for line in text.splitlines() if line}

@@ -5,18 +5,21 @@ import os
 import resource
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import branch
 import pytest
+from fakes.runs import ticks
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from recorded_run import Recorded, assembly, exact, info_for, ordered, record
 from typer.testing import CliRunner
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
-from gazerig.robot.model import stop_latch
+from gazerig.robot.model import commands
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
@@ -39,7 +42,7 @@ def branched_children(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stop_latch, "MIN_HOLD_S", 0.1)  # a shorter run
+        patch.setattr(commands, "MIN_HOLD_S", 0.1)  # a shorter run
         return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
 
 
@@ -226,20 +229,23 @@ def test_a_robot_that_cannot_start_leaves_an_older_recording(tmp_path: Path) -> 
     assert path.read_bytes() == b"older"
 
 
-def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "late.mcap"
+def writing(path: Path) -> tuple[Recorder, Assembly, Any]:
+    """Begin to record a robot; give the process of the writer too."""
     recorder = Recorder(path, info_for())
     recorder.open()
     made = assembly(recorder)
     made.robot.start(made.clock)
-    process = recorder._link._process
-    assert process is not None
+    assert recorder._link is not None and recorder._link._process is not None
+    return recorder, made, recorder._link._process
+
+
+def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "late.mcap"
+    recorder, made, process = writing(path)
     process.send_signal(19)  # SIGSTOP
-    seen = []
-    for number in range(1, 401):
-        made.clock.sleep_until(0.005 * number)
-        seen.append(made.robot.tick(0.005 * number, 0.005))
-        recorder.record(seen[-1])  # would never return if it waited
+    seen = ticks(made, 400)
+    for tick in seen:
+        recorder.record(tick)  # would never return if it waited
     process.send_signal(18)  # SIGCONT
     assert recorder.close("seconds").startswith("400 ticks")
     assert recorder.lost == 0
@@ -252,16 +258,10 @@ def test_what_the_queue_cannot_hold_is_lost_and_counted(
 ) -> None:
     monkeypatch.setattr("gazerig.robot.recording.writer_client.QUEUE_BYTES", 150_000)
     path = tmp_path / "lost.mcap"
-    recorder = Recorder(path, info_for())
-    recorder.open()
-    made = assembly(recorder)
-    made.robot.start(made.clock)
-    process = recorder._link._process
-    assert process is not None
+    recorder, made, process = writing(path)
     process.send_signal(19)
-    for number in range(1, 401):
-        made.clock.sleep_until(0.005 * number)
-        recorder.record(made.robot.tick(0.005 * number, 0.005))
+    for tick in ticks(made, 400):
+        recorder.record(tick)
     process.send_signal(18)
     said = recorder.close("seconds")
     assert recorder.lost > 0
@@ -273,18 +273,12 @@ def test_what_the_queue_cannot_hold_is_lost_and_counted(
 
 
 def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "dead.mcap", info_for())
-    recorder.open()
-    made = assembly(recorder)
-    made.robot.start(made.clock)
-    process = recorder._link._process
-    assert process is not None
+    recorder, made, process = writing(tmp_path / "dead.mcap")
     process.kill()
     process.wait()
     said: list[str] = []
-    for number in range(1, 200):
-        made.clock.sleep_until(0.005 * number)
-        recorder.record(made.robot.tick(0.005 * number, 0.005))
+    for tick in ticks(made, 199):
+        recorder.record(tick)
         said += recorder.events()
     assert said == ["recording stopped (its writer has died); the run continues without it"]
     assert "incomplete: its writer has died" in recorder.close("seconds")
