@@ -183,6 +183,11 @@ class Rig:
         device.getAllAvailableDevices = lambda: [info()]  # type: ignore[attr-defined]
         self.dai.Device = device
 
+    def opened(self, **wanted) -> OakSource:
+        source = self.source(**wanted)
+        source.open()
+        return source
+
     def source(self, **wanted) -> OakSource:
         colour = SimpleNamespace(link=lambda where: None)
 

@@ -65,8 +65,7 @@ def test_wrong_name_lists_what_there_is(tmp_path):
 
 def test_usb_2_that_carries_what_is_asked_is_told_so():
     rig = Rig("HIGH")
-    source = rig.source()  # 640 x 400 at 30 Hz with depth: 26.9 MB/s
-    source.open()
+    source = rig.opened()  # 640 x 400 at 30 Hz with depth: 26.9 MB/s
     (reported,) = source.events()
     assert "USB 2 speed (HIGH)" in reported and "enough for what is asked" in reported
     assert source.events() == ()
@@ -74,8 +73,7 @@ def test_usb_2_that_carries_what_is_asked_is_told_so():
 
 def test_usb_2_that_cannot_carry_it_says_what_it_can():
     rig = Rig("HIGH")
-    source = rig.source(width_px=1280, height_px=720)
-    source.open()
+    source = rig.opened(width_px=1280, height_px=720)
     (reported,) = source.events()
     assert "97 are asked for" in reported and "USB 3 cable" in reported
     assert "set oak.rate_hz 9 or oak.depth: false" in reported
@@ -86,8 +84,7 @@ def test_usb_2_that_cannot_carry_it_says_what_it_can():
 )
 def test_usb_2_line_that_is_full_is_told_once(speed, rate_hz, told):
     rig = Rig(speed)
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     source.events()
     times = [5.0 + k / rate_hz for k in range(60)]
     now = iter([t for at in times for t in (95.0 + at, 95.03 + at)])
@@ -101,8 +98,7 @@ def test_usb_2_line_that_is_full_is_told_once(speed, rate_hz, told):
 
 def test_frames_that_a_late_reader_left_lying_do_not_fill_the_line():
     rig = Rig("HIGH")
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     source.events()
     rig.queue.lying = True
     times = [5.0 + k / 11.0 for k in range(60)]
@@ -118,21 +114,18 @@ def rig():
 
 def test_e97_camera_without_stereo_goes_on_without_depth(rig):
     rig.device.sockets = rig.device.sockets[:1]
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     (reported,) = source.events()
     assert "no stereo pair (nothing at CAM_B and CAM_C)" in reported
     assert "oak.depth: false" in reported and not rig.asked.depth
     source.close()
-    plain = rig.source(depth=False)
-    plain.open()
+    plain = rig.opened(depth=False)
     assert plain.events() == ()
 
 
 def test_stereo_that_is_not_calibrated_goes_on_without_depth(rig):
     rig.device.calibration = calibrated(real(), stereo=False)
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     (reported,) = source.events()
     assert "stereo pair is not calibrated" in reported and not rig.asked.depth
 
@@ -155,21 +148,18 @@ def test_camera_without_colour_is_refused(rig):
 )
 def test_camera_without_a_usable_gyro_goes_on_without(rig, imu, extrinsics, told):
     rig.device.imu, rig.device.calibration = imu, calibrated(real(), imu=extrinsics)
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     reported = source.events()
     assert rig.asked.gyro == (not told)
     assert len(reported) == bool(told) and told in " ".join(reported)
     source.close()
-    without = rig.source(gyro=False)
-    without.open()
+    without = rig.opened(gyro=False)
     assert without.events() == () and not rig.asked.gyro
 
 
 def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own(rig):
     rig.device.calibration = calibrated(real(), imu=False)
-    source = rig.source(imu_rotation_deg=(0.0, 0.0, 90.0))
-    source.open()
+    source = rig.opened(imu_rotation_deg=(0.0, 0.0, 90.0))
     assert source.events() == () and rig.asked.gyro
 
 
@@ -191,8 +181,7 @@ def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own(rig):
 def test_face_model_of_another_kind_is_told_and_left_out(rig, tmp_path, archive, told):
     rig.device.platform = getattr(real().Platform, archive.pop("platform", "RVC4"))
     file = face_archive(tmp_path / "faces.tar.xz", **archive)
-    source = rig.source(face_model=str(file))
-    source.open()
+    source = rig.opened(face_model=str(file))
     reported = source.events()
     assert len(reported) == bool(told)
     assert bool(rig.asked.face_model) == (not told)
@@ -205,8 +194,7 @@ def test_face_model_that_is_no_archive_is_told_and_left_out(tmp_path):
     file = tmp_path / "face.onnx"
     file.write_bytes(b"nothing")
     rig = Rig()
-    source = rig.source(face_model=str(file))
-    source.open()
+    source = rig.opened(face_model=str(file))
     (reported,) = source.events()
     assert "is no NNArchive" in reported and not rig.asked.face_model
 
@@ -225,8 +213,7 @@ def test_usb_2_is_refused_where_that_is_wanted():
 
 def test_usb_3_is_no_matter_and_the_dots_are_lit():
     rig = Rig("SUPER")
-    source = rig.source(dot_projector=0.4)
-    source.open()
+    source = rig.opened(dot_projector=0.4)
     assert source.events() == ()
     assert rig.asked == OakParams(dot_projector=0.4)
     assert (rig.device.dots, rig.device.reconnections) == (0.4, 0)
@@ -263,8 +250,7 @@ def test_camera_that_does_not_start_is_freed_and_named():
 
 
 def test_camera_that_is_dropped_open_is_closed(rig):
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     held: list[object] = [source]
     held.append(held)  # as the frames of a traceback hold it: only the garbage collector finds it
     del source, held
@@ -278,16 +264,14 @@ def take(rig, source, clock, *messages):
 
 
 def test_unplugged_camera_is_lost(rig):
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     rig.queue.fed.append(real().XLinkReadError("Couldn't read data from stream"))
     with pytest.raises(CameraError, match="was lost .Couldn't read data"):
         source.take(lambda: 0.0, threading.Event())
 
 
 def test_stamps_in_step_with_the_host_are_used(rig):
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     first, second = take(rig, source, lambda: 100.1, Message(5.0, 100.03), Message(5.033, 100.064))
     assert first.captured_s == pytest.approx(100.03)
     assert second.captured_s == pytest.approx(100.063)
@@ -296,8 +280,7 @@ def test_stamps_in_step_with_the_host_are_used(rig):
 
 @pytest.mark.parametrize("stamp_s", [100.5, 90.0, 0.0])
 def test_stamps_out_of_step_give_way_to_arrivals(rig, stamp_s):
-    source = rig.source(latency_ms=30.0)
-    source.open()
+    source = rig.opened(latency_ms=30.0)
     (shot,) = take(rig, source, lambda: 100.1, Message(5.0, stamp_s))
     assert shot.captured_s == pytest.approx(100.07)
     (reported,) = source.events()
@@ -305,8 +288,7 @@ def test_stamps_out_of_step_give_way_to_arrivals(rig, stamp_s):
 
 
 def test_device_clock_set_anew_is_told(rig):
-    source = rig.source()
-    source.open()
+    source = rig.opened()
     now = iter([100.1, 100.1, 200.1, 200.1])
     take(rig, source, lambda: next(now), Message(500.0, 100.0), Message(1.0, 200.0))
     (reported,) = source.events()
