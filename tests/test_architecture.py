@@ -27,9 +27,9 @@ OWNERS = {
     "zstandard": ("robot.recording.",),
     "msgspec": (
         "robot.control.tick_stream",
-        "features.study.collected",
+        "features.study.participation",
         "features.study.journal",
-        "features.study.pages.participant_events",
+        "features.study.pages.participant_page",
     ),
     "orjson": ("robot.recording.",),
     "matplotlib": ("features.lab.report.plotting",),

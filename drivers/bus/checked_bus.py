@@ -75,7 +75,7 @@ class CheckedBus:
         began_s = self._now_s() if self._now_s is not None else 0.0
         feedback = self._checked_call(lambda: self._bus.read(now_s), "read")
         if self._now_s is not None:
-            # Report a read that leaves no time for the rest of the tick.
+            # A slow read leaves no time for the rest of the tick.
             took_s = self._now_s() - began_s
             period_s = now_s - self._last_s if self._last_s is not None else None
             self._last_s = now_s

@@ -54,7 +54,7 @@ class ClockSync:
         """
         difference_s = arrived_s - device_s
         if self._has_jumped(device_s, difference_s):
-            # Reset to an unknown clock.
+            # The clock is unknown again.
             self._best.clear()
             self._bucket, self._late_since_s, self._last = None, None, None
             self._drift, self._offset_s = 0.0, 0.0

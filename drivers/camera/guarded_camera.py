@@ -100,7 +100,6 @@ class GuardedCamera:
 
         outcome = self._call(read_camera)
         if outcome is None:
-            # Record that it has not answered, and report it once.
             if self._asked_s is None:
                 self._asked_s = now_s
             elif not self._late and now_s - self._asked_s > SILENT_S:

@@ -275,7 +275,7 @@ class _Film:
         _check_forward(number, max(1, self._number))
         if self._seen is None or self._seen[0] != number:
             while self._number < number:
-                # Go to the next frame, from the end to the start, and skip whole repeats.
+                # After the end comes the start; whole repeats are skipped.
                 if not self._capture.grab():
                     self._length, self._index = self._index, 0
                     self._rewind()

@@ -77,7 +77,6 @@ class Webcam:
             CameraError: it is absent, not permitted, busy or delivers no frame.
         """
         self.close()
-        # Reject a device file that is absent or not permitted; the message lists the others.
         if not self._file.exists():
             there = ", ".join(sorted(str(f) for f in self._file.parent.glob("video*")))
             raise CameraError(

@@ -175,7 +175,7 @@ class BoardSupervisor:
             if channel not in odd:
                 channel.confirmed(found[channel])
         if away or home:
-            # Arm the limits again, which a restart loses, then send the active goals. A board that
+            # A restart loses the limits: they are armed before the goals are sent. A board that
             # moves its channels home at their armed speed has not moved them far yet. A goal to a
             # channel that an error has just left without pulses would not be ramped, so goals are
             # sent only if the limits arrived intact.

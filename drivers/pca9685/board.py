@@ -132,7 +132,7 @@ class Pca9685Board:
         if (mode1, mode2, prescale) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale):
             return True
         if mode1 & SILENT or prescale != self._clocks[address].prescale:
-            # Set a board up from any state: no pulses, sleep, prescaler, then wake.
+            # From any state: no pulses, sleep, prescaler, then wake.
             mine = [servo_id for servo_id in self._sent if self._places[servo_id][0] == address]
             for servo_id in mine:
                 del self._sent[servo_id]

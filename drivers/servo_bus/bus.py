@@ -169,7 +169,6 @@ class SmartServoBus(PortBus):
         self, replies: dict[int, ServoReply], now_s: float
     ) -> dict[int, ServoReply]:
         """Read servos with a doubtful answer once more; keep values on which both answers agree."""
-        # Whether answers were damaged recently.
         places = self._feedback.places
         damaged = self._line.errors.get("corrupt", 0)
         if damaged != self._damaged or self._reader.stray_s == now_s:

@@ -226,7 +226,7 @@ class WholeAnswer:
                 if nothing has changed.
         """
         if expected is not self._expected:
-            # Set the expected values of known fields; a status is always 0.
+            # Known fields have expected values; a status is always 0.
             self._expected = expected
             order, expected = self._window.order, {"status": (0,) * len(self._heads), **expected}
             mask, known = [b"\xff" * len(self._front)], [self._front]

@@ -101,7 +101,7 @@ def read_calibration(dai: Any, calibration: Any, params: OakParams) -> OakCalibr
         raise CameraError(f"{_NO_LENS} ({' '.join(str(error).split())}): {_BOARD}") from error
     if not np.isfinite(K).all() or min(K[0, 0], K[1, 1]) < _LEAST_FOCAL_PX:
         raise CameraError(f"{_NO_LENS}: {_BOARD}")
-    # Fit k1 k2 p1 p2 k3 to a lens of any OpenCV model; return them and the residual, px.
+    # k1 k2 p1 p2 k3 are fitted to a lens of any OpenCV model.
     u, v = np.meshgrid(np.linspace(0, size[0] - 1, 33), np.linspace(0, size[1] - 1, 21))
     pixels = np.column_stack((u.ravel(), v.ravel()))[:, None]
     if fisheye:

@@ -105,7 +105,7 @@ class OakSource:
             self._queue = join_outputs(self._dai, self._pipeline, outputs, self._asked.rate_hz)
             self._gyro_queue, self._face_fault = imu_queue(outputs), outputs.face_fault
             self._pipeline.start()
-            # Wait until the gyro has found its bias, before the head moves.
+            # The gyro must find its bias before the head moves.
             if self._gyro_queue is not None:
                 if self._asked.imu_rotation_deg is not None:
                     R = rotation_of(self._asked.imu_rotation_deg)
@@ -236,7 +236,7 @@ class OakSource:
         self._number += 1
         height, width = image.shape[:2]
         captured_s = self._captured_s(group[COLOUR], arrived_s)
-        # Report a USB 2 line that does not carry the requested frames.
+        # A USB 2 line may not carry the requested frames.
         if self._slow_line is not None:
             # Before a frame that was queued, others may have been lost because the reader was late.
             line = self._slow_line.update(captured_s, 0.0 if self._waited else inf)
