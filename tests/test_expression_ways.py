@@ -6,7 +6,7 @@ import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.robot.cli import animation
-from gazerig.robot.dashboard.panels.animation_panel import AnimationPanel
+from gazerig.robot.dashboard.panels.controls import AnimationPanel
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Command, Express, SetLevel

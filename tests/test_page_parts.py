@@ -68,6 +68,7 @@ from gazerig.robot.dashboard.panels.servo_health import (
     health,
     other_heads,
     servo_table,
+    silence,
     strain_of_heat,
     strain_of_load,
     strain_of_voltage,
@@ -828,7 +829,7 @@ def test_panel_takes_snapshots_and_fills_its_tabs(
         panel.show()
     again = words_of(widgets)
     assert "51 saccades" not in again and "1 saccade<" in again
-    panel.silent()
+    panel.silence.content = silence()
     assert "the rig has sent nothing" in panel.silence.content
     panel.update((made(healthy(0.1)),))
     assert panel.silence.content == ""

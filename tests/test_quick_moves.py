@@ -6,7 +6,7 @@ from desk import GAZE_JOINTS
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.dashboard.panels.animation_panel import GESTURES, refused_moves
+from gazerig.robot.dashboard.panels.controls import GESTURES, refused_moves
 
 LIDLESS = tuple(joint for joint in GAZE_JOINTS if "lid" not in joint)
 ALL = {"gesture": ("none", *GESTURES)}

@@ -14,7 +14,7 @@ from PIL import Image  # noqa: E402
 from shown_page import wait_for  # noqa: E402
 from study_at_the_page import CODE, Pages, Tab, serving  # noqa: E402
 
-from gazerig.features.study.pages.head_link import HeadReport, NoHead  # noqa: E402
+from gazerig.features.study.pages.experimenter_line import HeadReport, NoHead  # noqa: E402
 from gazerig.features.study.run.study_file import load_study  # noqa: E402
 
 OUT = Path(__file__).parent

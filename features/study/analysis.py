@@ -16,8 +16,7 @@ from gazerig.features.study.participation import AnswerRow, Participation
 from gazerig.features.study.questionnaire import Questionnaire
 from gazerig.features.study.scores import Scores, item_answers, scores, wins
 from gazerig.features.study.statistics.contingency import Counts, counts_of
-from gazerig.features.study.statistics.reliability import cronbachs_alpha
-from gazerig.features.study.statistics.results import EffectSize
+from gazerig.features.study.statistics.effects import EffectSize, cronbachs_alpha
 from gazerig.gaze.types import Floats
 
 
@@ -119,16 +118,7 @@ def analyse_study(
     people: Sequence[Participation],
     deleted: int = 0,
 ) -> StudyAnalysis:
-    """Analyse a study.
-
-    Args:
-        name: of the study's file.
-        design: with its hypotheses.
-        questionnaires: by the keys in the design.
-        design_sha256: hash of the design in all data.
-        people: participants, with exclusions marked.
-        deleted: number of participants whose data were deleted.
-    """
+    """Analyse a study."""
     people = without_simulated(people)
     known = [one for one in measures(design, questionnaires).values() if not one.once]
     keys = tuple(design.conditions)

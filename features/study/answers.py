@@ -1,7 +1,7 @@
 """Stored answers: an integer of the scale, a side of a pair, text, or None."""
 
+from gazerig.features.study.journal import AnswerValue
 from gazerig.features.study.questionnaire import Item
-from gazerig.features.study.records import AnswerValue
 
 LONGEST_TEXT = 5000
 """Longest free text, characters."""
@@ -14,12 +14,6 @@ class WrongAnswer(ValueError):
 
 def check_answer(number: int, item: Item, value: object, may_skip: bool) -> AnswerValue:
     """Return an answer in its stored form.
-
-    Args:
-        number: number of the question on its page, for messages.
-        item: the item.
-        value: the answer, None without one.
-        may_skip: the study permits unanswered questions.
 
     Raises:
         WrongAnswer: it is missing, or does not fit the item.

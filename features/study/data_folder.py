@@ -43,11 +43,7 @@ class InterimLook(NamedTuple):
 
 
 class StudyData:
-    """The folder of a study's data.
-
-    Args:
-        folder: it need not exist.
-    """
+    """The folder of a study's data."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -59,10 +55,6 @@ class StudyData:
 
     def claim(self, name: str, canonical: bytes) -> str:
         """Assign the folder to a design; return the design's hash.
-
-        Args:
-            name: name of the study.
-            canonical: the design, from gazerig.features.study.preregistration.canonical.
 
         Raises:
             SetupError: it belongs to another design, or cannot be written.

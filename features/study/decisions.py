@@ -20,9 +20,8 @@ from gazerig.features.study.statistics.assumptions import (
     range_check,
 )
 from gazerig.features.study.statistics.contingency import chi_square, counts_of
-from gazerig.features.study.statistics.effects import cohens_dz
+from gazerig.features.study.statistics.effects import EffectSize, StatisticalTest, cohens_dz
 from gazerig.features.study.statistics.ranks import friedman, rank_sum, sign, signed_rank
-from gazerig.features.study.statistics.results import EffectSize, StatisticalTest
 from gazerig.gaze.types import Floats
 
 Verdict = Literal["supported", "not supported", "against", "too few"]
@@ -62,13 +61,7 @@ def decisions(
     questionnaires: Mapping[str, Questionnaire],
     people: Sequence[Participation],
 ) -> tuple[Decision, ...]:
-    """Decide on every hypothesis of a design, with the correction that it planned.
-
-    Args:
-        design: with its hypotheses.
-        questionnaires: by the keys in the design.
-        people: participants, with exclusions marked.
-    """
+    """Decide on every hypothesis of a design, with the correction that it planned."""
     known = measures(design, questionnaires)
     found = [
         _decide_rating(design, one, known[one.measure], questionnaires, people)

@@ -81,11 +81,6 @@ def power_claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -
 
     With a correction for several hypotheses each gets its share of alpha; Holm's procedure only
     increases the power.
-
-    Args:
-        design: a checked design.
-        hypothesis: one of its hypotheses.
-        measure: the hypothesis' measure.
     """
     many = len(design.hypotheses) if design.plan.correction != "none" else 1
     repetitions = design.trials.repetitions
@@ -122,13 +117,7 @@ def sample_size_by_formula(asked: PowerQuestion, power: float) -> int:
 
 
 def sample_size(asked: PowerQuestion, power: float, multiple: int = 1) -> int | None:
-    """Return the smallest number of participants for a power, None above ``MOST``.
-
-    Args:
-        asked: the test and its effect.
-        power: required probability to detect it.
-        multiple: the number must be a multiple of it.
-    """
+    """Return the smallest number of participants for a power, None above ``MOST``."""
     low, high = 0, ceil(sample_size_by_formula(asked, power) / multiple)
     if high * multiple > MOST:  # ties only increase it
         return None

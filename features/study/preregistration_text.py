@@ -32,15 +32,7 @@ def text(
     sha256: str,
     program: str,
 ) -> str:
-    """Return the pre-registration of a study.
-
-    Args:
-        design: a checked design.
-        questionnaires: by the keys in the design.
-        changes: for each condition the differences from the study's rig, by dotted key.
-        sha256: hash of the canonical text.
-        program: version.
-    """
+    """Return the pre-registration of a study."""
     claims = claims_of(design, questionnaires)
     hypotheses = [
         {

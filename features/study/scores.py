@@ -57,14 +57,7 @@ def scores(
     conditions: Sequence[str],
     questionnaires: Mapping[str, Questionnaire],
 ) -> Scores:
-    """Return a measure of all participants with data.
-
-    Args:
-        measure: a rating, a scale's mean or an objective measure.
-        people: participants, with exclusions marked.
-        conditions: keys of the design.
-        questionnaires: by the keys in the design.
-    """
+    """Return a measure of all participants with data."""
     conditions = tuple(conditions)
     columns = {key: k for k, key in enumerate(conditions)}
     kept: list[Participation] = []

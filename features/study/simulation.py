@@ -19,9 +19,9 @@ import numpy as np
 from scipy import optimize, special
 
 from gazerig.features.study.design import StudyDesign
+from gazerig.features.study.journal import AnswerValue
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.questionnaire import Item, Questionnaire
-from gazerig.features.study.records import AnswerValue
 from gazerig.gaze.types import Floats
 from gazerig.params import Bounds
 
@@ -158,14 +158,7 @@ class SimulatedParticipant:
         number: int,
         population: Population,
     ) -> None:
-        """Draw the participant's properties.
-
-        Args:
-            design: of the study.
-            questionnaires: by the keys in the design.
-            number: from 1.
-            population: distribution of the participants.
-        """
+        """Draw the participant's properties."""
         self._design, self._questionnaires = design, questionnaires
         self._number, self._population = number, population
         self._levels = levels(design)

@@ -1,20 +1,71 @@
 """Execution of one participant's session: screens out, answers in, all data on disk first.
 
-All methods may be called from any thread. A browser's request names its page; a repeated request,
-or one for a page that is over, has no effect.
+Conditions are presented by the head in the room, or by films in the browser. All methods may be
+called from any thread. A browser's request names its page; a repeated request, or one for a page
+that is over, has no effect.
 """
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import Protocol
 
 from gazerig.features.study.answers import WrongAnswer
-from gazerig.features.study.journal import Journal
-from gazerig.features.study.presenter import HeadLost, Presenter
-from gazerig.features.study.records import AnswerValue, Outcome, Record
+from gazerig.features.study.journal import AnswerValue, Journal, Outcome, Record
 from gazerig.features.study.screens import PresentationScreen, ReadyScreen, Screen
 from gazerig.features.study.session import ShownTrial, StudySession
+
+
+class HeadLost(Exception):
+    """The head cannot show conditions any more; the message gives the reason."""
+
+
+@dataclass(frozen=True)
+class PresentationData:
+    """Data of a presentation that has ended; see records.TrialEnded."""
+
+    recording: str = ""
+    span_s: tuple[float, float] = (nan, nan)
+
+
+class Presenter(Protocol):
+    """Shows conditions; it is called from one thread at a time."""
+
+    def begin(self, shown: ShownTrial) -> None:
+        """Start to show a condition.
+
+        Raises:
+            HeadLost: it cannot be shown.
+        """
+
+    def end(self) -> PresentationData:
+        """End the presentation; return its data."""
+
+    def fault(self) -> str:
+        """Return why conditions cannot be shown, "" without a fault."""
+
+    def restart(self) -> None:
+        """Try to restart the head after a fault; ``fault`` reports the result."""
+
+
+class FilmPresenter:
+    """Does nothing, because the browser shows the films."""
+
+    def begin(self, shown: ShownTrial) -> None:
+        """Do nothing."""
+
+    def end(self) -> PresentationData:
+        """Report that nothing was recorded."""
+        return PresentationData()
+
+    def fault(self) -> str:
+        """Report no fault."""
+        return ""
+
+    def restart(self) -> None:
+        """Do nothing."""
+
 
 WHOLE_SHARE = 0.9
 """Share of a film that must be played for a complete presentation."""
@@ -52,16 +103,7 @@ class StudyRunState:
 
 
 class StudyRun:
-    """Runs one participant's session.
-
-    Args:
-        code: of the participant.
-        session: with the journal's records.
-        journal: open, with the record of the opening.
-        presenter: shows the conditions.
-        now_s: returns the time of a monotonic clock.
-        utc: returns date and time.
-    """
+    """Runs one participant's session."""
 
     def __init__(
         self,

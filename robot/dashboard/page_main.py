@@ -99,14 +99,6 @@ def serve(
 ) -> Served:
     """Open the page's server, and its door on the first free port.
 
-    Args:
-        host: the address
-        port: the first to try; a busy one moves on to the next
-        token: what browsers must show
-        folder: folder that only this user can enter, for the server's socket
-        feed: to the rig
-        stop: sends stops to the rig
-
     Raises:
         OSError: see ``free_port``.
     """
@@ -203,7 +195,7 @@ def main(arguments: list[str]) -> int:
         except OSError as error:
             sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
             return CANNOT_OPEN
-        served.door.once = os.environ.pop(ONCE_VARIABLE, "")
+        served.door.admission.once = os.environ.pop(ONCE_VARIABLE, "")
         if served.words is not None:
             feed.send(NOTICE + served.words.encode())
         view = PageView(served.server, served.door.widgets, served.outbox, served.door.tell)

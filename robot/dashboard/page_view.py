@@ -6,7 +6,7 @@ import viser
 
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.door.viser_server import browser_of
-from gazerig.robot.dashboard.feed.camera_overlay import without_pictures
+from gazerig.robot.dashboard.feed.camera_overlay import encode, without_pictures
 from gazerig.robot.dashboard.feed.live_feed import News, OverlayChoices, WorldNow
 from gazerig.robot.dashboard.feed.page_process import (
     ALL_USERS,
@@ -16,10 +16,10 @@ from gazerig.robot.dashboard.feed.page_process import (
     REPLAY,
     VALUES,
 )
-from gazerig.robot.dashboard.panels.animation_panel import refused_moves
-from gazerig.robot.dashboard.panels.controls import Controls
+from gazerig.robot.dashboard.panels.controls import Controls, refused_moves
 from gazerig.robot.dashboard.panels.panel import PanelView
 from gazerig.robot.dashboard.panels.replay import ReplayView
+from gazerig.robot.dashboard.panels.servo_health import silence
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.view.glb import furnish
 from gazerig.robot.dashboard.view.head_view import HeadView
@@ -178,26 +178,21 @@ class PageView:
             self._drawn = True
         self._panel.show()
         if self._jpeg is not None:
-            self._panel.show_jpeg(self._jpeg)
+            self._panel.image.show(self._jpeg)
         if self._image is not None:
-            self._panel.show_image(self._image)
+            self._panel.image.show(encode(self._image))
         self._newest = self._jpeg = self._image = None
 
     def silent(self) -> None:
         """Show that no data arrives any more, with the last data."""
         self.show(News((), None, ended=False))
         if self._drawn and self._replay is None:  # a recording may be paused
-            self._panel.silent()
+            self._panel.silence.content = silence()
             self._tell({"stopped": "", "silent": True})
 
 
 def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
-    """Return the source of control and the activity of the head, for the page's headline.
-
-    Args:
-        leader: Source of control.
-        shot: Newest snapshot; None before the first.
-    """
+    """Return the source of control and the activity of the head, for the page's headline."""
     t_s = shot.t_s if shot is not None else 0.0
     return {
         "leads": leader.kind,

@@ -65,9 +65,10 @@ from gazerig.robot.analysis.event_detector import (
     Commanded,
     EventDetector,
     FixationEvent,
+    Jump,
     SaccadeEvent,
+    SaccadeFinder,
 )
-from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run

@@ -20,7 +20,6 @@ from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.human_norms import SACCADES
 
 _OVERVIEW_S = 12.0
-_NO_SACCADES = "no saccade of 1 deg or more"
 
 
 def _overview(figure: Figure, runs: Sequence[Shown]) -> None:

@@ -3,13 +3,12 @@
 from array import array
 from collections import defaultdict
 from dataclasses import dataclass, field
-from math import atan2, degrees, nan
+from math import atan2, degrees, inf, nan
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.features.lab.analysis.reaction_finder import MeasuredReaction, ReactionFinder
 from gazerig.features.lab.report.joint_basis import JointBasis, joints_of
 from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
@@ -28,6 +27,53 @@ from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Ask
+
+_LONGEST_S = 1.0
+"""A later saccade is a choice, not a reaction."""
+
+
+class MeasuredReaction(NamedTuple):
+    """A saccade to something that has just come into view.
+
+    seen_s: exposure of the first frame with it; onset_s: the saccade's command; kind: of the thing
+    """
+
+    seen_s: float
+    onset_s: float
+    kind: str
+
+    @property
+    def latency_s(self) -> float:
+        """Return the time from the frame to the command."""
+        return self.onset_s - self.seen_s
+
+
+class ReactionFinder:
+    """Finds reactions in ticks as they arrive."""
+
+    def __init__(self) -> None:
+        self._seen: dict[tuple[str, int], float] = {}
+        self._captured_s: float | None = None
+        self._saccades = -1
+
+    def update(self, tick: Tick) -> MeasuredReaction | None:
+        """Add a tick; return the reaction that begins in it, if any."""
+        percept = tick.percept
+        if percept is not None and percept.captured_s != self._captured_s:
+            # A thing in the first percept has not come into view.
+            since_s = -inf if self._captured_s is None else percept.captured_s
+            self._captured_s = percept.captured_s
+            for number, kind in zip(percept.bodies.ids, percept.bodies.kinds, strict=True):
+                self._seen.setdefault((kind, number), since_s)
+        began = 0 <= self._saccades < tick.gaze.saccades
+        self._saccades = tick.gaze.saccades
+        name = (tick.target.kind, tick.target.id)
+        if not began or tick.stopped or name not in self._seen:
+            return None
+        seen_s, self._seen[name] = self._seen[name], -inf
+        late = tick.t_s - seen_s > _LONGEST_S
+        return None if late else MeasuredReaction(seen_s, tick.t_s, tick.target.kind)
+
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""

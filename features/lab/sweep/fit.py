@@ -31,13 +31,6 @@ def search(scores: Scores, axes: Sequence[Axis], start: Point, count: int, seed:
     """Search for the lowest score by differential evolution (Storn & Price 1997).
 
     Begins with a Latin hypercube, and ``start`` if it is on the axes.
-
-    Args:
-        scores: called for whole generations.
-        axes: parameters to vary.
-        start: an initial point.
-        count: approximate number of points, at least two generations.
-        seed: of the search.
     """
     from scipy.optimize import differential_evolution  # half a second of processor
 
@@ -99,13 +92,6 @@ def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) 
 
     The same arguments and outcomes make the same search, so an interrupted search is repeated from
     the kept runs.
-
-    Args:
-        run: runs points.
-        axes: parameters to vary.
-        start: the rig's own values.
-        count: number of further points to try.
-        seed: of the search.
 
     Raises:
         SetupError: the rig's own values cannot be run, or no measure has enough events.

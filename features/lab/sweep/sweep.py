@@ -36,12 +36,7 @@ Arguments = Mapping[str, object]
 
 
 class RunStore:
-    """Finished runs on the disk, by point and seed.
-
-    Args:
-        folder: the folder of the sweep.
-        file: ``RUNS`` in it, open for appending and locked.
-    """
+    """Finished runs on the disk, by point and seed."""
 
     def __init__(self, folder: Path, file: BinaryIO) -> None:
         self.folder, self._file = folder, file
@@ -174,13 +169,7 @@ class SweepSpec:
 
 
 class Sweep:
-    """Runs points; runs that are already in the folder are not repeated.
-
-    Args:
-        seeds: of the runs at each point.
-        store: finished runs.
-        pool: runs the others.
-    """
+    """Runs points; runs that are already in the folder are not repeated."""
 
     def __init__(self, seeds: Sequence[int], store: RunStore, pool: WorkerPool) -> None:
         self._seeds, self._store, self._pool = tuple(seeds), store, pool

@@ -81,13 +81,7 @@ class _Worker(NamedTuple):
 
 
 class WorkerPool:
-    """Worker processes, started with the first runs.
-
-    Args:
-        job: the common input of all runs.
-        jobs: number of processes.
-        stopped: returns why to end, None to continue.
-    """
+    """Worker processes, started with the first runs."""
 
     def __init__(self, job: Job, jobs: int, stopped: Callable[[], str | None]) -> None:
         self._job, self._jobs, self._stopped = pickle.dumps(job), jobs, stopped

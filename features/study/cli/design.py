@@ -78,7 +78,7 @@ def design(
             raise SetupError(
                 f"there is no {study} here: name a study, or gazerig study design --example {study}"
             )
-        from gazerig.features.study.run.study_check import checked_study
+        from gazerig.features.study.run.study_file import checked_study
 
         found = checked_study(study)
         for line in summary(study, found):
@@ -100,11 +100,6 @@ def data_folder(study: "LoadedStudy", data: Path | None) -> Path:
 def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = False) -> bool:
     """Write a study's pre-registration into its data folder; return whether it was new.
 
-    Args:
-        study: a checked study.
-        folder: its data folder, which need not exist.
-        force: Replace a different pre-registration.
-
     Raises:
         SetupError: the folder has data of another design, or a different pre-registration without
             ``force``, or cannot be written.
@@ -125,11 +120,6 @@ def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = Fals
 
 def state(name: str, study: "LoadedStudy", folder: Path) -> None:
     """Make sure that a study is pre-registered before the first participant; report a new one.
-
-    Args:
-        name: of the study as it was typed.
-        study: a checked study.
-        folder: its data folder.
 
     Raises:
         SetupError: the pre-registration or the data there belong to another design.

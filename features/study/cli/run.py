@@ -58,7 +58,7 @@ def run(
         if (participant is None) == (not simulate):
             raise SetupError("say --participant N, or --simulate N for simulated ones")
         from gazerig.features.study.data_folder import StudyData
-        from gazerig.features.study.run.study_check import checked_study
+        from gazerig.features.study.run.study_file import checked_study
 
         found = checked_study(study)
         folder = StudyData(data_folder(found, data))
@@ -98,7 +98,7 @@ def film(study: StudyArgument = "study.yaml", data: DataOption = None) -> None:
     """Make the films of a study's conditions; those that are there already are kept."""
     with clear_errors():
         from gazerig.features.study.data_folder import StudyData
-        from gazerig.features.study.run.study_check import checked_study
+        from gazerig.features.study.run.study_file import checked_study
 
         found = checked_study(study)
         for key, path in _films(found, StudyData(data_folder(found, data))).items():

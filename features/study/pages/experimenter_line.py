@@ -1,4 +1,4 @@
-"""The experimenter's connection: the session's live state, and the buttons.
+"""The experimenter's connection: the session's live state, the head's health, and the buttons.
 
 It uses the live page's protocol, so that the stop button (browser/stop.js) is the same.
 """
@@ -6,6 +6,8 @@ It uses the live page's protocol, so that the stop button (browser/stop.js) is t
 import asyncio
 import json
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
 import aiohttp
 from aiohttp import web
@@ -13,7 +15,6 @@ from aiohttp import web
 from gazerig.features.study.answers import WrongAnswer
 from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.journal import WriteFailed
-from gazerig.features.study.pages.head_link import HeadLink
 from gazerig.features.study.pages.study_files import HEADERS
 from gazerig.features.study.screens import (
     ConsentScreen,
@@ -29,6 +30,58 @@ from gazerig.features.study.screens import (
 from gazerig.features.study.study_run import StudyRun
 from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
 from gazerig.robot.dashboard.requests.outbox import ASKED_BYTES, from_browser
+
+HeadHealth = Literal["none", "alive", "late", "fault", "stopped"]
+"""none: films are shown; late: it does not answer; stopped: its torque is off."""
+
+
+@dataclass(frozen=True)
+class HeadReport:
+    """Health of the head; says: the fault or the reason of a stop, "" without one."""
+
+    state: HeadHealth
+    says: str = ""
+
+
+class HeadLink(Protocol):
+    """A head in another process; its methods are called from any thread, and block."""
+
+    def report(self) -> HeadReport:
+        """Return the head's health immediately."""
+        ...
+
+    def stop(self, why: str) -> str:
+        """Switch its torque off; return the reason of a failure, "" on success.
+
+        Raises:
+            OSError: the head has ended, or does not answer.
+        """
+        ...
+
+    def resume(self) -> str:
+        """Switch its torque on again; return the reason of a failure, "" on success.
+
+        Raises:
+            OSError: the head has ended, or does not answer.
+        """
+        ...
+
+
+class NoHead:
+    """Replaces the head for films, with nothing to stop."""
+
+    def report(self) -> HeadReport:
+        """Report that there is no head."""
+        return HeadReport("none")
+
+    def stop(self, why: str) -> str:
+        """Return the reason of the failure: no head is shown."""
+        return "no head is shown"
+
+    def resume(self) -> str:
+        """Return the reason of the failure: no head is shown."""
+        return "no head is shown"
+
 
 WHO = "the experimenter"
 _BEAT_S = 1.0
@@ -62,16 +115,7 @@ class ExperimenterLine:
         notify: Callable[[], None],
         finish: Callable[[], None],
     ) -> None:
-        """Create it without connections.
-
-        Args:
-            run: the session.
-            design: the study's design, with the labels of its conditions.
-            head: the head that is shown.
-            watch: calls a function at news and at an interval, until the browser disconnects.
-            notify: informs all browsers of news.
-            finish: ends the program.
-        """
+        """Create it without connections."""
         self._run, self._design, self._head = run, design, head
         self._watch, self._notify, self._finish = watch, notify, finish
         self._opened_s = 0.0

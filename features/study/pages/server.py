@@ -17,14 +17,14 @@ from aiohttp.typedefs import Handler, Middleware
 from gazerig.features.study.answers import WrongAnswer
 from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.journal import WriteFailed
-from gazerig.features.study.pages.experimenter_line import ExperimenterLine
-from gazerig.features.study.pages.head_link import HeadLink, NoHead
-from gazerig.features.study.pages.participant_events import (
+from gazerig.features.study.pages.experimenter_line import ExperimenterLine, HeadLink, NoHead
+from gazerig.features.study.pages.participant_page import (
+    Json,
     Malformed,
     ParticipantEvent,
+    page_json,
     parse_event,
 )
-from gazerig.features.study.pages.participant_page import Json, page_json
 from gazerig.features.study.pages.study_files import HEADERS, StudyFiles
 from gazerig.features.study.study_run import StudyRun
 from gazerig.robot.dashboard.door.admission import Admission, page_url

@@ -23,11 +23,7 @@ HEADERS = {
 
 
 class StudyFiles:
-    """Documents at "/" and "/experimenter", all other files at "/study/NAME".
-
-    Args:
-        language: language of the participant's page.
-    """
+    """Documents at "/" and "/experimenter", all other files at "/study/NAME"."""
 
     def __init__(self, language: str) -> None:
         self._language = language

@@ -11,7 +11,7 @@ from gazerig.features.study.analysis import StudyAnalysis
 from gazerig.features.study.decisions import Decision
 from gazerig.features.study.design import Test
 from gazerig.features.study.measures import Measure
-from gazerig.features.study.statistics.results import EffectSize, StatisticalTest
+from gazerig.features.study.statistics.effects import EffectSize, StatisticalTest
 
 TEST_NAMES: dict[Test, str] = {
     "signed_rank": "Wilcoxon signed-rank test",

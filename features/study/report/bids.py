@@ -25,8 +25,7 @@ from gazerig.robot.recording.export_bids import (
     refuse_foreign,
     write_bids,
 )
-from gazerig.robot.recording.gaze_angles import collect_gaze_angles
-from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
+from gazerig.robot.recording.gaze_angles import collect_gaze_angles, find_intervals, label_samples
 from gazerig.robot.recording.read import RunRecording, used
 
 COLUMNS = (

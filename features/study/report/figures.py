@@ -136,12 +136,7 @@ def _paired(figure: Figure, one: MeasureSummary, names: list[str]) -> None:
 
 
 def forest_png(study: StudyAnalysis, names: list[str]) -> bytes:
-    """Draw the effect of each hypothesis with its interval.
-
-    Args:
-        study: with its decisions.
-        names: labels of the hypotheses, as on the page.
-    """
+    """Draw the effect of each hypothesis with its interval."""
     size = (_WIDE_IN, _HEAD_IN + _ROW_IN * max(1, len(names)))
     return png_of(lambda figure: _forest(figure, study.decisions, names), size)
 

@@ -13,9 +13,9 @@ from gazerig.features.lab.report.page import render
 from gazerig.features.lab.report.statistics import number
 from gazerig.features.study.analysis import ChoiceSummary, MeasureSummary, StudyAnalysis
 from gazerig.features.study.decisions import Decision
-from gazerig.features.study.records import STEP_DEG
+from gazerig.features.study.journal import STEP_DEG
 from gazerig.features.study.report import apa, figures
-from gazerig.features.study.statistics.results import StatisticalTest
+from gazerig.features.study.statistics.effects import StatisticalTest
 
 Progress = Callable[[str, float], None]
 _CLASSES = {
@@ -80,13 +80,7 @@ class ChoiceSection(NamedTuple):
 
 
 def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
-    """Return the report of a study as HTML that needs no other file.
-
-    Args:
-        study: the analysis.
-        made_by: program and version.
-        progress: is called with the share of the drawing.
-    """
+    """Return the report of a study as HTML that needs no other file."""
     sections = []
     for k, one in enumerate(study.measures):
         progress("drawing", k / max(1, len(study.measures)))

@@ -7,12 +7,11 @@ from typing import NamedTuple
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.analysis import StudyAnalysis, analyse_study
-from gazerig.features.study.collected import collect_study
 from gazerig.features.study.data_folder import InterimLook, StudyData
+from gazerig.features.study.participation import collect_study
 from gazerig.features.study.report.bids import StudyDataSet, write_study
 from gazerig.features.study.report.page import Progress, study_page
-from gazerig.features.study.report.r_script import r_script
-from gazerig.features.study.report.tables import answers_csv, results_json, trials_csv
+from gazerig.features.study.report.tables import answers_csv, r_script, results_json, trials_csv
 
 PAGE, DATA_SET = "index.html", "bids"
 _MARK = b'name="generator" content="gazerig"'
@@ -35,13 +34,6 @@ def write_report(data: Path, out: Path, made_by: str, utc: str, progress: Progre
 
     An earlier report in the folder is replaced; a folder with other files is refused. An analysis
     before the planned number of participants is recorded in the data as an interim look.
-
-    Args:
-        data: folder of the study's data.
-        out: folder of the report.
-        made_by: program and version.
-        utc: the present time.
-        progress: is called with each step.
 
     Raises:
         SetupError: the data cannot be analysed, or the folder holds other files, or a file cannot

@@ -1,4 +1,7 @@
-"""A study as tidy tables, one row per answer or presentation; and its results as JSON."""
+"""A study as tidy tables, one row per answer or presentation; its results as JSON; an R script.
+
+The script has exploratory models that only R packages have.
+"""
 
 import csv
 import json
@@ -11,7 +14,8 @@ from typing import Any
 from gazerig.features.study.analysis import StudyAnalysis
 from gazerig.features.study.order import PAIR
 from gazerig.features.study.participation import AnswerRow, Participation
-from gazerig.features.study.statistics.results import StatisticalTest
+from gazerig.features.study.report.apa import measure_words
+from gazerig.features.study.statistics.effects import StatisticalTest
 
 ANSWERS = (
     "participant", "simulated", "trial", "condition", "first", "second", "questionnaire", "item",
@@ -152,3 +156,80 @@ def as_text(value: str) -> str:
 
 def _yes_or_no(value: bool) -> str:
     return "yes" if value else "no"
+
+
+_BEGINNING = """\
+# Exploratory models of a study, written by gazerig beside answers.csv. They decide nothing.
+# Needs: install.packages(c("ordinal", "BradleyTerry2")). Run: Rscript exploratory.R
+file <- sub("^--file=", "", grep("^--file=", commandArgs(FALSE), value = TRUE))
+folder <- if (length(file)) dirname(file) else "."
+answers <- read.csv(file.path(folder, "answers.csv"), na.strings = "", stringsAsFactors = FALSE)
+answers <- answers[is.na(answers$left_out) & !is.na(answers$trial), ]
+"""
+
+_RATINGS = """
+# Cumulative-link mixed model. Participants differ in their level and in their preference (random
+# intercept and slope; Barr et al. 2013); one answer per condition does not tell a slope from noise.
+ratings <- function(name, questionnaire, items, better, than) {
+  cat("\\n==", name, "==\\n")
+  one <- answers[answers$questionnaire == questionnaire & answers$item %in% items &
+                   answers$condition %in% c(better, than), ]
+  value <- as.integer(one$value)
+  value <- ifelse(one$reverse == "yes", one$points + 1L - value, value)
+  one$rating <- factor(value, levels = sort(unique(value)), ordered = TRUE)
+  one$better <- as.numeric(one$condition %in% better)
+  one$participant <- factor(one$participant)
+  one$item <- factor(one$item)
+  slopes <- nrow(one) > 2 * nlevels(one$participant)
+  model <- paste("rating ~ better +",
+                 if (slopes) "(1 + better | participant)" else "(1 | participant)",
+                 if (length(items) > 1) "+ (1 | item)")
+  print(summary(ordinal::clmm(as.formula(model), data = one)))
+}
+"""
+
+_CHOICES = """
+# Bradley-Terry scores of all conditions. Choices of one participant depend on each other, so the
+# intervals are those of a bootstrap over participants.
+choices <- function(name, questionnaire, item, conditions) {
+  cat("\\n==", name, "==\\n")
+  one <- answers[answers$questionnaire == questionnaire & answers$item == item, ]
+  one$first <- factor(one$first, levels = conditions)
+  one$second <- factor(one$second, levels = conditions)
+  one$chosen <- as.numeric(one$value == "first")
+  scores <- function(rows) coef(suppressWarnings(
+    BradleyTerry2::BTm(chosen, first, second, data = rows)))
+  set.seed(1)
+  people <- split(seq_len(nrow(one)), one$participant)
+  drawn <- replicate(999, scores(one[unlist(sample(people, replace = TRUE)), ]))
+  drawn <- matrix(drawn, ncol = 999)
+  ends <- apply(drawn, 1, quantile, c(0.025, 0.975), na.rm = TRUE)
+  print(cbind(score = scores(one), low95 = ends[1, ], high95 = ends[2, ]))
+}
+"""
+
+
+def r_script(study: StudyAnalysis) -> str:
+    """Return an R script that reads answers.csv from its own folder.
+
+    It has a mixed model for each hypothesis about ratings, and the Bradley-Terry model of choices.
+    """
+    design = study.design
+    rated = [one for one in study.decisions if one.measure.kind in ("item", "scale")]
+    calls = [
+        f"ratings({json.dumps(f'{one.measure.name}: {one.hypothesis.better} > {one.hypothesis.than}')}, "
+        f"{json.dumps(one.measure.questionnaire)}, {_vector(one.measure.items)}, "
+        f"{_vector(design.side(one.hypothesis.better))}, {_vector(design.side(one.hypothesis.than))})"
+        for one in rated
+    ]
+    calls += [
+        f"choices({json.dumps(measure_words(one.measure))}, {json.dumps(one.measure.questionnaire)}, "
+        f"{json.dumps(one.measure.items[0])}, {_vector(design.conditions)})"
+        for one in study.choices
+    ]
+    parts = [_BEGINNING, _RATINGS * bool(rated), _CHOICES * bool(study.choices), "\n"]
+    return "".join(parts) + "".join(f"{call}\n" for call in calls)
+
+
+def _vector(names: Iterable[str]) -> str:
+    return f"c({', '.join(json.dumps(name) for name in names)})"

@@ -103,11 +103,6 @@ def films(study: LoadedStudy, folder: Path, progress: Callable[[str], Progress])
 
     The names of the files do not identify conditions; ``index.txt`` in the folder assigns them.
 
-    Args:
-        study: a checked study.
-        folder: folder of the films.
-        progress: returns the progress function for the film of a condition.
-
     Raises:
         SetupError: a film cannot be rendered or written.
     """

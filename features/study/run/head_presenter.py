@@ -12,11 +12,11 @@ from math import nan
 from pathlib import Path
 
 from gazerig.drivers.errors import DriverError
-from gazerig.features.study.pages.head_link import HeadReport
-from gazerig.features.study.presenter import HeadLost, PresentationData
+from gazerig.features.study.pages.experimenter_line import HeadReport
 from gazerig.features.study.run.head_process import HeadProcess
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.session import ShownTrial
+from gazerig.features.study.study_run import HeadLost, PresentationData
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import Clock

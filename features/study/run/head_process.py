@@ -10,7 +10,7 @@ from typing import Any
 
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.process import child_process
-from gazerig.features.study.presenter import HeadLost
+from gazerig.features.study.study_run import HeadLost
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.model.clock import Clock

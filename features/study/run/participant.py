@@ -10,15 +10,13 @@ from pathlib import Path
 import gazerig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.data_folder import StudyData, code_of
-from gazerig.features.study.journal import Journal, WriteFailed
+from gazerig.features.study.journal import Journal, Opened, WriteFailed
 from gazerig.features.study.pages.server import StudyServer
 from gazerig.features.study.participation import check_records
-from gazerig.features.study.presenter import FilmPresenter
-from gazerig.features.study.records import Opened
 from gazerig.features.study.run.head_presenter import HeadPresenter
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.session import StudySession
-from gazerig.features.study.study_run import StudyRun
+from gazerig.features.study.study_run import FilmPresenter, StudyRun
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import Clock
 

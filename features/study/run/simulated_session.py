@@ -6,9 +6,7 @@ from datetime import UTC, datetime, timedelta
 import gazerig
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.data_folder import StudyData, code_of
-from gazerig.features.study.journal import Journal
-from gazerig.features.study.presenter import FilmPresenter
-from gazerig.features.study.records import AnswerValue, Measured, TrialEnded
+from gazerig.features.study.journal import AnswerValue, Journal, Measured, TrialEnded
 from gazerig.features.study.run.participant import open_journal
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.screens import (
@@ -22,7 +20,7 @@ from gazerig.features.study.screens import (
 )
 from gazerig.features.study.session import StudySession
 from gazerig.features.study.simulation import Population, SimulatedParticipant
-from gazerig.features.study.study_run import StudyRun
+from gazerig.features.study.study_run import FilmPresenter, StudyRun
 
 _BEGAN = datetime(2000, 1, 1, tzinfo=UTC)
 _MOST_SCREENS = 100_000
@@ -36,13 +34,6 @@ def simulate_study(
     progress: Callable[[float], None] = lambda share: None,
 ) -> None:
     """Run participants 1 to ``count`` through a study; equal seeds give equal journals.
-
-    Args:
-        study: a checked study.
-        data: a folder without participants.
-        count: number of participants.
-        population: distribution of the participants.
-        progress: receives the finished share, 0..1.
 
     Raises:
         SetupError: the folder has data of participants, or the data cannot be written.

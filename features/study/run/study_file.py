@@ -1,24 +1,37 @@
-"""Studies and questionnaires by name or path, checked with their rigs."""
+"""Studies and questionnaires by name or path, checked with rigs, scenes, recordings and films."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from hashlib import sha256
 from os.path import isfile
 from pathlib import Path
 from typing import cast
 
+from gazerig.config.export import suggestion
 from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped
 from gazerig.config.parameters import NEXT_START, changed, differences, live, values
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.film_writer import film_seconds
 from gazerig.features.study.design import Condition, StudyDesign
 from gazerig.features.study.preregistration import canonical, design_sha256
 from gazerig.features.study.questionnaire import Questionnaire
-from gazerig.features.study.rules import consistency_rules, design_rules, questionnaire_rules
+from gazerig.features.study.rules import (
+    consistency_rules,
+    design_rules,
+    objective_rules,
+    questionnaire_rules,
+)
 from gazerig.features.study.shipped import HOME
+from gazerig.features.study.study_run import WHOLE_SHARE
 from gazerig.gaze.attention.top_down import PLANNED
+from gazerig.robot.analysis.human_norms import BY_KEY
+from gazerig.robot.app.scene_files import scene_names
+from gazerig.robot.app.surroundings import surroundings_names
 from gazerig.robot.model.commands import Value
+from gazerig.robot.recording.read import BadRecording, RunRecording
 
 _ENDS = {"recording": ".mcap", "film": ".webm"}
 _GAZE = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
@@ -326,3 +339,75 @@ def _faults_at_key(key: str, error: ConfigError) -> Iterator[tuple[str, str]]:
     """Yield the faults of a file that a key names; for an unknown shipped name, the rule."""
     for fault in error.faults:
         yield key, fault.rule if fault.file.startswith("config/") else str(fault)
+
+
+def checked_study(name_or_path: str) -> LoadedStudy:
+    """Return a study by shipped name or path, with every rule checked.
+
+    Raises:
+        gazerig.config.load.ConfigError: with every fault.
+    """
+    return load_study(
+        name_or_path, _surroundings, partial(objective_rules, known=BY_KEY), _recordings, _films
+    )
+
+
+def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Yield unknown scenes and worlds."""
+    scene, world = design.presentation.scene, design.presentation.world
+    known = scene_names()
+    if scene is not None and scene not in known:
+        near = suggestion(scene, known) or ";"
+        yield "presentation.scene", f"no scene {scene!r}{near} there is {', '.join(known)}"
+    worlds = surroundings_names()
+    if world is not None and "/" not in world and "." not in world and world not in worlds:
+        near = suggestion(world, worlds) or ";"
+        there = ", ".join(worlds) or "none"
+        yield "presentation.world", f"no world {world!r}{near} there is {there}"
+
+
+def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Yield recordings that the rig cannot repeat for a whole trial."""
+    for key, one in design.conditions.items():
+        if one.recording is None or not isfile(one.recording):
+            continue
+        try:
+            run = RunRecording(one.recording)
+            names = next(run.ticks()).guard_result.joints
+            rig = load_rig(one.rig or design.presentation.rig)
+        except ConfigError:
+            continue  # reported at the rig
+        except (BadRecording, StopIteration) as error:
+            yield f"conditions.{key}.recording", str(error) or "holds no tick; record it again"
+            continue
+        if names != rig.names:
+            other = ", ".join(sorted({*names} ^ {*rig.names}))
+            rule = (
+                f"is of a rig with other joints ({other}); name that rig, or record with this one"
+            )
+            yield f"conditions.{key}.recording", rule
+        if run.duration_s < design.trials.seconds:
+            rule = (
+                f"lasts {run.duration_s:.1f} s, and a trial {design.trials.seconds:g} s: shorten "
+                "trials.seconds, or record longer"
+            )
+            yield f"conditions.{key}.recording", rule
+
+
+def _films(design: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Yield films that are too short for a presentation."""
+    wanted_s = design.trials.seconds
+    for key, one in design.conditions.items():
+        if one.film is None or not isfile(one.film):
+            continue
+        try:
+            seconds = film_seconds(one.film)
+        except SetupError as error:
+            yield f"conditions.{key}.film", str(error)
+            continue
+        if seconds < WHOLE_SHARE * wanted_s:
+            rule = (
+                f"lasts {seconds:.1f} s, and a trial {wanted_s:g} s: shorten trials.seconds, or "
+                "take a longer film"
+            )
+            yield f"conditions.{key}.film", rule

@@ -14,14 +14,14 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.report import report
 from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
 from gazerig.features.lab.report.statistics import judge
-from gazerig.features.study.measures import GAZE_MEASURES
-from gazerig.features.study.records import (
+from gazerig.features.study.journal import (
     STEP_DEG,
     Measured,
     Record,
     TrialBegan,
     TrialEnded,
 )
+from gazerig.features.study.measures import GAZE_MEASURES
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.robot.analysis.gaze_on_face import on_face

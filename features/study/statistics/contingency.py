@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from gazerig.features.study.statistics.effects import cramers_v
-from gazerig.features.study.statistics.results import StatisticalTest, no_effect
+from gazerig.features.study.statistics.effects import StatisticalTest, cramers_v, no_effect
 from gazerig.gaze.types import Floats
 
 Counts = NDArray[np.int64]

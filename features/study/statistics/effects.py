@@ -1,4 +1,4 @@
-"""Effect sizes with their 95 % intervals.
+"""Results of tests, effect sizes with their 95 % intervals, and Cronbach's alpha of a scale.
 
 Intervals are those of the bias-corrected and accelerated bootstrap (Efron 1987) over participants;
 they are nan if it is undefined, because all participants answered alike.
@@ -6,13 +6,94 @@ they are nan if it is undefined, because all participants answered alike.
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import isfinite, nan, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special, stats
 
-from gazerig.features.study.statistics.results import EffectSize
+from gazerig.features.study.design import Test
 from gazerig.gaze.types import Floats
+
+
+class EffectSize(NamedTuple):
+    """An effect with its 95 % interval, nan without one.
+
+    name: in words; symbol: as printed; method: of the interval
+    bounded: it cannot exceed 1, so no zero is printed before the decimal point
+    """
+
+    name: str
+    symbol: str
+    value: float
+    low95: float
+    high95: float
+    method: str
+    bounded: bool = True
+
+
+@dataclass(frozen=True)
+class StatisticalTest:
+    """The results of one test.
+
+    symbol, statistic, df: as printed; df is nan for a statistic without degrees of freedom
+    p: by the statistic's distribution in large samples
+    exact_p: of the permutations of the data, nan if it was not computed
+    least_p: the smallest exact probability that is possible with this number of data
+    n: participants, or answers if each counts separately
+    notes: warnings for the reader, e.g. counts too small for the large-sample probability
+    """
+
+    key: Test
+    symbol: str
+    statistic: float
+    df: float
+    p: float
+    exact_p: float
+    least_p: float
+    n: int
+    effect: EffectSize
+    notes: tuple[str, ...] = ()
+
+    @property
+    def deciding_p(self) -> float:
+        """Return the exact probability if it is known, else that of large samples."""
+        return self.exact_p if isfinite(self.exact_p) else self.p
+
+
+def no_effect(name: str, symbol: str) -> EffectSize:
+    """Return an undefined effect."""
+    return EffectSize(name, symbol, nan, nan, nan, "none")
+
+
+def cronbachs_alpha(answers: Floats) -> EffectSize:
+    """Return Cronbach's alpha (1951) of a scale, with its interval over participants.
+
+    Args:
+        answers: (participants, items), with reversed items inverted.
+    """
+    rows = np.asarray(answers, float)
+    name = "Cronbach's alpha"
+    if rows.ndim != 2 or rows.shape[0] < 2 or rows.shape[1] < 2:
+        return EffectSize(name, "α", nan, nan, nan, "none")
+
+    def along(*items: Floats, axis: int = -1) -> Floats:
+        return _alpha(np.stack(items))
+
+    interval = bootstrap_interval(list(rows.T), along, paired=True)
+    return EffectSize(name, "α", float(_alpha(rows.T)), *interval, "BCa bootstrap")
+
+
+def _alpha(items: Floats) -> Floats:
+    """Return alpha of (items, ..., participants), nan if all sums are equal."""
+    k = len(items)
+    parts = np.var(items, axis=-1, ddof=1).sum(axis=0)
+    whole = np.asarray(np.var(items.sum(axis=0), axis=-1, ddof=1))
+    share = np.divide(parts, whole, out=np.full_like(whole, nan), where=whole > 1e-12)
+    alpha: Floats = k / (k - 1.0) * (1.0 - share)
+    return alpha
+
 
 RESAMPLES = 2000
 SEED = 20020401
@@ -121,11 +202,6 @@ def cramers_v(chi2: float, n: int, shape: tuple[int, int]) -> EffectSize:
     """Return Cramer's V of a table.
 
     The interval is that of the inverted noncentral chi-square distribution (Smithson 2003).
-
-    Args:
-        chi2: Pearson's statistic.
-        n: answers.
-        shape: rows and columns.
     """
     df, width = (shape[0] - 1) * (shape[1] - 1), n * (min(shape) - 1)
     if df < 1 or width < 1 or not isfinite(chi2):

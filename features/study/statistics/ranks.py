@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from gazerig.features.study.statistics import effects
-from gazerig.features.study.statistics.results import EffectSize, StatisticalTest, no_effect
+from gazerig.features.study.statistics.effects import EffectSize, StatisticalTest, no_effect
 from gazerig.gaze.types import Floats
 
 Zeros = Literal["wilcox", "pratt"]

@@ -73,7 +73,7 @@ Point = Callable[[object, str], bool]
 class AuthProxy:
     """Proxy that admits browsers to the server behind it, in its own thread.
 
-    webcam: receives pictures of browsers' own cameras
+    webcam: receives pictures of browsers' own cameras; admission: who is let in
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class AuthProxy:
         self._panel_socket = WidgetSocket(self.widgets)
         self._panel_tabs = TabLimits(MOST_LINES)
         self._cookie = f"gazerig_{port}"  # cookies are shared by all ports
-        self._admission = Admission(host, port, token, self._cookie, _WHERE)
+        self.admission = Admission(host, port, token, self._cookie, _WHERE)
         self._state: Mapping[str, object] = {}
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
@@ -126,15 +126,6 @@ class AuthProxy:
         self._opened = threading.Event()
         self._failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="page door", daemon=True)
-
-    @property
-    def once(self) -> str:
-        """Return another token that opens the page once, "" if there is none."""
-        return self._admission.once
-
-    @once.setter
-    def once(self, token: str) -> None:
-        self._admission.once = token
 
     def open(self) -> None:
         """Listen.
@@ -223,11 +214,11 @@ class AuthProxy:
         @web.middleware
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
             with self._connections.busy(request):
-                why_not = self._admission.refusal(request)
+                why_not = self.admission.refusal(request)
                 if why_not is not None:
                     return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
                 if "token" in request.query:
-                    answer = self._admission.with_cookie(request, _HEADERS)
+                    answer = self.admission.with_cookie(request, _HEADERS)
                     if self._name_cookie not in request.cookies:
                         answer.set_cookie(
                             self._name_cookie,

@@ -26,11 +26,7 @@ _MAY = {
 
 
 class PageFiles:
-    """Files of the folder ``browser``: the document at "/", the others at "/rig/NAME".
-
-    Args:
-        headers: of every answer.
-    """
+    """Files of the folder ``browser``: the document at "/", the others at "/rig/NAME"."""
 
     def __init__(self, headers: Mapping[str, str]) -> None:
         self._headers = {**headers, **_MAY}

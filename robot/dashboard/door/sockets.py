@@ -59,12 +59,7 @@ async def until_one_ends(*works: Awaitable[object]) -> None:
 
 
 async def close_socket(socket: web.WebSocketResponse, request: web.Request) -> None:
-    """Close a browser's websocket; a browser that reads nothing does not read the closing message.
-
-    Args:
-        socket: to be closed.
-        request: by which it was opened.
-    """
+    """Close a browser's websocket, also one that does not read the closing message."""
     with suppress(TimeoutError, ConnectionError):
         async with asyncio.timeout(_CLOSES_WITHIN_S):
             await socket.close()
@@ -87,12 +82,7 @@ TakePicture = Callable[[bytes], bool]
 
 
 class WebcamSocket:
-    """Receives images of one browser at a time.
-
-    Args:
-        now_s: the clock of the event loop.
-        take: receives pictures.
-    """
+    """Receives images of one browser at a time."""
 
     def __init__(self, now_s: Callable[[], float], take: TakePicture) -> None:
         self._take = take
@@ -130,11 +120,7 @@ _PAUSE_S = 0.04
 
 
 class WidgetSocket:
-    """Sends the panels to browsers, to each as fast as it reads them.
-
-    Args:
-        widgets: all panels.
-    """
+    """Sends the panels to browsers, to each as fast as it reads them."""
 
     def __init__(self, widgets: Widgets) -> None:
         self._widgets = widgets

@@ -185,13 +185,7 @@ def client_of(inside: ViewAddress) -> aiohttp.ClientSession:
 
 
 class ViewProxy:
-    """Proxy to viser behind the door; used in the door's event loop.
-
-    Args:
-        client: reaches the server.
-        connections: of the door.
-        headers: of every answer.
-    """
+    """Proxy to viser behind the door; used in the door's event loop."""
 
     def __init__(
         self,
@@ -217,13 +211,7 @@ class ViewProxy:
     async def relay(
         self, request: web.Request, who: str, over: Awaitable[object]
     ) -> web.StreamResponse:
-        """Relay a browser's websocket to the server and back, at the speed of the slower side.
-
-        Args:
-            request: to open it.
-            who: Name of the browser.
-            over: ends the connection.
-        """
+        """Relay a browser's websocket to the server and back, at the speed of the slower side."""
         if not self._tab_rate.take(asyncio.get_running_loop().time()):
             return web.Response(status=429, text="too many tabs at once\n", headers=self._headers)
         offered = [

@@ -96,10 +96,6 @@ class ParamThread:
     """Lets a thread send the parameters: writing them takes milliseconds, which a tick has not.
 
     It waits until there is something to send.
-
-    Args:
-        feed: sends; belongs to the thread from now on.
-        tell: gets a line if that fails.
     """
 
     def __init__(self, feed: ParamFeed, tell: Callable[[str], None]) -> None:

@@ -1,18 +1,19 @@
-"""Controls of the rig: the drawers Steer and Tune."""
+"""Controls of the rig: the drawers Steer (gaze, behaviours, face, joints) and Tune."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from math import degrees, radians
 
 import viser
 
-from gazerig.robot.dashboard.panels.animation_panel import EXPRESSION, GESTURE, AnimationPanel
-from gazerig.robot.dashboard.panels.jog_panel import JogPanel
+from gazerig.gaze.gesture.expression import NEUTRAL
 from gazerig.robot.dashboard.panels.param_panel import ParamState
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.html import note
-from gazerig.robot.dashboard.widgets.widget import Buttons
+from gazerig.robot.dashboard.widgets.widget import Buttons, Slider
 from gazerig.robot.dashboard.widgets.widgets import Container, Widgets
-from gazerig.robot.model.commands import Ask, LookAt
-from gazerig.robot.model.types import Snapshot
+from gazerig.robot.model.commands import NO_GESTURE, Ask, Express, Jog, LookAt, Play
+from gazerig.robot.model.types import Snapshot, in_order
 
 STEER = "steer"
 """Menu of the steps of a calibration, not of requests to the robot."""
@@ -73,14 +74,7 @@ class Controls:
 
 
 class LeadPanel:
-    """Controls of the gaze, with a target to drag through the scene, and menus.
-
-    Args:
-        place: Container of the drawer.
-        scene: Scene of the target.
-        outbox: Sends commands to the rig.
-        let_go: Called when joints are released.
-    """
+    """Controls of the gaze, with a target to drag through the scene, and menus."""
 
     def __init__(
         self,
@@ -175,3 +169,187 @@ class LeadPanel:
         for name, word in in_force.items():
             if name in self.menus:
                 self.menus[name].current = word
+
+
+EXPRESSION = "expression"
+GESTURE = "gesture"
+"""Names of the menus that are shown here."""
+_SPEEDS, _SPEED_STEP = (0.5, 2.0), 0.1
+"""Slowest and fastest speed of gestures, and its step."""
+
+
+class AnimationPanel:
+    """Section of the controls; it appears when the rig offers expressions or gestures."""
+
+    def __init__(self, place: Container, outbox: Outbox) -> None:
+        self._place, self._outbox = place, outbox
+        self._section: Container | None = None
+        self.expressions: Buttons | None = None
+        self.strength: Slider | None = None
+        self.gestures: Buttons | None = None
+        self.speed: Slider | None = None
+
+    def offer(self, names: Sequence[str]) -> None:
+        """Show a button for each expression, instead of the previous ones."""
+        options = tuple(sorted(names, key=lambda name: (name != NEUTRAL, name)))
+        if self.expressions is not None:
+            self.expressions.options = options
+            return
+        section = self._open_section()
+        self.expressions = section.buttons(EXPRESSION, options, order=1)
+        strength = self.strength = section.slider("strength", (0.0, 1.0), 0.05, 1.0, order=2)
+
+        def express(name: str, client: str) -> None:
+            self._outbox.command(Express(name, float(strength.value)), client)
+
+        self.expressions.on_press(express)
+
+    def offer_gestures(self, names: Sequence[str]) -> None:
+        """Show a button for each gesture, instead of the previous ones; the first ends a gesture.
+
+        Args:
+            names: Gestures that the rig can play, and the name that ends the present one.
+        """
+        options = tuple(sorted(names, key=lambda name: (name != NO_GESTURE, name)))
+        if self.gestures is not None:
+            self.gestures.options = options
+            return
+        section = self._open_section()
+        self.gestures = section.buttons(GESTURE, options, order=3)
+        speed = self.speed = section.slider("speed", _SPEEDS, _SPEED_STEP, 1.0, order=4)
+
+        def play(name: str, client: str) -> None:
+            gesture = "" if name == NO_GESTURE else name
+            self._outbox.command(Play(gesture, float(speed.value)), client)
+
+        self.gestures.on_press(play)
+
+    def _open_section(self) -> Container:
+        """Return the section; create it at the first call."""
+        if self._section is None:
+            self._section = self._place.section("face", order=20)
+        return self._section
+
+
+GESTURES = ("nod", "shake", "surprised", "sleepy")
+WINK = "wink"
+_WITH_LIDS = ("surprised", "sleepy")
+_NO_LIDS = "this rig has no lids"
+_NOT_NOW = "not while a calibration is under way"
+_NO_JOINTS = "this rig has none of the joints that it moves"
+
+
+def refused_moves(
+    menus: Mapping[str, Sequence[str]], joints: Sequence[str] | None
+) -> dict[str, str]:
+    """Return button -> reason of the buttons that this rig cannot do.
+
+    Args:
+        menus: Menus of the rig; empty before they are received.
+        joints: Names of the rig's joints; None before they are known.
+    """
+    if not menus:
+        return {}
+    if "gesture" not in menus:
+        return dict.fromkeys((*GESTURES, WINK), _NOT_NOW)
+    no_lids = joints is not None and not any("lid" in joint for joint in joints)
+    refused = {
+        name: _NO_LIDS if no_lids and name in _WITH_LIDS else _NO_JOINTS
+        for name in GESTURES
+        if name not in menus["gesture"]
+    }
+    return {**refused, WINK: _NO_LIDS} if no_lids else refused
+
+
+_STEP_DEG = 0.1
+_FIRST, _LAST = 1, 100
+"""Order of the sliders and of the elements below them."""
+_FOLLOWS_DEG = 0.15
+"""Step in which a slider follows its joint, deg."""
+_FREE_AFTER_S = 0.5
+"""Time after which a joint with another desired angle counts as no longer jogged, s."""
+_SAME_DEG = 0.3
+ESTIMATED = "estimated from the goals, not measured: the servos give no feedback"
+
+
+class JogPanel:
+    """One slider for each joint; they are created when the limits are known."""
+
+    def __init__(self, place: Container, outbox: Outbox) -> None:
+        self._place, self._outbox = place, outbox
+        self.sliders: dict[str, Slider] = {}
+        # Joint -> requested angle and the time of the last frame in which it was desired.
+        self._held: dict[str, tuple[float, float]] = {}
+        self._now_s = 0.0
+        place.html(
+            note(
+                "This moves the joint of the real head slowly, within the guard's limits. All "
+                'others hold their angles until you press "look freely".'
+            ),
+            order=0,
+        )
+        self.estimated_joints_note = place.html(order=_LAST)
+
+    def let_go(self) -> None:
+        """Forget the jogged joints; their sliders follow them again."""
+        self._held.clear()
+
+    def values(self, in_force: Mapping[str, object]) -> None:
+        """Create the sliders, and set their ranges to the joints' limits."""
+        keys = [key.split(".") for key in in_force if key.startswith("joints.")]
+        for joint in in_order(path[1] for path in keys if path[2:] == ["min_deg"]):
+            low, high = (in_force.get(f"joints.{joint}.{end}_deg") for end in ("min", "max"))
+            if not (isinstance(low, int | float) and isinstance(high, int | float)):
+                continue
+            slider = self.sliders.get(joint)
+            if slider is not None:
+                slider.ends = (float(low), float(high))
+                continue
+            slider = self.sliders[joint] = self._place.slider(
+                joint.replace("_", " "),
+                (float(low), float(high)),
+                _STEP_DEG,
+                min(max(0.0, float(low)), float(high)),
+                hint=(
+                    f"moves the joint, slowly; {low:g} to {high:g} deg, + left, up, open, "
+                    "right ear down"
+                ),
+                order=_FIRST + len(self.sliders),
+            )
+            slider.on_change(partial(self._jog, joint))
+
+    def _jog(self, joint: str, angle_deg: float, who: str) -> None:
+        self._held[joint] = (angle_deg, self._now_s)
+        self._outbox.command(Jog(((joint, radians(angle_deg)),)), who)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Update the sliders of joints that are not jogged, and list joints without measurement."""
+        if snapshot.t_s < self._now_s:  # the rig's clock was restarted
+            self._held.clear()
+        self._now_s = snapshot.t_s
+        places = {joint: i for i, joint in enumerate(snapshot.joints)}
+        for joint, slider in self.sliders.items():
+            if (i := places.get(joint)) is None:
+                continue
+            if (held := self._held.get(joint)) is not None:
+                asked_deg, at_s = held
+                if not snapshot.stopped and (
+                    abs(degrees(snapshot.desired_rad[i]) - asked_deg) < _SAME_DEG
+                ):
+                    self._held[joint] = (asked_deg, self._now_s)
+                elif snapshot.stopped or self._now_s - at_s > _FREE_AFTER_S:
+                    del self._held[joint]  # a stop or another command has released it
+            angle_deg = degrees(snapshot.measured_rad[i])
+            if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
+                low, high = slider.ends
+                slider.value = round(min(max(angle_deg, low), high), 1)
+        self.estimated_joints_note.content = estimated_joints_note(snapshot)
+
+
+def estimated_joints_note(snapshot: Snapshot) -> str:
+    """Return the joints with estimated angles as HTML, "" if all are measured."""
+    estimated = [joint for joint in snapshot.joints if joint in frozenset(snapshot.estimated)]
+    if not estimated:
+        return ""
+    names = "all joints" if len(estimated) == len(snapshot.joints) else ", ".join(estimated)
+    return note(f"{names.replace('_', ' ')}: {ESTIMATED}")

@@ -134,11 +134,7 @@ def mean_deg(angles_deg: Floats, group: ChartGroup, joints: tuple[str, ...]) -> 
 
 
 class JointCharts:
-    """Two menus, and a chart for each group of the choice.
-
-    Args:
-        place: Container of menus and charts.
-    """
+    """Two menus, and a chart for each group of the choice."""
 
     def __init__(self, place: Container) -> None:
         self._place = place

@@ -7,18 +7,19 @@ from math import inf
 import cv2
 import numpy as np
 
-from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.live_feed import OverlayChoices
 from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
-from gazerig.robot.dashboard.panels.dwell_chart import DwellChart
 from gazerig.robot.dashboard.panels.gaze_map import GazeMap
 from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
-from gazerig.robot.dashboard.panels.main_sequence_chart import MainSequenceChart
 from gazerig.robot.dashboard.panels.package_panels import PagePanels
-from gazerig.robot.dashboard.panels.run_figures import HOW_TO, RunFigures
-from gazerig.robot.dashboard.panels.servo_health import health
-from gazerig.robot.dashboard.panels.status import alarms, other_heads, silence
+from gazerig.robot.dashboard.panels.run_figures import (
+    HOW_TO,
+    DwellChart,
+    MainSequenceChart,
+    RunFigures,
+)
+from gazerig.robot.dashboard.panels.servo_health import alarms, health, other_heads
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
@@ -132,21 +133,9 @@ class PanelView:
                 self.map.show(encode(np.asarray(bgr, np.uint8)))
         self._shown += 1
 
-    def silent(self) -> None:
-        """Show that the rig sends no data, until it does again."""
-        self.silence.content = silence()
-
     def draw_all(self) -> None:
         """Draw all elements at the next frame."""
         self._shown = 0
-
-    def show_jpeg(self, jpeg: bytes) -> None:
-        """Show a recorded camera image."""
-        self.image.show(jpeg)
-
-    def show_image(self, bgr: ImageArray) -> None:
-        """Show the camera image."""
-        self.image.show(encode(bgr))
 
 
 def estimation_note(snapshot: Snapshot) -> str:

@@ -25,13 +25,7 @@ _PLAY, _PAUSE = "play", "pause"
 
 
 class ReplayView:
-    """Controls of a recording that is shown.
-
-    Args:
-        place: Container of the controls.
-        tell: Receives requests of users.
-        duration_s: length of the recording.
-    """
+    """Controls of a recording that is shown."""
 
     def __init__(self, place: Container, tell: Tell, duration_s: float) -> None:
         self._tell = tell

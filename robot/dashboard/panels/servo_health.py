@@ -1,15 +1,9 @@
-"""Health of the rig: guard, loop and frame in a few lines, every servo in a table."""
+"""Health of the rig: alarms, guard, loop and frame in a few lines, every servo in a table."""
 
 from html import escape
 from typing import Literal
 
-from gazerig.robot.dashboard.panels.status import (
-    OLD_FRAME_S,
-    group_reasons,
-    one_line,
-    without_feedback,
-)
-from gazerig.robot.dashboard.widgets.html import LEVELS, heading, note, pill
+from gazerig.robot.dashboard.widgets.html import LEVELS, banner, count_text, heading, note, pill
 from gazerig.robot.model.types import LoopFigures, Servos, Snapshot
 
 Strain = Literal["", "near", "over"]
@@ -25,6 +19,14 @@ NO_FEEDBACK = "no feedback"
 
 def health(snapshot: Snapshot) -> str:
     """Return the health of the rig as HTML."""
+    # Without the frame's age, which has its own line.
+    first, _, others = snapshot.perception.partition(" | ")
+    perception = others if first.startswith(("frame ", "no frame")) else snapshot.perception
+    age_s = snapshot.frame_age_s
+    frame = "<div>no frame yet</div>"
+    if age_s is not None:
+        kind = " class='warn'" if age_s >= OLD_FRAME_S else ""
+        frame = f"<div>frame <b{kind}>{1e3 * age_s:.0f} ms</b> old</div>"
     return (
         guard(snapshot)
         + heading("servos")
@@ -34,8 +36,8 @@ def health(snapshot: Snapshot) -> str:
         + heading("loop")
         + _timing(snapshot.timing)
         + heading("camera")
-        + _frame(snapshot.frame_age_s)
-        + f"<div>{escape(_without_frame_age(snapshot.perception))}</div>"
+        + frame
+        + f"<div>{escape(perception)}</div>"
     )
 
 
@@ -152,22 +154,87 @@ def _timing(timing: LoopFigures | None) -> str:
     )
 
 
-def _without_frame_age(perception: str) -> str:
-    """Return the text about perception without the frame's age, which has its own line."""
-    first, _, others = perception.partition(" | ")
-    return others if first.startswith(("frame ", "no frame")) else perception
-
-
-def _frame(age_s: float | None) -> str:
-    if age_s is None:
-        return "<div>no frame yet</div>"
-    kind = " class='warn'" if age_s >= OLD_FRAME_S else ""
-    return f"<div>frame <b{kind}>{1e3 * age_s:.0f} ms</b> old</div>"
-
-
 def _cell(text: str, strain: Strain) -> str:
     return f"<td class='{strain}'>{text}</td>" if strain else f"<td>{text}</td>"
 
 
 def _at(column: tuple[float | None, ...], i: int) -> float | None:
     return column[i] if column else None
+
+
+_REASONS_SHOWN = 4
+_STANDS_STILL = {
+    "hold": "guard: hold - joints are held where they are",
+    "torque_off": "guard: torque off - joints are released",
+}
+OLD_FRAME_S = 0.5
+"""Age from which a frame is old, s; the guard stops the neck at three times that."""
+
+
+def alarms(snapshot: Snapshot) -> str:
+    """Return banners for held joints and an old frame, "" without faults.
+
+    The stop button shows that the rig is stopped.
+    """
+    said, kind = "", LEVELS[snapshot.level]
+    if not snapshot.stopped and snapshot.level in ("hold", "torque_off"):
+        reasons = snapshot.reasons
+        more = len(reasons) - _REASONS_SHOWN
+        said += banner(
+            _STANDS_STILL[snapshot.level],
+            kind,
+            reasons[:_REASONS_SHOWN] + ((f"and {more} more",) if more > 0 else ()),
+        )
+    if snapshot.frame_age_s is not None and snapshot.frame_age_s >= OLD_FRAME_S:
+        said += banner(f"the frame is {snapshot.frame_age_s:.1f} s old", "hold")
+    for other in snapshot.others:
+        if other.level in _STANDS_STILL:
+            said += banner(f"{other.name}: {other.headline}", LEVELS[other.level])
+    return said
+
+
+def other_heads(snapshot: Snapshot) -> str:
+    """Return the activity of the other heads of the same world, one line each."""
+    return "".join(one_line(f"{other.name}: {other.headline}") for other in snapshot.others)
+
+
+def silence() -> str:
+    """Return a message that the rig sends no data."""
+    return note("silent: the rig has sent nothing for a second; the page shows the last data")
+
+
+def group_reasons(reasons: tuple[str, ...]) -> str:
+    """Return each reason once, with its first joint and the number of others.
+
+    For example "too fast (neck_yaw, +2)": a short limitation must not move the elements below it.
+    """
+    joints: dict[str, list[str]] = {}
+    for reason in reasons:
+        joint, _, why = reason.partition(": ")
+        joints.setdefault(why, []).append(joint)
+    return ", ".join(
+        f"{why} ({named[0]}{f', +{len(named) - 1}' if len(named) > 1 else ''})"
+        for why, named in joints.items()
+    )
+
+
+def one_line(text: str) -> str:
+    """Return text that is cut at the panel's edge, with all of it as tooltip."""
+    said = escape(text)
+    return f"<div class='line' title='{said}'>{said}</div>"
+
+
+def without_feedback(snapshot: Snapshot) -> str:
+    """Return the number of joints without position feedback, "" if all are measured."""
+    estimated = snapshot.estimated
+    if not estimated:
+        return ""
+    torque = dict(zip(snapshot.joints, snapshot.servos.torque, strict=False))
+    without_torque = sum(not torque.get(joint, True) for joint in estimated)
+    where = "shown where they should be"
+    if without_torque:  # a finger moves them, and no sensor sees it
+        where += f"; {'all' if without_torque == len(estimated) else without_torque} without torque: may be anywhere"
+    return (
+        f"<div class='warn'>{len(estimated)} of "
+        f"{count_text(len(snapshot.joints), 'joint')} without feedback: {where}</div>"
+    )

@@ -24,14 +24,7 @@ _PER_S, _BURST = 100.0, 200.0
 
 
 class Outbox:
-    """Sends requests over the page's socket; from any thread.
-
-    Args:
-        feed: to the rig.
-        clock: of the page.
-        name: returns the name of the browser of a client of the page.
-        leads: Receives the name of the browser in control of the head.
-    """
+    """Sends requests over the page's socket; from any thread."""
 
     def __init__(
         self,

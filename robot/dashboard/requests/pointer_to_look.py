@@ -79,11 +79,6 @@ def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Ve
 class PointerToLook:
     """Converts pointers to gaze targets; safe to call from any thread.
 
-    Args:
-        camera: Returns the camera of a browser's view, None if unknown.
-        look: hands a point to the rig, with the name of the browser.
-        clock: limits how many are handed on.
-
     p_world_eyes_m: the middle between the eyes, world frame; None before it is known
     """
 
@@ -99,12 +94,7 @@ class PointerToLook:
         self.p_world_eyes_m: Vec3 | None = None
 
     def take(self, asked: object, who: str) -> bool:
-        """Send the target of a browser's pointer; return False if there is none.
-
-        Args:
-            asked: Pointer as the browser sent it.
-            who: the name of the browser.
-        """
+        """Send the target of a browser's pointer; return False if there is none."""
         pointer, eyes_m = pointer_of(asked), self.p_world_eyes_m
         if pointer is None or eyes_m is None or not self._rate.take(self._clock.now_s()):
             return False
@@ -118,9 +108,6 @@ class PointerToLook:
 
 class ClickToLook:
     """Stores the newest frame and the pose of the camera at its capture.
-
-    Args:
-        pixels: places pixels in the world.
 
     newest: the newest tick, left here by the loop
     """

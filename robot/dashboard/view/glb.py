@@ -15,8 +15,7 @@ import viser
 from PIL import Image
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.description.mesh import Mesh, smooth_normals, turned
-from gazerig.robot.description.paint import Colour, Painted, plain
+from gazerig.robot.description.mesh import Colour, Mesh, Painted, plain, smooth_normals, turned
 from gazerig.robot.description.texture import TexturedMesh
 
 
@@ -67,12 +66,7 @@ FLAT = Finish(lit=False)
 
 
 def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
-    """Return a mesh with a texture as a binary glTF file, lit here.
-
-    Args:
-        shape: mesh in the frame of the scene.
-        finish: how it answers light.
-    """
+    """Return a mesh with a texture as a binary glTF file, lit here."""
     # Imported only to show a world: it takes half a second of a processor.
     import trimesh
     from trimesh.exchange.gltf import export_glb

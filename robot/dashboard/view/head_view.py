@@ -15,7 +15,7 @@ from gazerig.robot.description import links
 from gazerig.robot.description.build import SIDES, RigShape, describe
 from gazerig.robot.description.head_shape import HeadMeasures, measures_of
 from gazerig.robot.description.links import Description, Link, turn_about
-from gazerig.robot.description.paint import Colour
+from gazerig.robot.description.mesh import Colour
 from gazerig.robot.description.parts import FLOOR_M, meeting_rad
 from gazerig.robot.model.frames import CameraParams, quaternion
 from gazerig.robot.model.joint import JointParams
@@ -121,7 +121,19 @@ class HeadView:
             paths[link.name] = f"{paths[link.parent] if link.parent else '/rig'}/{link.name}"
         if self._paths != paths:
             self._paths, before = paths, None
-            self._add_frames(paths)
+            self._root.remove()
+            self._root = self._scene.add_frame("/rig", show_axes=False)
+            self.links = {
+                name: _Node(self._scene.add_frame(path, show_axes=False), [])
+                for name, path in paths.items()
+            }
+            self._sights = [
+                self._scene.add_line_segments(
+                    f"{paths[f'{side}_eye']}/sight", _AHEAD, self._colour, thickness=2.0,
+                    thickness_units="screen", visible=False,
+                )
+                for side in SIDES
+            ]  # fmt: skip
         at_rest = dict.fromkeys((joint.name for joint in description.joints), 0.0)
         lit = description.poses(at_rest | lid_angles(shape, (_LIT_OPEN,) * 2, (_LIT_OPEN,) * 2))
         for link in description.links:
@@ -145,22 +157,6 @@ class HeadView:
         if base.visuals:
             x, y, _ = base.visuals[0].p_m
             put(self._shade, (x, y, FLOOR_M + 0.001))
-
-    def _add_frames(self, paths: dict[str, str]) -> None:
-        """Add a frame for every link to the scene, at its path."""
-        self._root.remove()
-        self._root = self._scene.add_frame("/rig", show_axes=False)
-        self.links = {
-            name: _Node(self._scene.add_frame(path, show_axes=False), [])
-            for name, path in paths.items()
-        }
-        self._sights = [
-            self._scene.add_line_segments(
-                f"{paths[f'{side}_eye']}/sight", _AHEAD, self._colour, thickness=2.0,
-                thickness_units="screen", visible=False,
-            )
-            for side in SIDES
-        ]  # fmt: skip
 
 
 def _look_alike(one: Link, other: Link) -> bool:
@@ -238,13 +234,7 @@ _JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
 
 
 def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot) -> RigShape:
-    """Return a rig with the joints and the dimensions of a snapshot.
-
-    Args:
-        joints: their names.
-        measures: of the head.
-        snapshot: has the pose of the head.
-    """
+    """Return a rig with the joints and the dimensions of a snapshot."""
     x, _, z = measures.pivot_m
     pivot_m = snapshot.p_world_pivot_m
     above_base_m = pivot_m[2] if pivot_m is not None else snapshot.p_world_head_m[2] + z

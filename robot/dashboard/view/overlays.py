@@ -13,8 +13,7 @@ from gazerig.robot.dashboard.view.head_view import LidEdges
 from gazerig.robot.dashboard.view.scene_node import along, put, turned_up
 from gazerig.robot.description.build import SIDES
 from gazerig.robot.description.head_shape import EYE_RADIUS, measures_of, surface
-from gazerig.robot.description.mesh import Mesh, grid, lid, ring
-from gazerig.robot.description.paint import Colour
+from gazerig.robot.description.mesh import Colour, Mesh, grid, lid, ring
 from gazerig.robot.model.frames import quaternion
 from gazerig.robot.model.types import CommandedPose, Snapshot
 
@@ -28,13 +27,7 @@ class OverlayPanel:
         self._eyes = EyeFields(scene)
 
     def show(self, snapshot: Snapshot, layers: OverlayChoices, edges: LidEdges) -> None:
-        """Draw the selected layers and remove the others.
-
-        Args:
-            snapshot: of the rig.
-            layers: what is wanted.
-            edges: of the rig's lids.
-        """
+        """Draw the selected layers and remove the others."""
         self._commanded_pose.show(snapshot if layers.ghost else None, edges)
         self._camera.show(snapshot if layers.camera else None)
         self._eyes.show(snapshot if layers.eyes else None)
@@ -195,12 +188,7 @@ class CommandedPoseView:
         return _CommandedEye(side, ball, upper, lower)
 
     def show(self, snapshot: Snapshot | None, edges: LidEdges) -> None:
-        """Move the drawing to the desired pose; hide it if there is no snapshot or no such pose.
-
-        Args:
-            snapshot: of the rig.
-            edges: of its lids.
-        """
+        """Move the drawing to the desired pose; hide it if there is no snapshot or no such pose."""
         ghost = snapshot.commanded_pose if snapshot is not None else None
         self._frame.visible = ghost is not None
         if snapshot is not None and ghost is not None:

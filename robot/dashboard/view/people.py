@@ -8,8 +8,7 @@ import viser
 from gazerig.gaze.types import PARTS, Floats, Vec3
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glb, glow
 from gazerig.robot.dashboard.view.scene_node import along, put, turn_to
-from gazerig.robot.description.mesh import Mesh, cap, ring
-from gazerig.robot.description.paint import Colour
+from gazerig.robot.description.mesh import Colour, Mesh, cap, ring
 from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.description.person_shape import LOOKS, hand, head, torso
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M

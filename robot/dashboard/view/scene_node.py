@@ -42,12 +42,6 @@ def along(direction: Vec3) -> Quaternion:
     return _turned(atan2(y, x), -atan2(z, hypot(x, y)))
 
 
-def upright_along(direction: Vec3) -> Quaternion:
-    """Return the rotation of the z axis to a direction."""
-    x, y, z = direction
-    return _turned(atan2(y, x), atan2(hypot(x, y), z))
-
-
 def turned_up(angle_rad: float) -> Quaternion:
     """Return the rotation that raises the x axis by an angle."""
     return _turned(0.0, -angle_rad)

@@ -7,8 +7,7 @@ import viser
 
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, PLASTIC, SKIN, Finish, glb, textured_glb
 from gazerig.robot.dashboard.view.scene_node import put
-from gazerig.robot.description.mesh import smooth_normals
-from gazerig.robot.description.paint import Painted, merged
+from gazerig.robot.description.mesh import Painted, merged, smooth_normals
 from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
 
 _FINISHES: Mapping[WorldFinish, Finish] = {
@@ -32,12 +31,7 @@ class WorldView:
         self._moving: dict[str, viser.GlbHandle] = {}
 
     def show(self, shapes: WorldShapes, world_s: float) -> None:
-        """Move all objects to their poses at a time; draw a new world if it has changed.
-
-        Args:
-            shapes: of the world.
-            world_s: time since it began, seconds.
-        """
+        """Move all objects to their poses at a time; draw a new world if it has changed."""
         if self._shapes is None or shapes != self._shapes:
             self._build(shapes)
         poses = shapes.poses(world_s)

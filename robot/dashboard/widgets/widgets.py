@@ -199,7 +199,7 @@ class Client:
     def __init__(self, name: str, browser: str, wake: Callable[[], None]) -> None:
         self.name, self.browser = name, browser
         self._wake = wake
-        self._awake = False
+        self.awake = False  # waiting data is announced, and not taken yet
         # Number of an element -> its changed properties, None if it was removed.
         self.changes: dict[int, dict[str, object] | None] = {}
         self.images: set[int] = set()
@@ -208,13 +208,9 @@ class Client:
 
     def wake(self) -> None:
         """Announce waiting data, once until it is taken."""
-        if not self._awake:
-            self._awake = True
+        if not self.awake:
+            self.awake = True
             self._wake()
-
-    def taken(self) -> None:
-        """Record that the waiting data is being sent."""
-        self._awake = False
 
 
 class Widgets:
@@ -381,7 +377,7 @@ class Widgets:
     def outgoing(self, client: Client) -> Outgoing | None:
         """Return the next messages to a client, None if there are none."""
         with self._lock:
-            client.taken()
+            client.awake = False
             if self._held:  # the end of the block wakes it again
                 return None
             put, gone = [], []
