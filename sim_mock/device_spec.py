@@ -53,8 +53,21 @@ def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
     """
     specs: dict[int, ServoSpec] = {}
     for part in text.split(","):
-        ids, model, start = _read(part)
-        for servo_id in ids:
+        found = _PART.fullmatch(part.strip())
+        if found is None:
+            raise SetupError(f"--servos {part!r}: not IDS:MODEL, for example {EXAMPLE}")
+        first, last = int(found[1]), int(found[2] or found[1])
+        model, start = found[3].lower(), int(found[4] or MIDDLE)
+        if model in SERVOS and SERVOS[model].bus == "maestro":
+            raise SetupError(f"--servos {part!r}: a hobby servo needs a board: --maestro 12")
+        highest = _HIGHEST_ID[SERVOS[model].bus] if model in SERVOS else min(_HIGHEST_ID.values())
+        if not first <= last <= highest:
+            raise SetupError(f"--servos {part!r}: ids must increase, from 0 to {highest}")
+        if model not in SERVOS:
+            raise SetupError(
+                f"--servos {part!r}: unknown model; known models: {', '.join(_MODELS)}"
+            )
+        for servo_id in range(first, last + 1):
             if servo_id in specs:
                 raise SetupError(
                     f"--servos {part!r}: id {servo_id} is taken by a {specs[servo_id].model}; "
@@ -63,23 +76,6 @@ def parse_servos(text: str, firmware: int) -> tuple[ServoSpec, ...]:
             specs[servo_id] = ServoSpec(servo_id, model, start, firmware)
     _require_one_kind(specs.values())
     return tuple(specs.values())
-
-
-def _read(part: str) -> tuple[range, str, int]:
-    """Return the ids, the model and the start of one part."""
-    found = _PART.fullmatch(part.strip())
-    if found is None:
-        raise SetupError(f"--servos {part!r}: not IDS:MODEL, for example {EXAMPLE}")
-    first, last = int(found[1]), int(found[2] or found[1])
-    model, start = found[3].lower(), int(found[4] or MIDDLE)
-    if model in SERVOS and SERVOS[model].bus == "maestro":
-        raise SetupError(f"--servos {part!r}: a hobby servo needs a board: --maestro 12")
-    highest = _HIGHEST_ID[SERVOS[model].bus] if model in SERVOS else min(_HIGHEST_ID.values())
-    if not first <= last <= highest:
-        raise SetupError(f"--servos {part!r}: ids must increase, from 0 to {highest}")
-    if model not in SERVOS:
-        raise SetupError(f"--servos {part!r}: unknown model; known models: {', '.join(_MODELS)}")
-    return range(first, last + 1), model, start
 
 
 def _require_one_kind(specs: Iterable[ServoSpec]) -> None:

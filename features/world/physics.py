@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from gazerig.drivers.errors import SetupError
 from gazerig.errors import Error
 from gazerig.features.world.figure_model import PeoplePlacer
-from gazerig.features.world.hobby_shaft import WorldHobbyServo
 from gazerig.features.world.ideal_bus import IdealShaft
 from gazerig.features.world.model import WorldModel
-from gazerig.features.world.shaft import ShaftAxis, WorldShaft
+from gazerig.features.world.shaft import ShaftAxis, WorldHobbyServo, WorldShaft
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import Emulated, PluginLine, ShaftMakers, build
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec

@@ -18,7 +18,7 @@ from gazerig.features.world.world_spec import WorldSpec
 from gazerig.gaze.types import Vec3
 from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
-from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
+from gazerig.robot.description.world_shapes import WorldPart, WorldShapes
 from gazerig.robot.model.frames import Quaternion, quaternion
 
 _SKIN = ("head", "neck", "lips", "left_hand", "right_hand", "left_lid", "right_lid")
@@ -55,7 +55,12 @@ class SpecShapes(NamedTuple):
         return (
             *still_parts(model.mj, elsewhere, self.rig_joints),
             *heads,
-            *(WorldPart(name, shape, _finish(name), moves=True) for name, shape in moving.items()),
+            *(
+                WorldPart(
+                    name, shape, "skin" if name.split("/")[-1] in _SKIN else "cloth", moves=True
+                )
+                for name, shape in moving.items()
+            ),
         )
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
@@ -93,10 +98,6 @@ def script_shapes(figures: Figures) -> SpecShapes:
 
 def _no_body() -> tuple[str, Mapping[str, bytes]]:
     return "<mujoco/>", {}
-
-
-def _finish(segment: str) -> WorldFinish:
-    return "skin" if segment.rpartition("/")[2] in _SKIN else "cloth"
 
 
 class ShapesFrom(NamedTuple):

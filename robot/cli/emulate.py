@@ -15,14 +15,7 @@ from gazerig.robot.cli import emulate_options as options
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import clear_errors
 from gazerig.sim_mock.device_spec import CASES, EXAMPLE, line_of
-from gazerig.sim_mock.devices import (
-    BAUDS,
-    CHANNELS,
-    Emulated,
-    MaestroLine,
-    Pca9685Line,
-    PluginLine,
-)
+from gazerig.sim_mock.devices import BAUDS, CHANNELS, Emulated, MaestroLine, Pca9685Line, PluginLine
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import ServerSettings, run
 from gazerig.sim_mock.pty.server import say as say_line
@@ -120,11 +113,7 @@ def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
 
 
 def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
-    """Return a device at another baud rate, None for its own.
-
-    Raises:
-        SetupError: it does not know this rate.
-    """
+    """Return a device at another baud rate, None for its own."""
     if isinstance(device, PluginLine):
         return device
     known = BAUDS[device.kind]
@@ -137,11 +126,7 @@ def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
 
 
 def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSettings, ...]:
-    """Return every bus the choices that its kind knows.
-
-    Raises:
-        SetupError: one is no choice, or no device has its case.
-    """
+    """Return every bus the choices that its kind knows."""
     known = {case: None for bus in buses for case in CASES.get(bus.device.kind, {})}
     choices = {}
     for text in given:

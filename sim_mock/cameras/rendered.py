@@ -25,8 +25,7 @@ from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.scene_view import PinholeView, Rendered, SceneView
 from gazerig.sim_mock.cameras.canvas import Canvas
-from gazerig.sim_mock.cameras.draw_person import draw_arm_of, draw_person, draw_thing
-from gazerig.sim_mock.cameras.draw_room import draw_room
+from gazerig.sim_mock.cameras.draw_person import draw_arm_of, draw_person, draw_room, draw_thing
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,

@@ -92,7 +92,13 @@ class FilmCamera:
             CameraError: the film cannot be read any more.
         """
         while self._captured_s(self.frames + 1) + self._delay_s <= now_s:
-            self._look(self.frames + 1)
+            number = self.frames + 1
+            shot = self._orientation.upright(self._video.shot(number))
+            shot = shot._replace(captured_s=self._captured_s(number))
+            found = self._frames.look(shot)
+            self.frames += 1
+            self.frames_with_face += bool(found.faces)
+            self._newest = found
         return self._newest
 
     def retune(
@@ -116,12 +122,3 @@ class FilmCamera:
     def _captured_s(self, number: int) -> float:
         """Return the simulated time of a frame's exposure."""
         return self._start_s + self._video.due_s(number)
-
-    def _look(self, number: int) -> None:
-        """Find the faces and the motion of one frame."""
-        shot = self._orientation.upright(self._video.shot(number))
-        shot = shot._replace(captured_s=self._captured_s(number))
-        found = self._frames.look(shot)
-        self.frames += 1
-        self.frames_with_face += bool(found.faces)
-        self._newest = found

@@ -159,16 +159,13 @@ class ShaftMotion:
                 self.effort, self._integral, self.joint, self.volts = begun[4:8]
                 self.profile.restore(begun.profile)
             elif until < SPAN_MS:
-                self._span_start = self._state()
+                self._span_start = ShaftState(
+                    self.x, self.v, self._rv, self.u, self.effort, self._integral, self.joint,
+                    self.volts, self.profile.state(),
+                )  # fmt: skip
             self._advance(until)
             self._since_ms = until % SPAN_MS
             ticks -= until - since
-
-    def _state(self) -> ShaftState:
-        return ShaftState(
-            self.x, self.v, self._rv, self.u, self.effort, self._integral, self.joint, self.volts,
-            self.profile.state(),
-        )  # fmt: skip
 
     def _advance(self, ticks: int) -> None:
         """Advance by some milliseconds, in one map if possible, else one by one."""

@@ -58,7 +58,7 @@ from gazerig.sim_mock.scenes.script import (  # noqa: E402
 )
 
 if TYPE_CHECKING:
-    from gazerig.features.world.picture import WorldPicture
+    from gazerig.features.world.renderer import WorldPicture
 
 YUNET_FILE = TESTS.parents[1] / "shared" / "models" / "face_detection_yunet_2026may.onnx"
 AWAY_M = (0.6, 1.0, 1.5, 2.0, 2.5, 3.0)
@@ -158,7 +158,7 @@ def _played(script: SceneScript) -> "WorldPicture":
     from gazerig.features.world.figure import Figures
     from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.model import world_model
-    from gazerig.features.world.picture import WorldPicture
+    from gazerig.features.world.renderer import WorldPicture
 
     figures = Figures(script, 0)
     model = world_model(figures, ()).mj

@@ -64,7 +64,7 @@ class PosedPeople:
         from gazerig.features.world.figure import Figures
         from gazerig.features.world.figure_model import PeoplePlacer
         from gazerig.features.world.model import world_model
-        from gazerig.features.world.picture import WorldPicture
+        from gazerig.features.world.renderer import WorldPicture
 
         speaks = (Act(at_s=0.5, do="speak", for_s=_ROUND_S - 1.0),)
         people = {f"p{n}": PersonScript("front", n, acts=speaks) for n in looks}
@@ -275,7 +275,7 @@ def watch_motion(
     from gazerig.features.world.figure import Figures
     from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.model import world_model
-    from gazerig.features.world.picture import WorldPicture
+    from gazerig.features.world.renderer import WorldPicture
     from gazerig.features.world.world_scene import WorldScene
 
     scene = WorldScene("posed", Figures(script, 1))

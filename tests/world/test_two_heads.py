@@ -20,7 +20,7 @@ from gazerig.features.world.run.head_group import (
     has_other_heads,
     overload_message,
 )
-from gazerig.features.world.run.lockstep import Lockstep
+from gazerig.features.world.run.shared_world import Lockstep
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.interrupts import Interrupts

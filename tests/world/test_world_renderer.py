@@ -52,8 +52,7 @@ class Balls:
         p_world_base_m: Vec3 = ORIGIN,
     ) -> None:
         mujoco = import_mujoco()
-        from gazerig.features.world.picture import WorldPicture
-        from gazerig.features.world.renderer import RendererParams
+        from gazerig.features.world.renderer import RendererParams, WorldPicture
 
         bodies = "".join(
             f'<body mocap="true" pos="{x} {y} {z}"><geom type="sphere" size="{RADIUS_M}"'

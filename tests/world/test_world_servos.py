@@ -11,7 +11,7 @@ mujoco_or_skip()
 
 from gazerig.drivers.errors import SetupError  # noqa: E402
 from gazerig.features.world.physics import WorldUnstable  # noqa: E402
-from gazerig.robot.app import emulation  # noqa: E402
+from gazerig.robot.app import run_bus  # noqa: E402
 from gazerig.sim_mock.devices import PluginLine  # noqa: E402
 from gazerig.sim_mock.smart_servo.physics import Physics  # noqa: E402
 
@@ -216,7 +216,7 @@ def test_a_shaft_without_torque_turns_as_fast_as_its_viscous_friction_lets_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Dry friction takes .03 of the stall torque, the other half of it at no-load speed."""
-    monkeypatch.setattr(emulation, "Physics", partial(Physics, viscous_share=0.5))
+    monkeypatch.setattr(run_bus, "Physics", partial(Physics, viscous_share=0.5))
     bench = WorldBench("desk")
     for servo in bench.both("left_eye_pan"):
         servo.set_load(-0.05 * servo.model.stall_torque_nm)

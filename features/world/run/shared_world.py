@@ -1,17 +1,18 @@
 """A world with several heads: on one simulated clock, or in real time.
 
 In simulated time the world and all heads are in this process. Each head has a thread, and only one
-runs at a time (gazerig.features.world.run.lockstep): the same seed gives the same bytes on every
-bus. In real time the emulator's process has the world and the servos of all heads; each head's
-control loop uses its own terminals, on the host's clock.
+runs at a time: the one with the earliest next instant, and of equal ones the one with the lowest
+number. So the same seed gives the same bytes on every bus. In real time the emulator's process has
+the world and the servos of all heads; each head's control loop uses its own terminals, on the
+host's clock.
 """
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.world.run.lockstep import Lockstep
 from gazerig.features.world.run.poses import RigInState, SimulatedPoses, WorldPoses
 from gazerig.features.world.run.rig_room import RigRoom, served_room, simulated_room
 from gazerig.features.world.run.run_world import RunWorld, ServedRig
@@ -24,9 +25,83 @@ from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.description.head_shape import HeadMeasures
-from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 from gazerig.sim_mock.scenes.scene import Scene
+
+
+class Lockstep:
+    """A time that advances when all participants wait.
+
+    Args:
+        count: number of participants; each calls ``enter`` first and ``leave`` last.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._changed = threading.Condition()
+        self._due_s: list[float | None] = [0.0] * count
+        self._turn: int | None = 0
+        self._now_s = 0.0
+
+    def now_s(self) -> float:
+        """Return the time."""
+        return self._now_s
+
+    def clock(self, number: int) -> Clock:
+        """Return the clock of a participant."""
+        return _ParticipantClock(self, number)
+
+    def enter(self, number: int) -> None:
+        """Wait for the first turn of a participant."""
+        with self._changed:
+            self._await(number)
+
+    def wait(self, number: int, t_s: float) -> None:
+        """Let the other participants run until ``t_s``; return immediately if that is past."""
+        with self._changed:
+            if t_s <= self._now_s:
+                return
+            self._due_s[number] = t_s
+            self._hand_over()
+            self._await(number)
+
+    def leave(self, number: int) -> None:
+        """Let the other participants continue without this one; safe to call twice."""
+        with self._changed:
+            if self._due_s[number] is None:
+                return
+            self._due_s[number] = None
+            if self._turn == number:
+                self._hand_over()
+
+    def _await(self, number: int) -> None:
+        while self._turn != number:
+            self._changed.wait()
+
+    def _hand_over(self) -> None:
+        waiting = [(t_s, n) for n, t_s in enumerate(self._due_s) if t_s is not None]
+        if not waiting:
+            self._turn = None
+            return
+        t_s, self._turn = min(waiting)
+        self._now_s = max(self._now_s, t_s)
+        self._changed.notify_all()
+
+
+class _ParticipantClock:
+    """The clock of one participant."""
+
+    def __init__(self, shared: Lockstep, number: int) -> None:
+        self._shared, self._number = shared, number
+
+    def now_s(self) -> float:
+        """Return the time."""
+        return self._shared.now_s()
+
+    def sleep_until(self, t_s: float) -> None:
+        """Let the other participants run; return at ``t_s``."""
+        self._shared.wait(self._number, t_s)
+
 
 SceneOfHead = Callable[[Scene], Scene]
 

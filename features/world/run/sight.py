@@ -197,8 +197,7 @@ def world_view(
     """Return the renderer's view of a world."""
     model = spec.compiled()
     from gazerig.features.world.figure_model import PeoplePlacer
-    from gazerig.features.world.picture import WorldPicture
-    from gazerig.features.world.renderer import RendererParams
+    from gazerig.features.world.renderer import RendererParams, WorldPicture
 
     people = PeoplePlacer(model.mj, spec.figures) if spec.figures is not None else None
 
