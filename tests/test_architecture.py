@@ -46,7 +46,7 @@ OWNERS = {
     "typer": ("robot.cli.", "features.bringup.cli.", "features.study.cli.", "features.lab.cli."),
     "viser": ("robot.dashboard.",),
     "PIL": (
-        "features.bringup.calibration.charuco_page",
+        "features.bringup.calibration.charuco_views",
         "robot.dashboard.view.glb",
         "robot.description.gltf",
     ),
