@@ -119,7 +119,8 @@ def test_e65_a_head_in_flight_stops_where_it_can_and_not_behind_a_nearer_target(
 
 
 def test_e65_eyes_that_are_being_brought_back_do_not_take_the_head_to_the_next_target() -> None:
-    model = HeadModel(HeadParams(recentre_after_ms=300.0), radians(35.0), NECK, ROLL)
+    quick = HeadParams(recentre_after_ms=300.0, recentre_speed_deg_s=30.0, comfort_deg=8.0)
+    model = HeadModel(quick, radians(35.0), NECK, ROLL)
     yaws = [0.0]
     for k in range(400):
         t, first = k * 0.005, k < 260

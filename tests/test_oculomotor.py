@@ -138,7 +138,7 @@ def test_breathing_moves_the_head_and_not_the_gaze() -> None:
 
 
 def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
-    rig = Rig(head=HeadParams(goal_model="attention", recentre_after_ms=60_000.0))
+    rig = Rig()
     centre = scale(direction((radians(45.0), 0.0)), 1.0)
 
     def where(t: float) -> Target:

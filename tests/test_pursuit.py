@@ -7,7 +7,7 @@ import pytest
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale
 from gazerig.gaze.oculomotor.params import PursuitParams
-from gazerig.gaze.oculomotor.pursuit import Pursuit
+from gazerig.gaze.oculomotor.pursuit import Pursuit, sight
 from gazerig.gaze.types import Vec3
 
 DT = 0.005
@@ -116,3 +116,23 @@ def test_a_still_target_is_held_whatever_the_eye_centre_does() -> None:
 
 def test_no_time_no_motion() -> None:
     assert Pursuit(PursuitParams()).step(point(3.0), point(0.0), STILL, EYE, 0.0) == point(3.0)
+
+
+def catch_up(speed_deg_s: float, behind_deg: float, outruns: bool) -> float:
+    """Return the speed of a gaze that is behind a circling target; degrees."""
+    pursuit, gaze = Pursuit(PursuitParams()), point(-behind_deg)
+    now, v = circling(0.0, speed_deg_s)
+    moved = pursuit.follow(sight(gaze, EYE), sight(now, EYE), now, v, EYE, DT, True, outruns)
+    return (yaw(moved) - yaw(gaze)) / DT
+
+
+@pytest.mark.parametrize("speed", [5.0, 10.0, 30.0])
+def test_pursuit_does_not_outrun_a_target_to_catch_up(speed: float) -> None:
+    assert catch_up(speed, 1.5, False) == pytest.approx(speed, rel=0.01)
+    assert catch_up(speed, 1.5, True) > speed + 5.0
+    assert catch_up(speed, -1.5, False) < speed, "a gaze that is ahead waits"
+
+
+def test_a_slow_or_still_target_is_caught_up_with_freely() -> None:
+    assert catch_up(0.0, 1.0, False) == pytest.approx(catch_up(0.0, 1.0, True))
+    assert catch_up(1.0, 1.0, False) > 5.0

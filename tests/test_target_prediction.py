@@ -214,3 +214,19 @@ def test_cos_and_sin_of_an_ellipse_are_both_predicted() -> None:
         prediction.see(at(0.0, 0.0, t)._replace(p_world_m=place(t), v_world_m_s=v), EYE, FAST)
     moved = prediction.displacement(t + AGE_S)
     assert norm(sub(moved, sub(place(t + AGE_S), place(t)))) < 0.003
+
+
+def to_and_fro(hz: float, size: float = 0.1) -> Path:
+    """Return a path at one speed between two turns."""
+    return lambda t: 0.3 + size * 2.0 / pi * float(np.arcsin(sin(2.0 * pi * hz * t)))
+
+
+@pytest.mark.parametrize("hz", [0.4, 0.7, 1.2])
+def test_motion_at_one_speed_is_no_sine_and_never_outrun(hz: float) -> None:
+    path, prediction = to_and_fro(hz), TargetPrediction("periodic", 0.12, 0.3)
+    speed = 4.0 * hz * 0.1
+    for k in range(round(6.0 / FRAME_S)):
+        t = k * FRAME_S
+        prediction.see(target(path, t), EYE, FAST)
+        assert prediction.sine is None
+        assert norm(prediction.motion(t + AGE_S)[1]) <= 1.001 * speed

@@ -1,9 +1,10 @@
 """Idle gaze when there is no target: wait, search, then explore what is in view.
 
 A person who steps out of the frame often returns immediately, and a detector has gaps; so the gaze
-first stays. Then it searches: towards the side to which the person left, and around the place of
-the loss. With no person found it explores: one to two shifts of gaze per second, as people make in
-front of a scene, with an occasional rest straight ahead.
+first stays. Then it searches in steps: towards the side to which the person left, and around the
+place of the loss. From a far side it comes back in such steps as well. With no person found it
+explores: one to two shifts of gaze per second, as people make in front of a scene, with an
+occasional rest straight ahead.
 
 A glance goes to a thing in view, or to a recently seen one, or else to a plausible point. Shifts
 are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and more sideways than up or down,
@@ -54,9 +55,12 @@ class IdleParams:
     search_ms: Annotated[float, Bounds(0, 60000), "duration of the search for a lost target after that; 0: no search"] = 3000.0
     search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean duration of one fixation of the search"] = 600.0
     search_aside_deg: Annotated[float, Bounds(0, 90), "how far the search looks towards the side to which the target left"] = 18.0
+    search_step_deg: Annotated[float, Bounds(1, 90),
+        "mean size of the shifts of a search, and of those back from a far side; each a third smaller to a third larger"] = 15.0
     search_spread_deg: Annotated[float, Bounds(0, 45), "standard deviation of the search points, horizontally"] = 8.0
     leaving_deg_s: Annotated[float, Bounds(0.1, 100), "a target slower than this is not considered to have left to a side"] = 4.0
-    reach_deg: Annotated[float, Bounds(5, 180), "farthest search direction to the side, unless the target was farther"] = 70.0
+    reach_deg: Annotated[float, Bounds(5, 180),
+        "farthest search direction to the side; a lost target is looked after for one step more"] = 70.0
     rest_ms: Annotated[float, Bounds(200, 600_000), "mean time of a rest straight ahead between bouts of glances"] = 1500.0
     glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 750.0
     spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of all these durations"] = 0.6
@@ -169,7 +173,7 @@ class Idle:
             self._rest_now(t_s)
             return
         coast_s = min(max(0.0, t_s - gone.at_s), par.coast_ms / 1e3) if blind else 0.0
-        there = add(gone.p_world_m, scale(gone.v_world_m_s, coast_s))
+        there = self._reachable(add(gone.p_world_m, scale(gone.v_world_m_s, coast_s)))
         self._now = gone._replace(
             p_world_m=there,
             v_world_m_s=_STILL,
@@ -187,6 +191,8 @@ class Idle:
             self._now, self._until_s = self._resting(t_s), float("inf")
         elif self._gone is not None and t_s < self._search_until_s:
             self._search(self._gone, t_s, self._rng)
+        elif self._is_far_aside():
+            self._look_back(t_s, self._rng)
         elif self._now.kind == "rest" or (
             self._now.kind == "glance" and self._rng.random() < self._params.again_share
         ):
@@ -203,7 +209,7 @@ class Idle:
             self._until_s = t_s + self._time_s(self._params.rest_ms, self._rng)
 
     def _search(self, gone: Target, t_s: float, rng: np.random.Generator) -> None:
-        """Start a search fixation: first in the direction of the loss, then around."""
+        """Start a search fixation: first a step in the direction of the loss, then around."""
         par, first = self._params, self._now.kind != "search"
         rel = sub(gone.p_world_m, self._eye)
         out = self._heading(rel, gone.v_world_m_s)
@@ -213,14 +219,43 @@ class Idle:
         yaw, pitch = yaw_pitch(rel)
         to_yaw = yaw + share * out[0] + spread * float(rng.standard_normal())
         to_pitch = pitch + share * out[1] + 0.3 * spread * float(rng.standard_normal())
-        limit = max(radians(par.reach_deg), abs(yaw))
+        limit = radians(par.reach_deg)
+        here = yaw_pitch(sub(self._now.p_world_m, self._eye))[0]
+        step = self._step_rad(rng) * (1.0 if to_yaw >= here else -1.0)
+        if abs(here + step) > max(limit, abs(here)):
+            step = -step
         place = (
-            min(limit, max(-limit, to_yaw)),
+            here + step,
             min(radians(45.0), max(-radians(45.0), to_pitch)),
         )
         self._look("search", place, norm(rel), t_s, f"looking for {gone.kind} {gone.id}")
         until_s = t_s + self._time_s(par.search_fixation_ms, rng)
         self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
+
+    def _reachable(self, point: Vec3) -> Vec3:
+        """Return a point, brought to a step beyond the reach to the side if it is farther."""
+        rel, par = sub(point, self._eye), self._params
+        (yaw, pitch), most = yaw_pitch(rel), radians(par.reach_deg + par.search_step_deg)
+        if abs(yaw) <= most:
+            return point
+        return add(self._eye, scale(direction((most if yaw > 0.0 else -most, pitch)), norm(rel)))
+
+    def _step_rad(self, rng: np.random.Generator) -> float:
+        """Draw the size of a step of the search, or of one back."""
+        return radians(self._params.search_step_deg) * float(rng.uniform(2.0, 4.0)) / 3.0
+
+    def _is_far_aside(self) -> bool:
+        """Return whether a search has ended more than a step from straight ahead."""
+        yaw = yaw_pitch(sub(self._now.p_world_m, self._eye))[0]
+        return self._now.kind == "search" and abs(degrees(yaw)) > self._params.search_step_deg
+
+    def _look_back(self, t_s: float, rng: np.random.Generator) -> None:
+        """Take a step back from a far side."""
+        par, (yaw, pitch) = self._params, yaw_pitch(sub(self._now.p_world_m, self._eye))
+        back = self._step_rad(rng) * (-1.0 if yaw > 0.0 else 1.0)
+        place = yaw + back, 0.5 * pitch
+        self._look("search", place, par.rest_distance_m, t_s, "looking back from the side")
+        self._until_s = t_s + self._time_s(par.search_fixation_ms, rng)
 
     def _heading(self, rel: Vec3, v_world_m_s: Vec3) -> Angles2:
         """Return the yaw and pitch from the loss towards its heading; 0 for a target at rest."""

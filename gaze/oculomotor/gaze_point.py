@@ -182,8 +182,9 @@ class GazePoint:
             if shift_rad is None:
                 if dt_s > 0.0 and self._pursuit.controller is None:
                     closing = not (trigger.corrects or trigger.waits)
+                    known = self._prediction.sine is not None
                     self.point_m = self._pursuit.follow(
-                        gaze, there, point, velocity, p_head, dt_s, closing
+                        gaze, there, point, velocity, p_head, dt_s, closing, known
                     )
                 return None
         elif trigger.redirects(t_s):

@@ -9,14 +9,26 @@ All angles of a shift are measured along the great circle from the head's direct
 the head stops short of the target as seen from there and never passes it. The paper describes eq 7
 so in words ("30 deg short of the gaze direction"); an offset measured from straight ahead would
 turn a head that comes from 60 deg past a target at 25 deg.
+
+Equal shifts differ: slope, onset and duration scatter within bounds. The head stays where its law
+put it; when an eye has been eccentric for some random seconds, the head slowly brings it back.
+A target in sustained motion is pursued by the head too: each tick plans a minimum-jerk movement of
+.6 s to where the target will be soon. On a ramp this lags by .6 of that time, .36 s, less the .2 s
+of foresight; people's heads lag by .1 to .2 s. When the motion ends, the last plan is the brake.
 """
 
 from math import degrees, exp, hypot, radians
+
+import numpy as np
 
 from gazerig.gaze.angles import angle_between, direction, shortened, yaw_pitch
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
 from gazerig.gaze.types import Angles2, Angles3, Target, Vec3
+
+SEARCH = "search"
+OWN_LOOKS = ("glance", SEARCH, "rest")
+"""Kinds of targets that nothing seen has caused (gazerig.gaze.attention.idle)."""
 
 _LATERAL_RAD = radians(30.0)
 _LEAST_ROLL = 0.4
@@ -56,19 +68,21 @@ class HeadShare:
         full = radians(par.max_offset_deg) * (1.0 - interest(par, salience))
         return full if par.literal_reach else min(full, self.reach_rad)
 
-    def short_rad(self, salience: float, arc_rad: float) -> float:
+    def short_rad(self, salience: float, arc_rad: float, steeper: float = 0.0) -> float:
         """Return the angle by which the head stops short of a target.
 
         Args:
             salience: of the target.
             arc_rad: angle of the target from the head's direction at the start.
+            steeper: deviation of the slope in this shift.
         """
         par = self._params
         if par.goal_model == "attention":
             return self.offset_rad(salience)
         if par.goal_model == "align":
             return (1.0 - par.align) * self.trigger_rad
-        short = arc_rad - par.head_slope * max(0.0, arc_rad - self._half_range_rad)
+        slope = min(1.0, max(0.0, par.head_slope + steeper))
+        short = arc_rad - slope * max(0.0, arc_rad - self._half_range_rad)
         return min(short, self.reach_rad)
 
     def roll_rad(self, salience: float, yaw_rad: float) -> float:
@@ -86,20 +100,40 @@ _BRAKES_S = 0.12
 
 _ROUNDING_RAD = 1e-6
 _ROLLS_S = 0.5
+_FIRST_S = 0.01
+"""Mean lead of the head in looks of its own, so that it is first in half of them."""
+_MOST_SD, _MOST_DURATION_SD = 2.0, 1.5
+"""Bounds of the scatter, in standard deviations."""
+_PURSUES_S, _FORESEES_S = 0.6, 0.2
+"""Duration of a planned movement of pursuit, and how far ahead of now its goal is."""
+_MEAN_S = 1.0
+_FASTEST = 4.0
+"""Speeds above this multiple of the threshold count as that: it is not reached within .28 s."""
+_GOES_ON = 0.5
+"""Share of the threshold at which a pursuit ends."""
+_RELIEF = (0.25, 0.75)
+"""Eccentricity to which an eye is brought back, as a share of comfort_deg."""
 _SWINGS = 2.5
 """A movement lasting longer than this multiple of distance over speed swings past its goal."""
+
+
+def _bounded(rng: np.random.Generator, most: float) -> float:
+    """Draw a standard normal deviate within bounds."""
+    return min(most, max(-most, float(rng.standard_normal())))
 
 
 class HeadModel:
     """Start, goal and trajectory of the head's part of a gaze shift.
 
     share: the present share of the head
+    foresees_s: how far ahead the target's direction is given for pursuit; 0: not needed
 
     Args:
         params: constants of start, goal and motion.
         eye_limit_rad: the smallest limit of the eyes.
         neck_limit_rad: ((yaw low, high), (pitch low, high)) of the neck.
         roll_limit_rad: (low, high) of its roll; None without such a joint.
+        rng: random generator of the scatter and of recentring; None: neither is random.
     """
 
     def __init__(
@@ -108,7 +142,9 @@ class HeadModel:
         eye_limit_rad: float,
         neck_limit_rad: tuple[Angles2, Angles2],
         roll_limit_rad: Angles2 = _NO_ROLL,
+        rng: np.random.Generator | None = None,
     ) -> None:
+        self._rng = rng
         self.retune(params, eye_limit_rad, neck_limit_rad, roll_limit_rad)
         self.reset(0.0, (0.0, 0.0, 0.0))
 
@@ -125,6 +161,9 @@ class HeadModel:
         self.share = HeadShare(params, eye_limit_rad)
         self._comfort_rad = radians(params.comfort_deg)
         self._relief_rad = min(self._comfort_rad / 2.0, self.share.trigger_rad)
+        self._search_rad = radians(params.search_deg)
+        self._pursue_rad_s = radians(params.pursue_above_deg_s)
+        self.foresees_s = _FORESEES_S if params.pursue_above_deg_s > 0.0 else 0.0
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
         """Start at rest at the present head angles."""
@@ -134,7 +173,10 @@ class HeadModel:
         self._ends_s = t_s
         self._follows = False
         self._relieves = False
-        self._aside_since_s = t_s
+        self._aside_since_s = self._stepped_s = t_s
+        self._lead_s = self._speed_rad_s = 0.0
+        self._pursues = False
+        self._draw()
         self._level = head_rad[2] == 0.0
         self._start = self._goal_direction
         self._target: tuple[str, int] | None = None
@@ -176,9 +218,20 @@ class HeadModel:
         return self._reaching(target, facing_rad, facing_rad, short_rad, start)
 
     def leads_s(self, target: Target, eccentricity_rad: float) -> float:
-        """Return the time for which the eyes wait because the head goes first."""
-        first = target.top_down and eccentricity_rad >= self.share.trigger_rad
-        return self._params.lead_ms / 1e3 if first else 0.0
+        """Return the time for which the eyes wait because the head goes first.
+
+        Called once for each new target: the onset of the head is drawn here.
+        """
+        par = self._params
+        self._lead_s = par.lead_ms / 1e3 if target.top_down else -par.start_delay_ms / 1e3
+        if self._rng is not None and par.lead_spread_ms > 0.0:
+            self._lead_s += par.lead_spread_ms / 1e3 * _bounded(self._rng, _MOST_SD)
+            if target.kind in OWN_LOOKS:
+                self._lead_s += _FIRST_S
+            else:  # a reaction to something seen, whose time is drawn with it
+                self._lead_s = min(self._lead_s, par.lead_ms / 1e3)
+        first = target.top_down and eccentricity_rad >= self._trigger_rad(target)
+        return max(0.0, self._lead_s) if first else 0.0
 
     def step(
         self,
@@ -188,6 +241,7 @@ class HeadModel:
         eccentricity_rad: float,
         since_eye_onset_s: float,
         t_s: float,
+        soon_rad: Angles2 | None = None,
     ) -> Angles3:
         """Return the head's yaw, pitch and roll for this instant.
 
@@ -195,8 +249,13 @@ class HeadModel:
         gaze_rad: the same for the target point itself
         eccentricity_rad: angle of that point from the face's front
         since_eye_onset_s: time since the eyes started towards it, negative before
+        soon_rad: neck angles that will point the face at the centre ``foresees_s`` later; None: it
+            does not move
         """
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
+        soon_rad = facing_rad if soon_rad is None else soon_rad
+        if self._moves_on(facing_rad, soon_rad, since_eye_onset_s, t_s):
+            self._pursue(target, facing_rad, soon_rad, t_s)
         since_s = t_s - self._planned_s
         if since_s >= self._lasts_s:
             return self.in_range(self._goal)
@@ -216,35 +275,94 @@ class HeadModel:
         t_s: float,
     ) -> None:
         """Choose between turning to the target, recentring an eccentric eye, and rest."""
-        par, share = self._params, self.share
+        par, share, trigger_rad = self._params, self.share, self._trigger_rad(target)
         moving = t_s < self._ends_s
         if (target.kind, target.id) != self._target:
+            if self._target is None or target.id != self._target[1]:  # not a look past a face
+                self._speed_rad_s, self._pursues = 0.0, False
             self._target = target.kind, target.id
             self._aside_since_s = t_s
+            self._draw()
             self._start = self._facing(t_s) if moving else self._goal_direction
             # A reason that moved the eyes back from the target before it ends.
             self._follows, self._relieves = moving, False
         elif (
             not moving
             and self._start is not self._goal_direction
-            and angle_between(self._goal_direction, direction(facing)) < share.trigger_rad
+            and angle_between(self._goal_direction, direction(facing)) < trigger_rad
         ):
             self._start = self._goal_direction
         if eccentricity <= self._comfort_rad:
             self._aside_since_s = t_s
-        delay_ms = -par.lead_ms if target.top_down else par.start_delay_ms
-        if t_s - self._aside_since_s >= par.recentre_after_ms / 1e3 and not moving:
+        recentre_ms = par.recentre_after_ms + self._later * par.recentre_spread_ms
+        if t_s - self._aside_since_s >= recentre_ms / 1e3 and not moving:
             self._follows, self._relieves = False, True
-        elif eccentricity >= share.trigger_rad and since_onset >= delay_ms / 1e3 - 1e-9:
+        elif eccentricity >= trigger_rad and since_onset >= -self._lead_s - 1e-9:
             self._follows, self._relieves = True, False
         elif not moving:
             self._follows = self._relieves = False
         if self._relieves:
-            self._follow(target, facing, gaze, self._relief_rad, t_s)
+            relief_rad = min(self._relief * self._comfort_rad, share.trigger_rad)
+            self._follow(target, facing, gaze, relief_rad, t_s)
         elif self._follows:
             arc_rad = angle_between(self._start, direction(facing))
-            short_rad = share.short_rad(target.salience, arc_rad)
+            steeper = self._steeper * par.slope_spread
+            short_rad = share.short_rad(target.salience, arc_rad, steeper)
+            if target.kind == SEARCH:
+                short_rad = min(short_rad, self._search_rad)
             self._follow(target, facing, gaze, short_rad, t_s)
+
+    def _trigger_rad(self, target: Target) -> float:
+        """Return the eccentricity of a target from which the head joins in."""
+        if target.kind == SEARCH:
+            return min(self._search_rad, self.share.trigger_rad)
+        return self.share.trigger_rad
+
+    def _draw(self) -> None:
+        """Draw how this shift differs from equal ones, and when and how far an eye is brought back.
+
+        Deviates in standard deviations; the spreads are the present parameters'.
+        """
+        self._steeper = self._longer = self._later = 0.0
+        self._relief = 0.5
+        if (rng := self._rng) is not None:
+            self._steeper, self._longer = _bounded(rng, _MOST_SD), _bounded(rng, _MOST_DURATION_SD)
+            self._later, self._relief = (
+                float(rng.standard_exponential()),
+                float(rng.uniform(*_RELIEF)),
+            )
+
+    def _moves_on(self, facing: Angles2, soon: Angles2, since_onset: float, t_s: float) -> bool:
+        """Return whether the target is in sustained motion, which the head pursues."""
+        dt_s, self._stepped_s = t_s - self._stepped_s, t_s
+        least = self._pursue_rad_s
+        if least <= 0.0:
+            return False
+        speed = 0.0
+        if soon is not facing:
+            speed = angle_between(direction(facing), direction(soon)) / _FORESEES_S
+        kept = exp(-max(0.0, dt_s) / _MEAN_S)
+        self._speed_rad_s += (1.0 - kept) * (min(speed, _FASTEST * least) - self._speed_rad_s)
+        if since_onset < 0.0:
+            return False
+        self._pursues = self._speed_rad_s > (_GOES_ON * least if self._pursues else least)
+        return self._pursues
+
+    def _pursue(self, target: Target, facing: Angles2, soon: Angles2, t_s: float) -> None:
+        """Plan a movement to where the target will be soon, from the present one."""
+        low, high = self._roll
+        roll = min(max(self.share.roll_rad(target.salience, facing[0]), low), high)
+        yaw, pitch, _ = self.in_range((*soon, 0.0))
+        starts = [plan.at(t_s - self._planned_s) for plan in self._plans]
+        goal = yaw, pitch, roll
+        self._plans = tuple(
+            Quintic(start, end, _PURSUES_S) for start, end in zip(starts, goal, strict=True)
+        )
+        self._set_goal(goal)
+        self._start, self._level = self._goal_direction, True
+        self._follows = self._relieves = False
+        self._aside_since_s = t_s
+        self._planned_s, self._lasts_s, self._ends_s = t_s, _PURSUES_S, t_s + _PURSUES_S
 
     def _follow(
         self, target: Target, facing: Angles2, gaze: Angles2, short_rad: float, t_s: float
@@ -323,7 +441,8 @@ class HeadModel:
         peak = (4.0 / 3.0 * amplitude / 50.0 + 0.4) * par.base_speed_deg_s
         if self._relieves:
             peak = min(peak, par.recentre_speed_deg_s)
-        duration = max(1.875 * amplitude / peak, par.min_move_ms / 1e3)
+        longer = 1.0 + (0.0 if self._relieves else par.duration_spread * self._longer)
+        duration = max(longer * 1.875 * amplitude / peak, par.min_move_ms / 1e3)
         closing = yaw * yaw_rate + pitch * pitch_rate
         if closing > 0.0:
             duration = min(duration, max(_SWINGS * way * way / closing, _BRAKES_S))

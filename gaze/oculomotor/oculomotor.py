@@ -5,6 +5,7 @@ head during or after a gaze shift, planned or pushed, is compensated exactly (th
 reflex), and vergence follows from each eye's own geometry.
 """
 
+from math import radians
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +14,14 @@ from gazerig.gaze.angles import (
     add,
     angle_between,
     norm,
+    scale,
     sub,
     unit,
 )
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.gesture.animation import NO_OFFSET, PoseOffset
 from gazerig.gaze.gesture.breathing import Breathing
+from gazerig.gaze.gesture.sway import Sway
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.oculomotor.binocular import EyeGeometry
 from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint
@@ -44,9 +47,11 @@ from gazerig.gaze.types import (
 _AT_END = "at the end of its range"
 
 
-_Seen = tuple[Vec3, Vec3, Vec3, Vec3]
-"""The target at this tick: its point and velocity, the goal point of the head, and the vector from
-midway between the eyes to the first."""
+_Seen = tuple[Vec3, Vec3, Vec3, Vec3, bool]
+"""The target at this tick: its point and velocity, the goal point of the head, the vector from
+midway between the eyes to the first, and whether that goal point moves with it."""
+_SWING_RAD = radians(10.0)
+"""The head stays in the middle of smaller swings, and pursues larger ones."""
 
 
 class ReachableGaze(NamedTuple):
@@ -79,6 +84,7 @@ class Oculomotor:
         lids: the model of lids and blinks.
         breathing: sways the head; None: no breathing.
         rng: random generator of endpoints and re-fixations; None: without re-fixations.
+        sway: moves the head at random at rest; None: no sway.
 
     Raises:
         ValueError: endpoints scatter and rng is None.
@@ -95,6 +101,7 @@ class Oculomotor:
         lids: Lids,
         breathing: Breathing | None = None,
         rng: np.random.Generator | None = None,
+        sway: Sway | None = None,
     ) -> None:
         self._prediction = TargetPrediction("none", 0.0, 1.0)
         self._gaze = GazePoint(params, saccade, pursuit, self._prediction, rng)
@@ -103,7 +110,7 @@ class Oculomotor:
         self._pursuit = pursuit
         self._head = head
         self._lids = lids
-        self._breathing = breathing
+        self._breathing, self._sway = breathing, sway
         self._started = False
         self._base_rad: Angles2 = (0.0, 0.0)
 
@@ -132,6 +139,8 @@ class Oculomotor:
         self._lids.reset(t_s)
         if self._breathing is not None:
             self._breathing.reset(t_s)
+        if self._sway is not None:
+            self._sway.reset(t_s)
         self._prediction.reset()
         self._pursuit.reset()
         self._gaze.reset(t_s, _meeting_point(state))
@@ -154,7 +163,7 @@ class Oculomotor:
         if not self._started:
             self.reset(t_s, state)
         R_world_head, p_head = self._predict_head(state)
-        point, velocity, centre_point, toward = self._now(target, p_head, t_s)
+        point, velocity, centre_point, toward, moves = self._now(target, p_head, t_s)
         self._base_rad = base = state.base_rad
         facing = centre = self._geometry.facing(point, base)
         if centre_point is not point:
@@ -167,7 +176,11 @@ class Oculomotor:
             self._record_shift(target, aside_rad, off_rad, t_s)
         jumps = place.jumps
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
-        head = self._head.step(target, centre, facing, aside_rad, t_s - place.onset_s, t_s)
+        soon = None
+        if moves and (ahead_s := self._head.foresees_s) > 0.0:
+            soon = self._geometry.facing(add(centre_point, scale(velocity, ahead_s)), base)
+        since_s = t_s - place.onset_s
+        head = self._head.step(target, centre, facing, aside_rad, since_s, t_s, soon)
         wanted = eyes_on(place.point_m, R_world_head, p_head)
         if (controller := self._pursuit.controller) is not None:
             jumps = jumps or shift_rad is not None
@@ -271,11 +284,14 @@ class Oculomotor:
         return tuple(found)
 
     def _add_sway(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
-        """Return the head's angles with breathing and an offset, clipped to the neck's range."""
+        """Return the head's angles with breathing, sway and offset, clipped to the neck's range."""
         if self._breathing is not None:
             yaw, pitch, roll = self._breathing.step(t_s)
             head = head[0] + yaw, head[1] + pitch, head[2] + roll
-        elif offset == NO_OFFSET.head_rad:
+        if self._sway is not None:
+            yaw, pitch, roll = self._sway.step(t_s)
+            head = head[0] + yaw, head[1] + pitch, head[2] + roll
+        if self._breathing is None and self._sway is None and offset == NO_OFFSET.head_rad:
             return head
         return self._head.in_range((head[0] + offset[0], head[1] + offset[1], head[2] + offset[2]))
 
@@ -297,14 +313,19 @@ class Oculomotor:
         moved, velocity = prediction.motion(t_s)
         p, centre = target.p_world_m, target.centre_world_m
         point = self._gaze.clear(add(p, moved), p_head)
-        middle = prediction.to_middle
-        if middle is not None:
+        middle, toward, moves = (
+            prediction.to_middle,
+            sub(point, p_head),
+            norm(velocity) > MOVING_M_S,
+        )
+        if middle is not None and prediction.size_m <= _SWING_RAD * norm(toward):
+            moves = False
             head_point = self._gaze.clear(add(p if centre is None else centre, middle), p_head)
         elif centre is None:
             head_point = point
         else:
             head_point = self._gaze.clear(add(centre, moved), p_head)
-        return point, velocity, head_point, sub(point, p_head)
+        return point, velocity, head_point, toward, moves
 
 
 def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:

@@ -119,15 +119,27 @@ class HeadParams:
     literal_reach: Annotated[bool, "use max_offset_deg even if it exceeds the eyes' limit, as printed in the paper"] = False
     roll_deg: Annotated[float, Bounds(0, 20),
         "roll of the head, ear to the side that it turns to, at the highest interest for a target 30 deg or more aside; 0: none"] = 4.0
+    slope_spread: Annotated[float, Bounds(0, 0.4),
+        "standard deviation of head_slope from one shift to the next, never more than twice that; .16 between people"] = 0.1
     lead_ms: Annotated[float, Bounds(0, 100), "how long the head starts before the eyes, for top-down targets to which it turns"] = 0.0
+    lead_spread_ms: Annotated[float, Bounds(0, 200),
+        "standard deviation of both onsets; in looks of its own (glance, search, rest) the eyes wait for a head that is first, "
+        "as people's is in half of such shifts; in others it is never first"] = 30.0
     start_delay_ms: Annotated[float, Bounds(0, 1000), "how long the head starts after the eyes, for bottom-up targets"] = 20.0
     base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0: the peak speed of a head movement of A degrees is (4/3 A/50 + 0.4) V0"] = 70.0
+    duration_spread: Annotated[float, Bounds(0, 0.4),
+        "standard deviation over mean of the duration of equal head movements, never more than one and a half of that"] = 0.15
     min_move_ms: Annotated[float, Bounds(20, 5000), "shortest duration of a head movement; otherwise small ones would be twitches"] = 300.0
     replan_deg: Annotated[float, Bounds(0.05, 20), "a moving head plans its movement again when the goal changes by this much"] = 1.0
     recentre_after_ms: Annotated[float, Bounds(0, 60000),
-        "after an eye has been eccentric for this long, the head turns slowly to bring it back"] = 800.0
-    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 8.0
-    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it brings the eyes back"] = 30.0
+        "after an eye has been eccentric for this long at least, the head turns slowly to bring it back"] = 3000.0
+    recentre_spread_ms: Annotated[float, Bounds(0, 60000), "mean of a random time by which that is later (exponential)"] = 5000.0
+    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 12.0
+    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it brings the eyes back"] = 12.0
+    search_deg: Annotated[float, Bounds(0, 90),
+        "eccentricity at which the head leaves the eyes when they search for a lost person; 90: as in any shift"] = 6.0
+    pursue_above_deg_s: Annotated[float, Bounds(0, 100),
+        "the head pursues a target whose mean speed over the last second is above this; 0: never"] = 3.0
     # fmt: on
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ slower Kdiv for a receding target. Saccades close larger errors of direction.
 from math import exp, radians, sqrt
 from typing import NamedTuple, Protocol
 
-from gazerig.gaze.angles import perpendicular, scale, sub
+from gazerig.gaze.angles import dot, norm, perpendicular, scale, sub
 from gazerig.gaze.oculomotor.binocular import (
     BinocularController,
     EyeGeometry,
@@ -35,6 +35,8 @@ _PEAK_SHARE = 1.2
 """Largest peak speed of a followed swing, over the fastest pursuit: its ends compensate for the
 part cut off in its middle."""
 _NEAREST_M = 1.0 / _NEAREST_1_M
+_SLOW_RAD_S = radians(5.0)
+"""From no speed up to this, the gaze may outrun a target less and less to catch up with it."""
 
 
 class Slip(NamedTuple):
@@ -131,11 +133,14 @@ class Pursuit:
         eye: Vec3,
         dt_s: float,
         closing: bool,
+        outruns: bool = True,
     ) -> Vec3:
         """Return the result of ``step``, given both points as seen from the eye.
 
         gaze, now: gaze point and target as seen from ``eye``
         dt_s: above 0
+        outruns: whether a gaze that is behind may be faster than the target; False leaves the rest
+            to catch-up saccades, as people do unless they know the motion
         """
         par = self._params
         (x, y, z, near), (to_x, to_y, to_z, near_now) = gaze, now
@@ -155,9 +160,11 @@ class Pursuit:
             if size > most:
                 off_x, off_y, off_z = scale((off_x, off_y, off_z), most / size)
             share = 1.0 - exp(-par.gain_1_s * dt_s)
-            move_x += off_x * share
-            move_y += off_y * share
-            move_z += off_z * share
+            close = off_x * share, off_y * share, off_z * share
+            if not outruns:
+                way = to_x - was_x, to_y - was_y, to_z - was_z
+                close = _no_faster(close, way, 1.0 - par.velocity_gain, dt_s)
+            move_x, move_y, move_z = move_x + close[0], move_y + close[1], move_z + close[2]
             size = sqrt(move_x * move_x + move_y * move_y + move_z * move_z)
             most = self._max_rad_s * dt_s
             if size > most:
@@ -186,6 +193,19 @@ class Pursuit:
             share = self._max_rad_s / size
             x, y, z = x * share, y * share, z * share
         return (x * gain, y * gain, z * gain)
+
+
+def _no_faster(close: Vec3, way: Vec3, least: float, dt_s: float) -> Vec3:
+    """Return the closing of an error, not faster along a target's motion than what it lacks.
+
+    close: of this step; way: the target's motion in it; least: share of that motion which pursuit
+    leaves; a slow target is caught up with freely
+    """
+    size = norm(way)
+    along = dot(close, way) / size if size > 0.0 else 0.0
+    free = max(0.0, 1.0 - size / (_SLOW_RAD_S * dt_s))
+    most = max(least * size, free * along)
+    return close if along <= most else sub(close, scale(way, (along - most) / size))
 
 
 def sight(point: Vec3, eye: Vec3) -> Sight:

@@ -17,6 +17,8 @@ from gazerig.params import Bounds
 
 _FLANK_PEAK_ACCELERATION = 1.5396
 """Highest acceleration of half a minimum-jerk movement, times its time, over its speed."""
+_HURRY = 0.75
+"""Shortest rise over that in which the servos reach the peak of people at their acceleration."""
 _LITERAL_REST_RAD = radians(0.05)
 """Remaining distance at which a saccade of the 0.8-per-frame rule counts as landed."""
 
@@ -32,7 +34,7 @@ class SaccadeParams:
     max_speed_deg_s: Annotated[float, Bounds(10, 1000), "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s"] = 500.0
     min_duration_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
     max_acceleration_deg_s2: Annotated[float, Bounds(100, 200_000),
-        "highest acceleration that the eye servos follow; human and main_sequence saccades that need more take longer"] = 38000.0
+        "highest acceleration that the eye servos follow; human and main_sequence saccades that need more take longer"] = 44000.0
     human_base_ms: Annotated[float, Bounds(1, 200), "human, main_sequence: duration at amplitude 0"] = 25.0
     human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "human, main_sequence: increase of the duration with amplitude"] = 2.5
     human_peak_deg_s: Annotated[float, Bounds(10, 1000), "human: peak speed V of large saccades, V (1 - exp(-A / A0))"] = 530.0
@@ -103,10 +105,12 @@ class HumanProfile:
     human_peak_deg_s (1 - exp(-A / human_peak_scale_deg)), as one source measured them.
 
     The speed rises like the first half of a minimum-jerk movement, stays at its peak for a while,
-    and falls like the second half. Rise and fall share their time .38 to .62 up to 10 deg and .14
-    to .86 from 38 deg on; the time at the peak follows from the ratio of peak to mean speed. Its
-    middle is then at .42 of the duration of small saccades and at .25 of large ones: the values of
-    Collewijn et al. (1988), minus the delay of servos.
+    and falls like the second half. The rise has .25 of the time of rise and fall up to 10 deg and
+    .11 from 38 deg on; the time at the peak follows from the ratio of peak to mean speed. A shaft
+    lags most while it accelerates: on it the middle of the peak is at .45 of a saccade of 10 deg
+    and at .39 of one of 20, as in people (Collewijn et al. 1988). So short a rise costs a saccade
+    of 20 deg a tenth of its time. Servos that would lose more than that rise for longer, for .38
+    and .14 of that time at most.
     """
 
     def __init__(self, params: SaccadeParams) -> None:
@@ -143,7 +147,7 @@ class HumanProfile:
         D = max(D, par.device_floor_ms / 1e3)
         if A <= 0.0:
             return D, 0.0, 0.5 * D, D
-        share = self._rise_share(A)
+        share = self._rise_share(A, self._peak_rad_s(A, D), D)
         # A = V (flanks / 1.875 + cruise), flanks + cruise = D. Without a cruise, the speed at the
         # highest acceleration:
         reached = sqrt(PEAK_SPEED * A * most * share / _FLANK_PEAK_ACCELERATION)
@@ -155,10 +159,14 @@ class HumanProfile:
         flanks = (V * D - A) / (V * (1.0 - 1.0 / PEAK_SPEED))
         return D, V, flanks * share, flanks
 
-    def _rise_share(self, amplitude_rad: float) -> float:
+    def _rise_share(self, amplitude_rad: float, peak_rad_s: float, duration_s: float) -> float:
         """Return the share of the rise in the time of rise and fall."""
-        over = (degrees(amplitude_rad) - 10.0) / 28.0
-        return 0.38 - 0.24 * min(1.0, max(0.0, over))
+        over = min(1.0, max(0.0, (degrees(amplitude_rad) - 10.0) / 28.0))
+        flanks = (peak_rad_s * duration_s - amplitude_rad) / (1.0 - 1.0 / PEAK_SPEED)
+        if flanks <= 0.0:
+            return 0.38 - 0.24 * over
+        needed = _FLANK_PEAK_ACCELERATION * peak_rad_s * peak_rad_s / (self._most_rad_s2 * flanks)
+        return min(0.38 - 0.24 * over, max(0.25 - 0.14 * over, _HURRY * needed))
 
     def _peak_rad_s(self, amplitude_rad: float, duration_s: float) -> float:
         """Return the peak speed of people at an amplitude."""

@@ -34,6 +34,11 @@ _LEAST_M = 0.015
 """Least amplitude of a predicted swing."""
 _FITS, _STILL_FITS = 0.2, 0.35
 """Largest deviation from the sine, as a share of its effective value, to begin and to continue."""
+_HARMONIC = 0.07
+"""Largest third harmonic of a swing, as a share of it; that of a motion to and fro at one speed is
+a ninth, and a sine would be ahead of that."""
+_FASTEST_IN_S = 0.5
+"""Time of the past whose highest speed no extrapolated speed exceeds."""
 _FITTED_FOR_S = 0.09
 """Interval of fits to a swing, which is every third frame."""
 _SPARSE = 4
@@ -136,7 +141,7 @@ class TargetPrediction:
         self._at_s, self._p, self._v = at_s, p, v
         self._share = 1.0
         self._fastest_m_s = fastest_rad_s * norm(sub(p, eye))
-        self._most_m_s = max(norm(v), self._fastest_m_s)
+        self._most_m_s = norm(v)
         if self._model != "periodic" or target.id < 0:
             self._bend, self.sine = _STILL, None
             return
@@ -145,6 +150,8 @@ class TargetPrediction:
         while past[0][0] < at_s - _WINDOWS_S[-1]:
             past.popleft()
         self._bend = self._slope()
+        recent = (seen[4:] for seen in reversed(past) if seen[0] > at_s - _FASTEST_IN_S)
+        self._most_m_s = max(map(norm, recent))
         self.sine = sine = self._recognise(p, at_s)
         if sine is not None:
             most_m_s = fastest_rad_s * norm(sub(sine.middle, eye))
@@ -170,6 +177,11 @@ class TargetPrediction:
         """Return the vector from the target's position in its frame to the middle of its swing."""
         return None if self.sine is None else scale(self.sine.offset(self._at_s), -1.0)
 
+    @property
+    def size_m(self) -> float:
+        """Return the amplitude of the recognised swing, 0 without one."""
+        return 0.0 if self.sine is None else self.sine.size_m
+
     def _displacement_at(self, age_s: float) -> Vec3:
         """Return the displacement an age after the frame."""
         sine = self.sine
@@ -191,7 +203,7 @@ class TargetPrediction:
         bent = min(age_s, _BENDS_S)
         (x, y, z), (a, b, c) = self._v, self._bend
         speed = x + a * bent, y + b * bent, z + c * bent
-        # An extrapolated change of speed does not exceed the present speed, or that of the eyes.
+        # No extrapolated change makes the target faster than it has been.
         return _shorten(speed, self._most_m_s)
 
     def _slope(self) -> Vec3:
@@ -287,6 +299,10 @@ def fit_sine(past: Floats, at_s: float, limit: float) -> Sine | None:
     rest = p - base @ x
     off = float((rest * rest).sum()) / n
     if swing < _LEAST_M * _LEAST_M or off > limit * limit * 0.5 * swing:
+        return None
+    third = np.column_stack((np.cos(3.0 * w * t), np.sin(3.0 * w * t)))
+    x3 = np.linalg.solve(third.T @ third, third.T @ rest)
+    if float((x3**2).sum()) > _HARMONIC * _HARMONIC * swing:
         return None
     m, c, s = ((row[0], row[1], row[2]) for row in x.tolist())
     return Sine(at_s, w, m, c, s)

@@ -24,6 +24,8 @@ WANTED = {
     "scenes, peak inside its band, share": (0.75, 1.0),
     "time of the peak less people's, up to 10 deg, median": (-0.08, 0.08),
     "time of the peak, 18-30 deg": (0.25, 0.47),
+    "time of the peak, 10 deg": (0.42, 0.48),
+    "time of the peak, 20 deg": (0.36, 0.42),
 }
 
 
@@ -33,6 +35,12 @@ def inside(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     fast = (people.slowest_peak(size) <= peak) & (peak <= people.fastest_peak(size))
     long = (people.shortest_ms(size) <= ms) & (ms <= people.longest_ms(size))
     return fast, long
+
+
+def peak_time(size_deg: float) -> float:
+    """Return the time of the peak on the true shaft, a mean over sizes within a degree."""
+    near = [size_deg + off for off in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    return float(np.mean([one.timing()[2] for one in steps("desk", near)]))
 
 
 def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
@@ -56,4 +64,5 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
             np.median(small[:, 3] - people.peak_at(small[:, 0]))
         ),
         "time of the peak, 18-30 deg": float(np.median(large[:, 3])),
+        **{f"time of the peak, {size:g} deg": peak_time(size) for size in (10.0, 20.0)},
     }

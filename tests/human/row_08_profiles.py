@@ -17,6 +17,8 @@ WANTED = {
     "rows of docs/profiles.md that are not true": (0.0, 0.0),
     "nakamoto: mean rest on a part, s": (0.253, 0.294),
     "nakamoto: largest eye angle at rest, deg": (10.0, 20.1),
+    "nakamoto: largest measured eye angle, deg": (10.0, 20.0),
+    "mitake: visitor's face, share of the time that it is there": (0.75, 1.0),
     "nakamoto: targets other than faces, %": (0.0, 0.0),
     "nakamoto: blinks a minute": (12.0, 24.0),
     "mitake: blinks a minute": (0.0, 0.0),
@@ -40,6 +42,15 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "nakamoto: largest eye angle at rest, deg": max(
             float(np.abs(one.eyes_goal_deg[_rests(one)]).max()) for one in nakamoto
         ),
+        "nakamoto: largest measured eye angle, deg": float(
+            max(
+                np.abs(one.eyes_deg).max()
+                for one in (*nakamoto, *_visits(run, "nakamoto", seconds, seeds))
+            )
+        ),
+        "mitake: visitor's face, share of the time that it is there": float(
+            np.mean([_on_face(one) for one in _visits(run, "mitake", seconds, seeds)])
+        ),
         "nakamoto: shifts on the face, 1/s": 1.0 / float(np.mean([v.seconds for v in found])),
         "nakamoto: largest eye angle in flight, deg": float(
             max(np.abs(one.eyes_goal_deg).max() for one in nakamoto)
@@ -49,6 +60,18 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "mitake: blinks a minute": _blinks(mitake),
         "mitake: looks away and around, %": _elsewhere(mitake),
     }
+
+
+def _visits(run: Runner, profile: str, seconds: float, seeds: Sequence[int]) -> list[MeasuredRun]:
+    return [run("visitor", profile, seed=seed, seconds=seconds) for seed in seeds]
+
+
+def _on_face(one: MeasuredRun) -> float:
+    """Return the share of time on the face while it is within reach of the head, 60 deg aside."""
+    there = (one.truth["face 0"][:, 0] > 0.3) & (np.abs(one.truth_deg("face 0")[:, 0]) < 60.0)
+    on = np.array([name.startswith("face") for name in one.target_name])
+    off = np.linalg.norm(one.gaze_deg - one.truth_deg("face 0"), axis=1)
+    return float((on & (off < 6.0))[there].mean())
 
 
 def _rests(one: MeasuredRun) -> np.ndarray:

@@ -1,0 +1,117 @@
+"""No two movements of the head are equal: goal, onset and duration scatter within bounds.
+
+Things in turn 40 deg to the left, ahead, 40 deg to the right and ahead, each as it was before. The
+slope of people's heads is .77 +- .16 (Stahl 1999); in a natural task of 27 to 57 deg the head went
+first in 48 % of the shifts, with the eye in 37 %, after it in 15 %. Onsets are those of the plan
+(phase "saccade", and 1 % of the head's way): servos hide both alike.
+"""
+
+from collections.abc import Sequence
+from math import cos, radians, sin
+
+import numpy as np
+from human.measured_run import MeasuredRun, Runner
+from human.row_16_idle import FURNISHED
+
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+
+_YAWS = (40, 0, -40, 0)
+_EACH_S, _TURNED_S = 2.5, 0.9
+_EYES_M: Vec3 = (0.04, 0.0, 0.13)
+_TOGETHER_S = 0.008
+_FREE_DEG = 17.9
+_KINDS = ("glance", "search", "rest", "light")
+
+WANTED = {
+    "equal looks: slope of the head, standard deviation": (0.05, 0.16),
+    "equal looks: slope of the head, farthest from the mean": (0.08, 0.35),
+    "equal looks: duration, coefficient of variation": (0.05, 0.35),
+    "equal looks: head less eye onset, standard deviation, ms": (10.0, 80.0),
+    "natural shifts: head first, %": (35.0, 60.0),
+    "natural shifts: eye first, %": (5.0, 45.0),
+}
+
+
+class EqualLights:
+    """The same thing at the same places, to both sides."""
+
+    name = "equal-lights"
+    round_s = _EACH_S * len(_YAWS)
+    behaviours: tuple[str, ...] = ()
+
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        """Return no one."""
+        return ()
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        """Return the one that is lit."""
+        number = int(t_s / _EACH_S)
+        yaw, (x, y, z) = radians(_YAWS[number % len(_YAWS)]), _EYES_M
+        return (Thing(number, "light", (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z), 0.05),)
+
+    def events(self) -> tuple[Event, ...]:
+        """Return none."""
+        return ()
+
+
+SCENE = EqualLights()
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return how the figures of equal looks scatter, and who goes first in natural ones."""
+    lit = {
+        "gaze.top_down.rules.wait.look_at": "light",
+        "camera.horizontal_field_deg": 140.0,  # so that far ones are seen
+    }
+    equal = np.concatenate(
+        [_shifts(run(SCENE, seed=n, seconds=seconds, overrides=lit)) for n in seeds]
+    )
+    natural = np.concatenate([_shifts(run(FURNISHED, seed=n, seconds=seconds)) for n in seeds])
+    out = equal[equal[:, 0] > _FREE_DEG + 8.0]
+    slopes = out[:, 1] / (out[:, 0] - _FREE_DEG)
+    lag = natural[np.isfinite(natural[:, 3]), 3]
+    return {
+        "equal looks: slope of the head, standard deviation": float(slopes.std()),
+        "equal looks: slope of the head, farthest from the mean": float(
+            np.abs(slopes - slopes.mean()).max()
+        ),
+        "equal looks: duration, coefficient of variation": float(
+            np.nanstd(out[:, 2]) / np.nanmean(out[:, 2])
+        ),
+        "equal looks: head less eye onset, standard deviation, ms": 1e3
+        * float(np.nanstd(out[:, 3])),
+        "natural shifts: head first, %": 100.0 * float((lag < -_TOGETHER_S).mean()),
+        "natural shifts: eye first, %": 100.0 * float((lag > _TOGETHER_S).mean()),
+        "natural shifts": float(len(lag)),
+        "equal looks: slope of the head, mean": float(slopes.mean()),
+        "equal looks": float(len(out)),
+    }
+
+
+def _shifts(one: MeasuredRun) -> np.ndarray:
+    """Return (n, 4) arc, head turned, seconds of the head, head less eye onset (nan: none)."""
+    rows, t, goal = [], one.t_s, one.head_goal_deg[:, 0]
+    flying = one.phase == "saccade"
+    for k in np.flatnonzero(np.diff(one.shift)) + 1:
+        done = np.searchsorted(t, t[k] + _TURNED_S)
+        if done >= len(t) or (np.diff(one.shift[k:done]) > 0).any():
+            continue
+        if one.target_name[k].split()[0] not in _KINDS:
+            continue
+        before = np.searchsorted(t, t[k] - 0.1)
+        if abs(goal[k] - goal[before]) > 0.3:
+            continue
+        turned = abs(goal[done] - goal[k])
+        if turned < 3.0:
+            continue
+        share = np.abs(goal[k:done] - goal[k]) / turned
+        begins, ends = np.argmax(share > 0.01), np.argmax(share > 0.97)
+        jump = np.argmax(flying[k:done])
+        lag = t[k + begins] - t[k + jump] - _LAW_S if flying[k:done].any() else np.nan
+        rows.append((abs(one.target_deg[k, 0] - goal[k]), turned, t[k + ends] - t[k + begins], lag))
+    return np.array(rows).reshape(-1, 4)
+
+
+_LAW_S = 0.05
+"""Time in which a movement by minimum jerk covers 1 % of its way: a tenth of .5 s."""
