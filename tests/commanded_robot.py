@@ -11,6 +11,7 @@ from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Command
+from gazerig.robot.model.reply import CommandReply
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 
@@ -33,6 +34,14 @@ class Running:
             self.ticks.append,
         )
         return self.ticks[began:]
+
+    def do(self, command: Command, seconds: float = 0.006) -> tuple[CommandReply, list[Tick]]:
+        """Ask and run on; give the reply and the new ticks."""
+        ticket = self.made.robot.command(command)
+        ticks = self.go(seconds)
+        reply = ticket.wait(0.0)
+        assert reply is not None
+        return reply, ticks
 
     def order(self, order: Command) -> None:
         """Ask."""

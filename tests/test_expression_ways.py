@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 
 import pytest
-from ticked_rig import TickedRig, connected, gazerig
+from ticked_rig import Outbox, TickedRig, connected, gazerig
 
 from gazerig.robot.cli import animation
 from gazerig.robot.dashboard.panels.controls import AnimationPanel
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
-from gazerig.robot.model.commands import Command, Express, SetLevel
+from gazerig.robot.model.commands import Express, SetLevel
 
 
 @pytest.fixture
@@ -43,14 +43,8 @@ def test_levels_come_from_standard_input(rig: TickedRig) -> None:
 
 
 def test_buttons_and_strength_on_the_page() -> None:
-    asked: list[tuple[Command, str]] = []
-
-    class Outbox:
-        def command(self, command: Command, who: str) -> bool:
-            asked.append((command, who))
-            return True
-
-    panel = AnimationPanel(Widgets().panel("steer"), Outbox())  # type: ignore[arg-type]
+    outbox = Outbox()
+    panel = AnimationPanel(Widgets().panel("steer"), outbox)  # type: ignore[arg-type]
     panel.offer(["sad", "neutral", "happy"])
     panel.offer(["happy", "neutral", "sad"])
     expressions, strength = panel.expressions, panel.strength
@@ -58,4 +52,4 @@ def test_buttons_and_strength_on_the_page() -> None:
     assert expressions.options == ("neutral", "happy", "sad")
     strength.arrived(0.4, "5")
     expressions.arrived("sad", "5")
-    assert asked == [(Express("sad", 0.4), "5")]
+    assert outbox.asked == [(Express("sad", 0.4), "5")]

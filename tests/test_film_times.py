@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from fakes.films import write_film
 from hypothesis import given
 from hypothesis import strategies as st
 from present import present
@@ -20,14 +21,6 @@ from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 UNEVEN = (0, 1, 2, 6, 7, 8, 12, 13, 14, 20, 21, 22, 23, 30, 31, 32, 40, 41, 42, 43)
-
-
-def write_film(path, length=20, rate_hz=30.0, fourcc="mp4v", size=(64, 48)):
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*fourcc), rate_hz, size)
-    for k in range(length):
-        writer.write(np.full((size[1], size[0], 3), 12 * k % 256, np.uint8))
-    writer.release()
-    return path
 
 
 def retimed(source, path, ticks, rate_hz=30.0):
@@ -53,7 +46,7 @@ def retimed(source, path, ticks, rate_hz=30.0):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("times")
-    write_film(folder / "plain.mp4")
+    write_film(folder / "plain.mp4", 20, 30.0, grey=12, fourcc="mp4v")
     return folder
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
-from ticked_rig import TickedRig, connected, gazerig
+from ticked_rig import Outbox, TickedRig, connected, gazerig
 
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import changed
@@ -16,7 +16,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.dashboard.panels.controls import AnimationPanel
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.command_json import as_json, as_recorded, check, from_json, from_recording
-from gazerig.robot.model.commands import Ask, Command, Jog, Play, Resume, Stop
+from gazerig.robot.model.commands import Ask, Jog, Play, Resume, Stop
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -90,14 +90,8 @@ def test_the_command_is_data() -> None:
 
 
 def test_buttons_and_speed_on_the_page() -> None:
-    asked: list[tuple[Command, str]] = []
-
-    class Outbox:
-        def command(self, command: Command, who: str) -> bool:
-            asked.append((command, who))
-            return True
-
-    panel = AnimationPanel(Widgets().panel("steer"), Outbox())  # type: ignore[arg-type]
+    outbox = Outbox()
+    panel = AnimationPanel(Widgets().panel("steer"), outbox)  # type: ignore[arg-type]
     panel.offer_gestures(["tilt", "none", "nod"])
     gestures, speed = panel.gestures, panel.speed
     assert gestures is not None and speed is not None
@@ -105,7 +99,7 @@ def test_buttons_and_speed_on_the_page() -> None:
     speed.arrived(1.5, "5")
     for chosen in ("nod", "none"):
         gestures.arrived(chosen, "5")
-    assert asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
+    assert outbox.asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
 
 
 def looked_at(kind: str, number: int = 1) -> Target:

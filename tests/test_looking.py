@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commanded_robot import Running, running_desk
 
-from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
-from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose
 from gazerig.robot.app.session import run as run_session
-from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.command_json import as_json, check, from_json
 from gazerig.robot.model.commands import (
     Command,
@@ -29,44 +27,15 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.lead import ARRIVED_RAD
 from gazerig.robot.model.leader import NOBODY_LEADS
-from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.recording.read import RunRecording
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
-class Simulated:
-    """A rig in simulated time that ticks on when asked."""
-
-    def __init__(self, made: Assembly) -> None:
-        self.made = made
-
-    def go(self, seconds: float) -> list[Tick]:
-        ticks: list[Tick] = []
-        over = lambda s: "seconds" if s >= seconds else None  # noqa: E731
-        run(self.made.robot, self.made.clock, self.made.loop, over, ticks.append)
-        return ticks
-
-    def do(self, command: Command, seconds: float = 0.006) -> tuple[CommandReply, list[Tick]]:
-        ticket = self.made.robot.command(command)
-        ticks = self.go(seconds)
-        reply = ticket.wait(0.0)
-        assert reply is not None
-        return reply, ticks
-
-
 @pytest.fixture
-def rig() -> Iterator[Simulated]:
-    options = RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
-    made = assemble(load_rig("desk"), options)
-    made.robot.start(made.clock)
-    try:
-        rig = Simulated(made)
-        rig.go(2.0)
-        yield rig
-    finally:
-        made.robot.stop()
-        made.close()
+def rig() -> Iterator[Running]:
+    with running_desk() as running:
+        yield running
 
 
 LOOKS: list[Command] = [
@@ -110,7 +79,7 @@ def test_what_cannot_be_looked_at_is_refused_with_the_rule(data: Any, words: str
         from_json(data)
 
 
-def test_a_point_of_the_head_is_where_the_head_had_it(rig: Simulated) -> None:
+def test_a_point_of_the_head_is_where_the_head_had_it(rig: Running) -> None:
     before = rig.go(0.006)[-1].pose
     reply, ticks = rig.do(LookAtInHead((1.2, 0.3, 0.1), stay=True), 1.5)
     assert reply.asked_m is not None
@@ -122,7 +91,7 @@ def test_a_point_of_the_head_is_where_the_head_had_it(rig: Simulated) -> None:
 
 
 @pytest.mark.parametrize("frame", ["world", "head"])
-def test_a_direction_is_looked_in(rig: Simulated, frame: Any) -> None:
+def test_a_direction_is_looked_in(rig: Running, frame: Any) -> None:
     rig.do(Jog((("neck_yaw", radians(15.0)),), stay=True), 2.0)
     before = rig.go(0.006)[-1].pose
     asked = (radians(10.0), radians(-5.0))
@@ -135,7 +104,7 @@ def test_a_direction_is_looked_in(rig: Simulated, frame: Any) -> None:
     assert ticks[-1].lead.arrived
 
 
-def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Simulated) -> None:
+def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Running) -> None:
     percept = rig.go(0.006)[-1].percept
     assert percept is not None
     person = percept.faces[0].id
@@ -146,7 +115,7 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Simulated) -> N
     assert ticks[-1].lead.arrived and ticks[-1].led == f"a client: look at person {person}"
 
 
-def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Simulated) -> None:
+def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Running) -> None:
     assert rig.do(LookAtPerson(99))[0].refused.startswith("no person 99 is seen now; there is ")
     percept = rig.go(0.006)[-1].percept
     assert percept is not None
@@ -158,7 +127,7 @@ def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Simulat
     assert ticks[-1].lead.ended == f"person {percept.faces[0].id} is gone"
 
 
-def test_a_pixel_is_where_it_was_when_the_frame_was_taken(rig: Simulated) -> None:
+def test_a_pixel_is_where_it_was_when_the_frame_was_taken(rig: Running) -> None:
     tick = rig.go(0.006)[-1]
     found = tick.detections
     assert found is not None and tick.percept is not None
@@ -178,14 +147,14 @@ def test_a_pixel_is_where_it_was_when_the_frame_was_taken(rig: Simulated) -> Non
     assert norm(sub(near.asked_m, head)) == pytest.approx(0.5, abs=0.1)
 
 
-def test_a_pixel_without_a_frame_is_refused(rig: Simulated) -> None:
+def test_a_pixel_without_a_frame_is_refused(rig: Running) -> None:
     nothing: Any = lambda now_s: None  # noqa: E731
     rig.made.robot.camera.latest = nothing  # type: ignore[method-assign]
     rig.go(0.006)
     assert "no camera frame" in rig.do(LookAtPixel((1.0, 1.0)))[0].refused
 
 
-def test_a_lead_ends_after_its_time_and_says_so(rig: Simulated) -> None:
+def test_a_lead_ends_after_its_time_and_says_so(rig: Running) -> None:
     ticks = rig.do(LookAt((1.0, 0.5, 0.3), "a show", True, for_s=0.5), 1.0)[1]
     led = [tick for tick in ticks if tick.led]
     assert led[-1].t_s - led[0].t_s == pytest.approx(0.5, abs=0.011)
@@ -194,7 +163,7 @@ def test_a_lead_ends_after_its_time_and_says_so(rig: Simulated) -> None:
     assert "a show: look at 1 0.5 0.3: its time is over, so the gaze leads again" in words
 
 
-def test_leads_are_counted_and_their_ends_have_reasons(rig: Simulated) -> None:
+def test_leads_are_counted_and_their_ends_have_reasons(rig: Running) -> None:
     assert rig.go(0.006)[-1].lead == NOBODY_LEADS
     assert rig.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].lead == 1
     reply, ticks = rig.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)

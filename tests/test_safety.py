@@ -387,13 +387,18 @@ def test_a_slow_start_is_no_jam() -> None:
         assert world.tick(0.5 if k < 300 else -0.5) != "not moving"
 
 
+def awake(at_rad: float) -> Guard:
+    """Return a guard of joints at an angle, past its gentle start."""
+    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
+    guard.reset(0.0, (at_rad,) * 9)
+    guard._gentle = [False] * 9
+    return guard
+
+
 @pytest.mark.parametrize("off_deg", np.linspace(2.5, 3.5, 21).tolist())
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
-    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
-    guard.reset(0.0, (0.0,) * 9)
-    guard._gentle = [False] * 9
-    found = False
+    guard, found = awake(0.0), False
     for k in range(1, 60):
         joints = JointState((-way * radians(off_deg),) * 9, (0.0,) * 9, (k * DT,) * 9, ())
         verdict = guard.check((0.0,) * 9, joints, 0.0, k * DT)
@@ -404,10 +409,7 @@ def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
 
 @pytest.mark.parametrize("creep_deg_s", [1.0, 2.5, 3.0, 3.7, 4.0, 6.0, -1.0, -6.0, -20.0])
 def test_only_motion_towards_the_command_counts(creep_deg_s: float) -> None:
-    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
-    guard.reset(0.0, (0.6,) * 9)
-    guard._gentle = [False] * 9
-    found = False
+    guard, found = awake(0.6), False
     for k in range(1, 100):
         at = radians(5.0 + creep_deg_s * k * DT)
         joints = JointState((at,) * 9, (0.0,) * 9, (k * DT,) * 9, ())

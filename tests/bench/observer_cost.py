@@ -17,8 +17,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from bench_recording import recorder as recorder_at
 
-from gazerig.config.save_text import params_text, walk_text
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
@@ -26,7 +26,6 @@ from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick, run
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.recording.run_info import RunInfo, versions
 
 TESTS = Path(__file__).parents[1]
 
@@ -95,7 +94,7 @@ class Costs:
 def show(seconds: float) -> None:
     """Measure and print all."""
     with tempfile.TemporaryDirectory() as folder:
-        recorder = recorder_at(Path(folder) / "run.mcap")
+        recorder = recorder_at(Path(folder) / "run.mcap", fast=False)
         substitutes = Substitutes(body=recorder.wrap_body)
         asked = RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         made = assemble(load_rig("desk"), asked, substitutes)
@@ -154,17 +153,6 @@ def _spectate(observers: RunObservers, over: threading.Event) -> None:
 
 def _drop(line: str) -> None:
     """Print nothing."""
-
-
-def recorder_at(path: Path) -> Recorder:
-    """Return a recorder of the desk rig's run."""
-    rig = load_rig("desk")
-    info = RunInfo(
-        "desk", rig.profile, params_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True,
-        versions=versions(),
-    )  # fmt: skip
-    return Recorder(path, info)
 
 
 if __name__ == "__main__":
