@@ -67,35 +67,39 @@ class ServoLine:
 
     def send(self, data: bytes, baud: int, now_s: float | None = None) -> bytes:
         """Send the host's bytes now, or at ``now_s``; return the bytes that arrive immediately."""
-        faulty = self.device.faults.wire.any
+        wire = self.device.faults.wire
+        faulty = wire.any
         if faulty:
-            data = self.device.faults.wire.add_noise(data, self.device.now_s())
+            data = wire.add_noise(data, self.device.now_s())
         replies = self.device.exchange(data, baud)
         if faulty:
-            replies = self._apply_noise(replies)
+            noise_s = self.device.now_s()
+            said = b"".join(piece.data for reply in replies for piece in reply.pieces)
+            before, self._said = self._said, said or self._said
+            replies = [
+                DeviceReply(
+                    r.end, [p._replace(data=wire.add_noise(p.data, noise_s)) for p in r.pieces]
+                )
+                for r in replies
+            ]
+            if said and before and wire.take("repeat", None, noise_s) is not None:
+                first = replies[0]
+                replies[0] = DeviceReply(first.end, [Piece(NO_DEVICE, before), *first.pieces])
         if self.wire_time:
             self._on_the_wire(data, replies, baud, self.device.now_s() if now_s is None else now_s)
             return self.arrived()
         if not replies:
             return b""
-        if not self._late and not self.device.faults.wire.any and not self._any_late(replies):
+        if not self._late and not wire.any and not self._any_late(replies):
             return b"".join([piece[1] for reply in replies for piece in reply[1]])
-        self._queue_late(replies, self.device.now_s())
+        # The only delays are those of faults.
+        sent_s = self.device.now_s()
+        due_s = max(sent_s, self._late[-1][0] if self._late else sent_s)
+        for reply in replies:
+            for piece in reply.pieces:
+                due_s += piece.late_s
+                self._late.append((due_s, piece.data))
         return self.arrived()
-
-    def _apply_noise(self, replies: list[DeviceReply]) -> list[DeviceReply]:
-        """Apply noise to the answers; put the previous ones first if that fault is active."""
-        wire, now_s = self.device.faults.wire, self.device.now_s()
-        said = b"".join(piece.data for reply in replies for piece in reply.pieces)
-        before, self._said = self._said, said or self._said
-        replies = [
-            DeviceReply(r.end, [p._replace(data=wire.add_noise(p.data, now_s)) for p in r.pieces])
-            for r in replies
-        ]
-        if said and before and wire.take("repeat", None, now_s) is not None:
-            first = replies[0]
-            replies[0] = DeviceReply(first.end, [Piece(NO_DEVICE, before), *first.pieces])
-        return replies
 
     def _any_late(self, replies: list[DeviceReply]) -> bool:
         for _, pieces in replies:
@@ -103,14 +107,6 @@ class ServoLine:
                 if late_s:
                     return True
         return False
-
-    def _queue_late(self, replies: list[DeviceReply], now_s: float) -> None:
-        """Queue answers whose only delay is a fault's."""
-        due_s = max(now_s, self._late[-1][0] if self._late else now_s)
-        for reply in replies:
-            for piece in reply.pieces:
-                due_s += piece.late_s
-                self._late.append((due_s, piece.data))
 
     def _on_the_wire(
         self, data: bytes, replies: list[DeviceReply], baud: int, now_s: float

@@ -48,7 +48,10 @@ def open_context(make: Callable[[], Made]) -> tuple[Backend, Any, Made]:
         # MuJoCo reads the variable again when it looks for the library's functions.
         with _environment("MUJOCO_GL", backend):
             try:
-                context = _context(backend)
+                shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+                if backend == "glfw" and not shown:
+                    raise RuntimeError("there is no display")
+                context = import_module(f"mujoco.{backend}").GLContext(64, 64)
                 try:
                     with context.as_current():  # no longer than needed: another thread may render
                         made = make()
@@ -123,13 +126,6 @@ def _candidates() -> tuple[Backend, ...]:
             f"no pictures of a world: MUJOCO_GL is egl, osmesa, glfw or off, not {wanted!r}"
         )
     return (_chosen,) if _chosen is not None else ("egl", "osmesa", "glfw")
-
-
-def _context(backend: Backend) -> Any:
-    """Return an OpenGL context of MuJoCo's Python package."""
-    if backend == "glfw" and not any(os.environ.get(x) for x in ("DISPLAY", "WAYLAND_DISPLAY")):
-        raise RuntimeError("there is no display")
-    return import_module(f"mujoco.{backend}").GLContext(64, 64)
 
 
 def _forget_opengl() -> None:

@@ -76,7 +76,16 @@ def world_model(
     Raises:
         SetupError: the user's file cannot be used; names the file and the remedy.
     """
-    spec = _spec_of(mjcf_file) if mjcf_file is not None else _room(figures, rigs)
+    if mjcf_file is None:
+        spec = _room(figures, rigs)
+    else:
+        refuse_excessive(mjcf_file)
+        try:
+            spec = mujoco.MjSpec.from_file(str(mjcf_file))
+        except (ValueError, OSError) as error:
+            raise SetupError(
+                f"{mjcf_file}: MuJoCo cannot read this world: {_one_line(error)}"
+            ) from None
     spec.option.timestep = STEP_S
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     try:
@@ -107,15 +116,6 @@ def _room(figures: Figures | None, rigs: Sequence[RigInWorld]) -> Any:
         rgba=[0.6, 0.55, 0.5, 1.0],
     )
     return spec
-
-
-def _spec_of(path: Path) -> Any:
-    """Return a user's MJCF file."""
-    refuse_excessive(path)
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except (ValueError, OSError) as error:
-        raise SetupError(f"{path}: MuJoCo cannot read this world: {_one_line(error)}") from None
 
 
 def _one_line(error: Exception) -> str:

@@ -5,6 +5,7 @@ computes the poses of the bodies with its own model.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -78,21 +79,14 @@ class OtherHeads:
             return {}
         import mujoco
 
-        newest = self._newest()
+        if self._reader is None:
+            with suppress(OSError):  # the emulator has ended, or not started
+                self._reader = StateReader(self._state)
+        newest = None if self._reader is None else self._reader.newest()
         if newest is not None:
             for placed, head in zip(self._rigs, self._heads, strict=True):
                 for name, at in head.joints.items():
-                    self._data.qpos[placed.qpos[name]] = newest[at]
+                    self._data.qpos[placed.qpos[name]] = newest.qpos[at]
         mujoco.mj_kinematics(self._model.mj, self._data)
         places, turns = self._data.xpos.tolist(), self._data.xquat.tolist()
         return {name: (tuple(turns[i]), tuple(places[i])) for name, i in self._bodies.items()}
-
-    def _newest(self) -> Any:
-        """Return the coordinates of the newest state, None before the first."""
-        if self._reader is None:
-            try:
-                self._reader = StateReader(self._state)
-            except OSError:  # the emulator has ended, or not started
-                return None
-        newest = self._reader.newest()
-        return None if newest is None else newest.qpos

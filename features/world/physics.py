@@ -197,7 +197,15 @@ class World:
             self._gain[self._actuators] = efforts[:, 1]
             self._range[self._actuators] = efforts[:, 2:]
         if self._pushes:
-            self._apply_pushes()
+            # The forces of this millisecond; expired ones are removed.
+            wrenches = data.xfrc_applied
+            for push in self._pushes:
+                wrenches[push.body] = 0.0
+            self._pushes = [push for push in self._pushes if self._ms < push.until_ms]
+            for push in self._pushes:
+                lever = data.xpos[push.body] - data.xipos[push.body]
+                wrenches[push.body, :3] += push.force_n
+                wrenches[push.body, 3:] += np.cross(lever, push.force_n)
         if self._people is not None and self._ms % PEOPLE_MS == 0:
             self._people.place(data, self._script_s())
         mujoco.mj_step(self._mj, data)
@@ -276,17 +284,6 @@ class World:
         if place < 0:
             raise ValueError(f'no body {body!r} with mocap="true"')
         self._data.mocap_pos[place] = p_m
-
-    def _apply_pushes(self) -> None:
-        """Apply the forces of this millisecond, and remove the expired ones."""
-        wrenches = self._data.xfrc_applied
-        for one in self._pushes:
-            wrenches[one.body] = 0.0
-        self._pushes = [one for one in self._pushes if self._ms < one.until_ms]
-        for one in self._pushes:
-            lever = self._data.xpos[one.body] - self._data.xipos[one.body]
-            wrenches[one.body, :3] += one.force_n
-            wrenches[one.body, 3:] += np.cross(lever, one.force_n)
 
     def state(self) -> WorldState:
         """Return the current state."""

@@ -247,17 +247,13 @@ class WorldShaft(Shaft):
         push = self._stall_nm * self.volts
         gain = -push * (kp + kd) * SPEED_UNIT
         if torque_max != inf:
-            return self._within(torque_max, push * c, gain, push * least, push * most)
+            # The torque is limited with the motor's induced torque in it.
+            strongest = self._stall_nm * torque_max
+            induced = self._induced_nm_s * self.v / SPEED_UNIT
+            low = max(-strongest, push * least - induced)
+            high = min(strongest, push * most - induced)
+            return push * c, gain - self._induced_nm_s, min(low, high), max(low, high)
         return push * c, gain, push * least, push * most
-
-    def _within(
-        self, torque_max: float, torque: float, gain: float, low: float, high: float
-    ) -> Effort:
-        """Limit a torque that includes the motor's induced torque."""
-        most = self._stall_nm * torque_max
-        induced = self._induced_nm_s * self.v / SPEED_UNIT
-        low, high = max(-most, low - induced), min(most, high - induced)
-        return torque, gain - self._induced_nm_s, min(low, high), max(low, high)
 
     def _error(self, r: float) -> float:
         """Return the position error, in steps."""

@@ -155,19 +155,15 @@ def _draw_solid(canvas: Canvas, solid: _PlacedShape) -> None:
     facing = facing[np.argsort(-depth)]
     fixed = np.rint(corners[facing] * (1 << _SHIFT)).astype(np.int32)
     image, fill = canvas.image, cv2.fillConvexPoly
-    for triangle, colour in zip(fixed, _shade(solid)[facing].tolist(), strict=True):
-        fill(image, triangle, colour, cv2.LINE_8, _SHIFT)
-
-
-def _shade(solid: _PlacedShape) -> Floats:
-    """Return the colours of a shape's faces under the room's light, BGR."""
-    mesh, colours, out = solid.shape
-    assert out is not None
-    normals = out @ solid.R.T
+    # The colours of the faces under the room's light, BGR.
+    assert solid.shape.normals is not None
+    normals = solid.shape.normals @ solid.R.T
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     bright = _AMBIENT + _DIRECT * np.clip(normals @ _TO_LIGHT, 0.0, 1.0)
-    lit = np.clip(colours * bright[:, None], 0.0, 255.0)
-    return np.asarray(lit[mesh.faces].mean(axis=1)[:, ::-1])
+    lit = np.clip(solid.shape.colours * bright[:, None], 0.0, 255.0)
+    shades = lit[mesh.faces].mean(axis=1)[facing, ::-1]
+    for triangle, colour in zip(fixed, shades.tolist(), strict=True):
+        fill(image, triangle, colour, cv2.LINE_8, _SHIFT)
 
 
 def _draw_ball(canvas: Canvas, p_m: Vec3, radius_m: float) -> None:

@@ -127,26 +127,28 @@ class ActiveFaults:
 
     def spoil_answers(self, answers: Sequence[Answer], fast: bool, now_s: float) -> list[Answer]:
         """Change answers before their checksums are computed: ids, errors, lengths and order."""
-        said = [self._spoil_answer(answer, fast, now_s) for answer in answers]
+        said: list[Answer] = []
+        for answer in answers:
+            servo_id, params = answer.servo_id, answer.params
+            refused = self.take("refuse", servo_id, now_s)
+            if refused is not None:
+                error = answer.error | int(refused.numbers[0])
+                # A block of a fast reply keeps its position: it is filled with zeros.
+                answer = answer._replace(error=error, params=bytes(len(params)) if fast else b"")
+            short = self.take("short", servo_id, now_s)
+            if short is not None:
+                kept = max(0, len(params) - int(short.numbers[0]))
+                answer = answer._replace(params=params[:kept])
+            long = self.take("long", servo_id, now_s)
+            if long is not None:
+                answer = answer._replace(params=params + bytes(int(long.numbers[0])))
+            other = self.take("wrong_id", servo_id, now_s)
+            if other is not None:
+                answer = answer._replace(servo_id=int(other.numbers[0]))
+            said.append(answer)
         if len(said) > 1 and self.take("reorder", None, now_s):
             said.reverse()
         return said
-
-    def _spoil_answer(self, answer: Answer, fast: bool, now_s: float) -> Answer:
-        servo_id, params = answer.servo_id, answer.params
-        refused = self.take("refuse", servo_id, now_s)
-        if refused is not None:
-            error = answer.error | int(refused.numbers[0])
-            # A block of a fast reply keeps its position: it is filled with zeros.
-            answer = answer._replace(error=error, params=bytes(len(params)) if fast else b"")
-        short = self.take("short", servo_id, now_s)
-        if short is not None:
-            answer = answer._replace(params=params[: max(0, len(params) - int(short.numbers[0]))])
-        long = self.take("long", servo_id, now_s)
-        if long is not None:
-            answer = answer._replace(params=params + bytes(int(long.numbers[0])))
-        other = self.take("wrong_id", servo_id, now_s)
-        return answer if other is None else answer._replace(servo_id=int(other.numbers[0]))
 
     # --- received bytes
 
@@ -168,7 +170,16 @@ class ActiveFaults:
             if cut is not None:
                 del data[int(cut.numbers[0]) :]
             hurt = piece._replace(data=bytes(data))
-            out += self._delay(hurt, now_s)
+            late = self.take("delay", servo_id, now_s)
+            if late is not None:
+                hurt = hurt._replace(late_s=hurt.late_s + late.numbers[0] / 1000.0)
+            gap = self.take("stall", servo_id, now_s)
+            if gap is None:
+                out.append(hurt)
+            else:
+                half = len(hurt.data) // 2
+                rest = Piece(servo_id, hurt.data[half:], 0.0, gap.numbers[0] / 1000.0)
+                out += [hurt._replace(data=hurt.data[:half]), rest]
             again = self.take("duplicate", piece.servo_id, now_s) is not None
             if again and not fast:
                 out.append(Piece(NO_DEVICE, hurt.data))
@@ -188,18 +199,6 @@ class ActiveFaults:
         if after is not None:
             out.append(Piece(NO_DEVICE, self._noise(after)))
         return out
-
-    def _delay(self, piece: Piece, now_s: float) -> list[Piece]:
-        """Return a piece after a delay, or in two halves with a gap."""
-        late = self.take("delay", piece.servo_id, now_s)
-        if late is not None:
-            piece = piece._replace(late_s=piece.late_s + late.numbers[0] / 1000.0)
-        gap = self.take("stall", piece.servo_id, now_s)
-        if gap is None:
-            return [piece]
-        half = len(piece.data) // 2
-        rest = Piece(piece.servo_id, piece.data[half:], 0.0, gap.numbers[0] / 1000.0)
-        return [piece._replace(data=piece.data[:half]), rest]
 
     def _noise(self, fault: LineFault) -> bytes:
         return self._rng.randbytes(8) if fault.data is None else fault.data

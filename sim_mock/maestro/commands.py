@@ -89,19 +89,16 @@ class CommandParser:
     def feed(self, data: bytes) -> Iterator[ParsedCommand]:
         """Yield the commands that bytes complete, fed one by one."""
         for end, byte in enumerate(data, 1):
-            for command in self._take(byte):
+            packet, found = self._packet, tuple[ParsedCommand, ...]()
+            if byte & 0x80 and not (packet and packet[0] == MINI_SSC and byte != MINI_SSC):
+                found = self._begin(byte)
+            elif not self._deaf and not packet:
+                found = (_PROTOCOL,)
+            elif not self._deaf:
+                packet.append(byte)
+                found = self._check_complete() if len(packet) >= self._until else ()
+            for command in found:
                 yield command._replace(end=end)
-
-    def _take(self, byte: int) -> tuple[ParsedCommand, ...]:
-        packet = self._packet
-        if byte & 0x80 and not (packet and packet[0] == MINI_SSC and byte != MINI_SSC):
-            return self._begin(byte)
-        if self._deaf:
-            return ()
-        if not packet:
-            return (_PROTOCOL,)
-        packet.append(byte)
-        return self._check_complete() if len(packet) >= self._until else ()
 
     def _begin(self, byte: int) -> tuple[ParsedCommand, ...]:
         """Start a command; an unfinished one is an error."""

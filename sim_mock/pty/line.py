@@ -126,8 +126,12 @@ class TerminalLine:
             answer = self.line.send(data, baud or 1, now_s)
             if answer:
                 self.terminal.write(answer)
-            if self.device.check_baud and self._warn is not None and data:
-                self._warn_of(baud, self._warn)
+            new = self.device.check_baud and data and baud != self._warned
+            if self._warn is not None and new and not self.device.at_baud(baud):
+                self._warned = baud
+                device = self.settings.device
+                rate = "another rate" if device.baud is None else device.baud
+                self._warn(f"a client speaks at {baud} bit/s; {device.listens} at {rate}")
         if self.line.busy:
             self._deliver()
         if self.device.faults.wire.any or self._held or self._forbidden:
@@ -146,15 +150,6 @@ class TerminalLine:
         data = self.line.arrived()
         if data and self.terminal.plugged:
             self.terminal.write(data)
-
-    def _warn_of(self, baud: int, warn: Callable[[str], None]) -> None:
-        """Warn of a client's wrong baud rate, once for each rate."""
-        if baud == self._warned or self.device.at_baud(baud):
-            return
-        self._warned = baud
-        device = self.settings.device
-        rate = "another rate" if device.baud is None else device.baud
-        warn(f"a client speaks at {baud} bit/s; {device.listens} at {rate}")
 
     # --- faults of the adapter
 

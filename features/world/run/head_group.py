@@ -118,17 +118,14 @@ def compose_group(options: RunOptions) -> "HeadGroup":
         world.close()
         raise
     pictures = None if options.fast else (found.camera.rate_hz, not options.no_pictures)
-    return HeadGroup(_link(members), world, pictures)
-
-
-def _link(members: Sequence[_Member]) -> list[_Member]:
-    """Return the heads with the others attached to the first, so that its commands can stop all."""
-    first, *others = members
-    robots = tuple(NamedRobot(one.name, one.composed.made.robot) for one in others)
-    made = first.composed.made._replace(others=robots)
+    # The others are attached to the first, so that its commands can stop all.
+    leader, *rest = members
+    robots = tuple(NamedRobot(one.name, one.composed.made.robot) for one in rest)
+    made = leader.composed.made._replace(others=robots)
     # The process has one parameter store and one remote control: those of the first head.
-    alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in others]
-    return [first._replace(composed=first.composed._replace(made=made)), *alone]
+    alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in rest]
+    linked = [leader._replace(composed=leader.composed._replace(made=made)), *alone]
+    return HeadGroup(linked, world, pictures)
 
 
 def other_head_file(path: Path, name: str) -> Path:

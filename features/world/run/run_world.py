@@ -58,7 +58,10 @@ def rig_in_world(
     looks: bool = True,
 ) -> RigInWorld:
     """Return a rig for a world."""
-    stops = {name: _stop_rad(rig, name) for name in rig.names}
+    stops = {
+        name: (radians(one.min_deg - STOP_BEYOND_DEG), radians(one.max_deg + STOP_BEYOND_DEG))
+        for name, one in ((name, rig.joints[name]) for name in rig.names)
+    }
     servos = tuple(_servo(rig, name) for name in rig.names)
     return RigInWorld(
         partial(_body, rig, looks), stops, crooked_rad(rig), servos, prefix, p_m, yaw_rad
@@ -82,11 +85,6 @@ def world_ideal_bus(rig: Rig, world: "World", number: int = 0) -> "WorldIdealBus
 
     measured = [rig.joints[name].facts.measured for name in rig.names]
     return WorldIdealBus(rig_setups(rig), world.ideal_shafts(number), measured, world.now_s)
-
-
-def _stop_rad(rig: Rig, name: str) -> tuple[float, float]:
-    joint = rig.joints[name]
-    return radians(joint.min_deg - STOP_BEYOND_DEG), radians(joint.max_deg + STOP_BEYOND_DEG)
 
 
 def _servo(rig: Rig, name: str) -> ServoInWorld:
