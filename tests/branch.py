@@ -147,7 +147,7 @@ def gazerig(*words: str) -> Callable[[], None]:
     def work() -> None:
         from gazerig.robot.cli import terminal
         from gazerig.robot.cli.entry_point import main
-        from gazerig.robot.cli.line_writer import LineWriter
+        from gazerig.robot.cli.terminal import LineWriter
 
         # That of the parent may have had a thread, which a fork has not.
         terminal._writer = LineWriter(2)

@@ -9,10 +9,11 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.recording.gaze_angles import GazeAngles, collect_gaze_angles
-from gazerig.robot.recording.gaze_labels import (
+from gazerig.robot.recording.gaze_angles import (
+    GazeAngles,
     LabelledInterval,
     Labels,
+    collect_gaze_angles,
     find_intervals,
     label_samples,
 )

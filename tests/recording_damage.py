@@ -24,8 +24,8 @@ from gazerig.robot.control.loop import run
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording, used
 from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.replay import SnapshotIndex
 from gazerig.robot.recording.run_info import RunInfo
-from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
 HEAD = 9
 

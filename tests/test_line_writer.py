@@ -5,7 +5,7 @@ import os
 import time
 from collections.abc import Callable
 
-from gazerig.robot.cli.line_writer import LineWriter
+from gazerig.robot.cli.terminal import LineWriter
 from gazerig.robot.control.interrupts import Interrupts
 
 

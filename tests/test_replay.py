@@ -17,9 +17,7 @@ from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Ask
-from gazerig.robot.recording.playback_clock import PlaybackState
-from gazerig.robot.recording.replay import Replay, introduction
-from gazerig.robot.recording.snapshot_index import SnapshotIndex
+from gazerig.robot.recording.replay import PlaybackState, Replay, SnapshotIndex, introduction
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -15,7 +15,7 @@ from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.dashboard.feed.page_process import unpack
 from gazerig.robot.recording.gaze_angles import collect_gaze_angles
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.snapshot_index import SnapshotIndex
+from gazerig.robot.recording.replay import SnapshotIndex
 
 pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 

@@ -10,8 +10,7 @@ from typer.testing import CliRunner
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.main import app
-from gazerig.robot.cli.suggestions import completed, speaking_of
-from gazerig.robot.cli.terminal import _writer
+from gazerig.robot.cli.terminal import _writer, completed, speaking_of
 from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = pytest.mark.usefixtures("simulated_wires")

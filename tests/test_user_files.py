@@ -20,7 +20,7 @@ from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_
 from gazerig.drivers.files.file_output import output_file, output_text, refuse_existing, write_file
 from gazerig.robot.analysis.heatmap import face_from
 from gazerig.robot.recording.recorder import Recorder
-from gazerig.robot.remote.file_watch import look
+from gazerig.robot.remote.live_server import look
 
 SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
 

@@ -14,33 +14,20 @@ from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.aversion import Aversion
+from gazerig.gaze.attention.bottom_up import BottomUp
+from gazerig.gaze.attention.idle import Idle
+from gazerig.gaze.attention.top_down import TopDown
+from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
-from gazerig.robot.app.camera_factory import (
-    make_lendable,
-    placed_camera,
-    run_camera,
-    sight_of,
-)
-from gazerig.robot.app.gaze_models import (
-    attention_models,
-    chooser_of,
-    kinematics_of,
-    motion_models,
-    oculomotor,
-)
+from gazerig.robot.app.camera_factory import make_lendable, placed_camera, run_camera, sight_of
+from gazerig.robot.app.gaze_models import chooser_of, kinematics_of, motion_models, oculomotor
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.app.rig_description import shape_of
-from gazerig.robot.app.rig_limits import (
-    animation_tables,
-    lid_spans,
-    limits,
-    own_parts,
-    park_rad,
-)
+from gazerig.robot.app.rig_limits import animation_tables, lid_spans, limits, own_parts, park_rad
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
@@ -52,11 +39,7 @@ from gazerig.robot.control.robot_group import NamedRobot
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.coupling_params import pairs_of
-from gazerig.robot.model.frames import (
-    CameraMount,
-    CameraParams,
-    PoseHistory,
-)
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles, further
@@ -258,7 +241,8 @@ def _components(
     lids = Lids(rig.gaze.lids, random.lids)
     tracker = Tracker(rig.tracks)
     moves = motion_models(rig, random.head, random.sway)
-    decides = attention_models(rig, random.idle)
+    field_of_view, bottom_up = FieldOfView(rig.gaze.field_of_view), BottomUp(rig.gaze.bottom_up)
+    top_down, idle = TopDown(rig.gaze.top_down), Idle(rig.gaze.idle, random.idle)
     animation = Animation(further(rig.joints), animation_tables(rig))
     return Components(
         body=body,
@@ -277,11 +261,13 @@ def _components(
             kinematics.own_parts,
         ),
         tracker=tracker,
-        attention=Attention(rig.gaze.attention, *decides, random.reaction),
-        field_of_view=decides.field_of_view,
-        bottom_up=decides.bottom_up,
-        top_down=decides.top_down,
-        idle=decides.idle,
+        attention=Attention(
+            rig.gaze.attention, field_of_view, bottom_up, top_down, idle, random.reaction
+        ),
+        field_of_view=field_of_view,
+        bottom_up=bottom_up,
+        top_down=top_down,
+        idle=idle,
         scanpath=Scanpath(rig.gaze.scanpath, walk, random.scanpath),
         aversion=Aversion(rig.gaze.aversion, random.aversion),
         oculomotor=oculomotor(rig, kinematics, moves, lids, random.endpoint),

@@ -19,11 +19,7 @@ from gazerig.drivers.camera.camera_plugins import (
 )
 from gazerig.drivers.camera.capture_loop import Locate, Motion
 from gazerig.drivers.camera.double_buffer import PoseBuffer, PoseSlot
-from gazerig.drivers.camera.guarded_camera import (
-    CLOSE_PROCESS_S,
-    OPEN_PROCESS_S,
-    GuardedCamera,
-)
+from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, OPEN_PROCESS_S, GuardedCamera
 from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S
 from gazerig.drivers.camera.orientation import FrameOrientation, UprightSource, upright
 from gazerig.drivers.camera.process import CameraProcess
@@ -336,11 +332,7 @@ def orientation_of(camera: CameraParams) -> FrameOrientation:
 
 
 def _section(rig: Rig, name: str) -> object:
-    """Return the parameters of a package's camera: the rig's section of its name, or defaults.
-
-    Raises:
-        PluginError: the rig has none, and a parameter has no default.
-    """
+    """Return the parameters of a package's camera: the rig's section of its name, or defaults."""
     section = getattr(rig, name, None)
     if section is not None:
         return section

@@ -8,10 +8,6 @@ import numpy as np
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, create, find, is_ours, load
-from gazerig.gaze.attention.bottom_up import BottomUp
-from gazerig.gaze.attention.idle import Idle
-from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.gesture.breathing import Breathing
 from gazerig.gaze.gesture.sway import Sway
 from gazerig.gaze.lids.lids import Lids
@@ -38,26 +34,6 @@ def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
 def kinematics_of(rig: Rig) -> Kinematics:
     """Return a rig's geometry."""
     return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
-
-
-class AttentionModels(NamedTuple):
-    """Models of attention."""
-
-    field_of_view: FieldOfView
-    bottom_up: BottomUp
-    top_down: TopDown
-    idle: Idle
-
-
-def attention_models(rig: Rig, idle_rng: np.random.Generator) -> AttentionModels:
-    """Return the models of attention."""
-    gaze = rig.gaze
-    return AttentionModels(
-        FieldOfView(gaze.field_of_view),
-        BottomUp(gaze.bottom_up),
-        TopDown(gaze.top_down),
-        Idle(gaze.idle, idle_rng),
-    )
 
 
 class MotionModels(NamedTuple):

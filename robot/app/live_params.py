@@ -263,11 +263,7 @@ def _with_servo(joint: JointParams, first: JointParams, coupled: bool) -> JointP
 
 
 def _prepare(command: Tune, base: Rig, rig: Rig) -> _Ready:
-    """Build a checked change, with a new face walk if that has changed.
-
-    Raises:
-        gazerig.config.load.ConfigError: the walk that the rig names is invalid.
-    """
+    """Build a checked change, with a new face walk if that has changed."""
     name = rig.gaze.scanpath.transition_matrix
     walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
     return _Ready(command.changes, base, rig, walk)

@@ -149,11 +149,7 @@ class RunOptions:
         return replace(self, scene=scene)
 
     def _refuse_bus(self) -> None:
-        """Refuse a bus that is unknown, or that replaces no servos.
-
-        Raises:
-            SetupError: the message names the missing option.
-        """
+        """Refuse a bus that is unknown, or that replaces no servos."""
         if self.bus is None:
             return
         if self.bus not in BUSES:
@@ -168,11 +164,7 @@ class RunOptions:
             )
 
     def _refuse_clashes(self, scene: str | None) -> None:
-        """Refuse options that exclude each other.
-
-        Raises:
-            SetupError: the message names the missing option.
-        """
+        """Refuse options that exclude each other."""
         world, camera = self.world is not None, self.camera is not None or self.oak
         if self.port is not None and self.mock:
             raise SetupError("--port and --mock exclude each other: --mock has a port of its own")

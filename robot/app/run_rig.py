@@ -53,11 +53,7 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
 
 
 def _chosen(params: P, key: str, value: str, option: str) -> P:
-    """Replace one key that has choices by an option of the command line.
-
-    Raises:
-        SetupError: the value is none of the choices.
-    """
+    """Replace one key that has choices by an option of the command line."""
     choices = choices_of(type(params), key)
     if value not in choices:
         raise SetupError(f"{option} {value}: unknown; there is {', '.join(choices)}")

@@ -12,12 +12,7 @@ from gazerig.drivers.process.bounded_call import OverdueReport
 from gazerig.robot.analysis.behaviour_score import BehaviourScore, PlannerScore
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
 from gazerig.robot.analysis.summary import Summary
-from gazerig.robot.app.assemble import (
-    RIGS_OWN,
-    Assembly,
-    Substitutes,
-    assemble,
-)
+from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers

@@ -17,14 +17,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.robot.app.options import host_port
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import (
-    FAULT,
-    ForceOption,
-    clear_errors,
-    complete_rig,
-    say,
-    signals,
-)
+from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say, signals
 
 if TYPE_CHECKING:
     from gazerig.robot.app.resimulate import Resimulation
@@ -107,8 +100,11 @@ def export(
         from gazerig.robot.control.feedback_basis import ESTIMATED
         from gazerig.robot.recording.export_bids import DatasetDescription, write_bids
         from gazerig.robot.recording.export_csv import csv_files, write_csv
-        from gazerig.robot.recording.gaze_angles import collect_gaze_angles
-        from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
+        from gazerig.robot.recording.gaze_angles import (
+            collect_gaze_angles,
+            find_intervals,
+            label_samples,
+        )
         from gazerig.robot.recording.read import RunRecording, used
 
         recording = RunRecording(file)
@@ -157,18 +153,11 @@ def _show(
     stopped: Callable[[], str | None],
 ) -> bool:
     """Serve the page until stopped; return False if it cannot start."""
-    from gazerig.robot.dashboard.feed.live_feed import (
-        LiveRig,
-        RunState,
-        rig_message,
-        state_message,
-    )
+    from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState, rig_message, state_message
     from gazerig.robot.dashboard.feed.page_process import PageProcess
     from gazerig.robot.model.clock import RealClock
-    from gazerig.robot.recording.playback_clock import PlaybackState
     from gazerig.robot.recording.read import RunRecording, used
-    from gazerig.robot.recording.replay import Replay
-    from gazerig.robot.recording.snapshot_index import SnapshotIndex
+    from gazerig.robot.recording.replay import PlaybackState, Replay, SnapshotIndex
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)

@@ -1,16 +1,29 @@
-"""The terminal: lines for people, one status line, clear errors, Ctrl-C as a request to stop."""
+"""The terminal: lines for people, one status line, clear errors, Ctrl-C as a request to stop.
+
+Lines for people are written by a thread: a pipe without a reader, a terminal stopped with Ctrl-S or
+a full disk delays no caller. Lines that cannot be written are dropped and counted.
+
+Commands that a message suggests get the rig and port of this one. A driver or the doctor that finds
+a fault does not know them; a cure that leaves them out would set up the default rig instead.
+"""
 
 import atexit
 import contextlib
+import errno
 import logging
 import os
+import re
+import select
+import shlex
 import shutil
 import signal
+import stat
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated, NoReturn
 
 import typer
@@ -18,9 +31,159 @@ import typer
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
-from gazerig.robot.cli.line_writer import LineWriter
-from gazerig.robot.cli.suggestions import completed, speaking_of, with_doctor
+from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.robot.control.interrupts import ENDING, Interrupts
+
+_MOST = 500
+"""So many lines wait; more are dropped."""
+_RETRY_S = 0.2
+_LOOK_S = 0.5
+UNREAD = "standard error, whose reader has closed it"
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""A disk may have room again."""
+
+
+class LineWriter:
+    """Writes to a file descriptor, in the order of the calls.
+
+    dropped: lines that were not written
+    """
+
+    def __init__(self, fd: int, most: int = _MOST) -> None:
+        self._fd = fd
+        self._most = most
+        self._call = BoundedCall("line writer", 0.0)
+        self._status: str | None = None
+        self._status_waits = False
+        self._gone = False
+        self._unread: str | None = None
+        self._look_s = 0.0
+        self.dropped = 0
+
+    def line(self, text: str) -> None:
+        """Write this, line end included; returns at once."""
+        if self._gone or self._call.waiting() >= self._most:
+            self.dropped += 1
+            return
+        # The text on the status line is older than this.
+        self._status = None
+        self._call.begin(lambda: self._write(text))
+
+    def status(self, text: str) -> None:
+        """Write this unless something newer comes first; returns at once."""
+        if self._gone:
+            return
+        self._status = text
+        if not self._status_waits:
+            self._status_waits = True
+            self._call.begin(self._write_status)
+
+    def unread(self) -> str | None:
+        """Return that its reader is gone, None while it may be there."""
+        now_s = perf_counter()
+        if self._unread is None and now_s - self._look_s > _LOOK_S:
+            self._look_s = now_s
+            if self._reader_gone():
+                self._unread = UNREAD
+        return self._unread
+
+    def flush(self, timeout_s: float) -> bool:
+        """Wait until everything is written, no longer than this; return whether it is."""
+        return self._gone or self._call.idle(timeout_s)
+
+    def _reader_gone(self) -> bool:
+        """Return whether a pipe has lost its reader, which else only the next line would find."""
+        try:
+            if not hasattr(select, "poll"):  # Windows: the next line finds it
+                return False
+            if not stat.S_ISFIFO(os.fstat(self._fd).st_mode):
+                return False
+            poll = select.poll()
+            poll.register(self._fd, 0)
+            return any(events & select.POLLERR for _, events in poll.poll(0))
+        except OSError:
+            return False
+
+    def _write_status(self) -> None:
+        self._status_waits = False
+        text, self._status = self._status, None
+        if text is not None:
+            self._write(text)
+
+    def _write(self, text: str) -> None:
+        data = text.encode(errors="replace")
+        while data and not self._gone:
+            try:
+                data = data[os.write(self._fd, data) :]
+            except BlockingIOError:  # another process made it so
+                with contextlib.suppress(OSError, ValueError):
+                    select.select([], [self._fd], [], _RETRY_S)
+            except OSError as error:
+                # Without a reader, all that follow are lost. A terminal that is gone comes with
+                # SIGHUP, for those who want to know.
+                self._gone = error.errno not in _FULL
+                if error.errno == errno.EPIPE:
+                    self._unread = UNREAD
+                break
+        self.dropped += bool(data)
+
+
+_SUGGESTED = re.compile(
+    r"\bgazerig (?P<command>doctor|setup|calibrate|reboot|scan|home)\b"
+    r"(?P<words>(?: --fix\b| --joint \w+| --kind \w+|(?<=reboot) \d+)*)"
+)
+_given: list[Mapping[str, object]] = [{}]
+"""Of the command in force, last; for all threads, as those that watch a run speak, too."""
+
+
+@contextlib.contextmanager
+def speaking_of(rig: str | None, port: str | None, mock: bool) -> Iterator[None]:
+    """Make messages within the block suggest commands for this rig and port.
+
+    A block that names no rig speaks of the one around it.
+    """
+    _given.append({"rig": rig, "port": port, "mock": mock} if rig is not None else _given[-1])
+    try:
+        yield
+    finally:
+        _given.pop()
+
+
+def with_doctor(text: str) -> str:
+    """Return a fault of servos with the command that finds its cause, where none is named yet."""
+    given = _given[-1]
+    reaches = isinstance(given.get("rig"), str) and given.get("mock") is not True
+    return f"{text}; gazerig doctor finds the cause" if reaches and "gazerig " not in text else text
+
+
+def completed(text: str, given: Mapping[str, object] | None = None) -> str:
+    """Return a message in which every suggested command reaches what this command reached.
+
+    Args:
+        text: The message.
+        given: Parameters of the command that speaks: rig, port, mock; those of the present one
+            where None.
+    """
+    if given is None:
+        given = _given[-1]
+    if "gazerig " not in text or not isinstance(given.get("rig"), str):
+        return text
+    known = given
+
+    def whole(found: re.Match[str]) -> str:
+        if text[found.end() :].startswith((f" {shlex.quote(str(known['rig']))}", " --port ")):
+            return found[0]  # its message is complete
+        if found["command"] == "reboot" and not found["words"]:
+            return found[0]  # a description, not a command
+        port, mock = known.get("port"), known.get("mock") is True
+        more = f" --port {shlex.quote(str(port))}" if isinstance(port, str) else ""
+        more += " --mock" if mock else ""
+        scans = found["command"] == "scan" and not mock
+        named = "" if scans else f" {shlex.quote(str(known['rig']))}"
+        return f"gazerig {found['command']}{named}{found['words']}{more}"
+
+    return _SUGGESTED.sub(whole, text)
+
 
 BAD_INPUT = 2
 """Exit code: something asked for or configured is wrong."""

@@ -9,13 +9,7 @@ from math import atan, degrees, tan
 from typing import NamedTuple
 
 from gazerig.gaze.angles import compose
-from gazerig.robot.description.links import (
-    IDENTITY,
-    CollisionShape,
-    Description,
-    Link,
-    turn_about,
-)
+from gazerig.robot.description.links import IDENTITY, CollisionShape, Description, Link, turn_about
 from gazerig.robot.description.mesh_files import mesh_files, numbers
 from gazerig.robot.model.frames import quaternion
 

@@ -122,11 +122,7 @@ def read_mesh(params: MeshParams) -> Painted:
 
 
 def _loaded(path: Path) -> Any:
-    """Return all of a file as one mesh of trimesh.
-
-    Raises:
-        MeshUnusable: it cannot be read.
-    """
+    """Return all of a file as one mesh of trimesh."""
     import trimesh  # takes a while to import, and few rigs need it
 
     try:

@@ -13,13 +13,7 @@ from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.description import head_mesh, mass
 from gazerig.robot.description.head_shape import CHIN, HeadMeasures
-from gazerig.robot.description.links import (
-    CollisionShape,
-    Inertia,
-    Link,
-    LinkJoint,
-    Visual,
-)
+from gazerig.robot.description.links import CollisionShape, Inertia, Link, LinkJoint, Visual
 from gazerig.robot.description.mesh import (
     Mesh,
     Painted,

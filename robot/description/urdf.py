@@ -10,13 +10,7 @@ from typing import NamedTuple
 
 from gazerig.gaze.angles import add, rotate
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.description.links import (
-    IDENTITY,
-    ORIGIN,
-    CollisionShape,
-    Description,
-    Link,
-)
+from gazerig.robot.description.links import IDENTITY, ORIGIN, CollisionShape, Description, Link
 from gazerig.robot.description.mesh import ellipsoid
 from gazerig.robot.description.mesh_files import mesh_files, numbers, plain_obj, roll_pitch_yaw
 

@@ -200,11 +200,7 @@ class Guardian:
                 pipe.close()
 
     def _start(self) -> None:
-        """Start the process.
-
-        Raises:
-            OSError: the system refuses.
-        """
+        """Start the process."""
         self._ready = False
         self._looks = self._heartbeat.looks, inf
         self._process = child_process.start(

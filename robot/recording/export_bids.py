@@ -22,8 +22,7 @@ from gazerig.drivers.files.file_output import make_folder, output_file, write_fi
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.control.feedback_basis import ESTIMATED, PARTLY, Basis
 from gazerig.robot.recording.export_csv import number
-from gazerig.robot.recording.gaze_angles import GazeAngles
-from gazerig.robot.recording.gaze_labels import LabelledInterval, Labels
+from gazerig.robot.recording.gaze_angles import GazeAngles, LabelledInterval, Labels
 
 BIDS_VERSION = "1.11.1"
 

@@ -35,12 +35,7 @@ from gazerig.robot.model.commands import (
     Stop,
     Value,
 )
-from gazerig.robot.model.parameter import (
-    JsonValue,
-    ParamChange,
-    Parameter,
-    SavedFile,
-)
+from gazerig.robot.model.parameter import JsonValue, ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.socket_io import (
     ANSWER_BYTES,
@@ -524,11 +519,7 @@ def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
 
 
 def _wire(path: Path) -> Wire:
-    """Connect to a rig's socket.
-
-    Raises:
-        OSError: there is no answer.
-    """
+    """Connect to a rig's socket."""
     return Wire(dial(path, CONNECT_S), ANSWER_BYTES)
 
 

@@ -141,11 +141,7 @@ def dial(path: Path, within_s: float) -> socket.socket:
 
 
 def _dial_port(path: Path, within_s: float) -> socket.socket:
-    """Connect to the port in a file, and send the token.
-
-    Raises:
-        OSError: see ``dial``.
-    """
+    """Connect to the port in a file, and send the token."""
     port, _, token = path.read_text(encoding="ascii").partition(" ")
     if not port.isdecimal():
         raise ConnectionRefusedError(f"{path} names no port")

@@ -15,7 +15,7 @@ import numpy as np
 from human.measured_run import BEGIN_S, MeasuredRun
 
 from gazerig.robot.recording.export_csv import write_csv
-from gazerig.robot.recording.gaze_labels import find_intervals, label_samples
+from gazerig.robot.recording.gaze_angles import find_intervals, label_samples
 
 NOISE_DEG = 0.02
 """Standard deviation of each sample, as of a tower-mounted tracker (0.01 to 0.05)."""

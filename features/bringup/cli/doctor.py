@@ -41,8 +41,7 @@ from gazerig.features.bringup.doctor.diagnostics import (
 from gazerig.features.bringup.doctor.servo_rules import apply_fix
 from gazerig.features.bringup.servo_families import kind_of
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
-from gazerig.robot.cli.suggestions import completed
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, completed
 from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()

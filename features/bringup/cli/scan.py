@@ -39,8 +39,7 @@ from gazerig.features.bringup.cli.ports import (
 from gazerig.features.bringup.doctor.run import name_ports
 from gazerig.features.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
-from gazerig.robot.cli.suggestions import completed
-from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, say
+from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, completed, say
 
 app = typer.Typer()
 
