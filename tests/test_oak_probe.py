@@ -255,7 +255,7 @@ def test_camera_that_is_dropped_open_is_closed(rig):
     held.append(held)  # as the frames of a traceback hold it: only the garbage collector finds it
     del source, held
     gc.collect()
-    assert rig.waited and rig.device.closed == 1  # type: ignore[attr-defined]
+    assert rig.waited and rig.device.closed == 1
 
 
 def take(rig, source, clock, *messages):

@@ -40,7 +40,7 @@ class Costs:
 
     def __init__(self, observers: RunObservers, recorder: Recorder) -> None:
         self._observers, self._recorder = observers, recorder
-        self._sinks = {sink.name: sink for sink in recorder.stream._sinks}
+        self._sinks = {sink[0]: sink for sink in recorder.stream._sinks}
         self.windows: dict[str, list[tuple[float, float, float]]] = {way: [] for way in WAYS}
         self._way, self._number, self._start = "both", 0, (0, 0)
         self._calls_ns = 0
