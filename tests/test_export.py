@@ -22,13 +22,11 @@ from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
 from gazerig.robot.recording.gaze_angles import (
     MOVEMENTS,
     GazeTarget,
-    collect_gaze_angles,
-    gaze_in_space,
-)
-from gazerig.robot.recording.gaze_labels import (
     LabelledInterval,
+    collect_gaze_angles,
     estimate_lag,
     find_intervals,
+    gaze_in_space,
     label_samples,
     speed_deg_s,
 )
