@@ -10,8 +10,18 @@ from hypothesis import strategies as st
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.view.glb import glow
 from gazerig.robot.description import head_mesh, person_shape
-from gazerig.robot.description.mesh import Mesh, cap, smooth_normals
-from gazerig.robot.description.paint import Painted, merged, mirrored, mix, moved, painted, plain
+from gazerig.robot.description.mesh import (
+    Mesh,
+    Painted,
+    cap,
+    merged,
+    mirrored,
+    mix,
+    moved,
+    painted,
+    plain,
+    smooth_normals,
+)
 from gazerig.robot.description.texture import TexturedMesh, textured
 
 SHAPES: dict[str, Callable[[], Painted]] = {
