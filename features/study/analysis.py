@@ -11,10 +11,9 @@ from scipy import stats
 from gazerig.features.study.data_folder import InterimLook
 from gazerig.features.study.decisions import Decision, decisions
 from gazerig.features.study.design import StudyDesign
-from gazerig.features.study.measures import Measure, measures
 from gazerig.features.study.participation import AnswerRow, Participation
 from gazerig.features.study.questionnaire import Questionnaire
-from gazerig.features.study.scores import Scores, item_answers, scores, wins
+from gazerig.features.study.scores import Measure, Scores, item_answers, measures, scores, wins
 from gazerig.features.study.statistics.contingency import Counts, counts_of
 from gazerig.features.study.statistics.effects import EffectSize, cronbachs_alpha
 from gazerig.gaze.types import Floats

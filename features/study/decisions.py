@@ -10,10 +10,16 @@ from numpy.typing import NDArray
 
 from gazerig.features.lab.report.statistics import correct_p_values
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
-from gazerig.features.study.measures import Measure, measures
 from gazerig.features.study.participation import Participation
 from gazerig.features.study.questionnaire import Questionnaire
-from gazerig.features.study.scores import Scores, choice_differences, scores, wins
+from gazerig.features.study.scores import (
+    Measure,
+    Scores,
+    choice_differences,
+    measures,
+    scores,
+    wins,
+)
 from gazerig.features.study.statistics.assumptions import (
     AssumptionCheck,
     difference_checks,

@@ -140,7 +140,15 @@ def participation(
             before = found[one.trial, one.side]
             found[one.trial, one.side] = replace(before, measured=dict(one.values))
     trials = tuple(found.values())
-    rows = [_mark_exclusion(row, trials) for row in answers.values()]
+    broken = {t.trial: t.outcome for t in reversed(trials) if t.outcome != "complete"}
+    rows = []
+    for row in answers.values():
+        left_out = "not answered" if row.value is None else ""
+        if row.trial is not None and row.trial < 0:
+            left_out = "practice"
+        elif row.trial in broken:
+            left_out = f"presentation {broken[row.trial].replace('_', ' ')}"
+        rows.append(replace(row, left_out=left_out))
     slowest: dict[tuple[int | None, str], float] = {}
     for row in rows:
         page = row.trial, row.questionnaire
@@ -210,16 +218,6 @@ def _misfit(
             return f"{one.condition!r} is no pair"
     unknown = [key for key in shown if key not in design.conditions]
     return f"there is no condition {unknown[0]!r}" if unknown else ""
-
-
-def _mark_exclusion(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
-    """Exclude practice, incomplete presentations, and missing answers."""
-    if row.trial is not None and row.trial < 0:
-        return replace(row, left_out="practice")
-    ends = [t.outcome for t in trials if t.trial == row.trial]
-    if broken := next((outcome for outcome in ends if outcome != "complete"), ""):
-        return replace(row, left_out=f"presentation {broken.replace('_', ' ')}")
-    return replace(row, left_out="not answered") if row.value is None else row
 
 
 def _exclusion_reason(
@@ -335,19 +333,14 @@ def design_from_text(
             key: {k: v for k, v in design["conditions"][key].items() if k in known}
             for key in design.pop("order")
         }
-        found = {
-            key: msgspec.convert(_in_order(asked[key]), Questionnaire)
-            for key in (*design["questionnaires"], *design["after"])
-        }
+        found = {}
+        for key in (*design["questionnaires"], *design["after"]):
+            one = {**asked[key]}
+            one["items"] = {name: one["items"][name] for name in one.pop("order")}
+            found[key] = msgspec.convert(one, Questionnaire)
         return msgspec.convert(design, StudyDesign), found
     except (KeyError, TypeError, AttributeError, msgspec.MsgspecError) as error:
         raise SetupError(
             f"{path}: no design of a study ({error}): it was written by another version of gazerig, "
             "or changed; analyse it with the version that ran the study"
         ) from error
-
-
-def _in_order(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a questionnaire with its items in the order of presentation."""
-    rest = {key: value for key, value in asked.items() if key != "order"}
-    return {**rest, "items": {key: asked["items"][key] for key in asked["order"]}}

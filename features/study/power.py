@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
-from gazerig.features.study.measures import Measure
 from gazerig.features.study.order import balanced_group_size
+from gazerig.features.study.scores import Measure
 from gazerig.features.study.simulation import (
     BETWEEN_SD,
     ITEM_SD,

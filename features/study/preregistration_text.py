@@ -7,11 +7,11 @@ from pathlib import Path
 import jinja2
 
 from gazerig.features.study.design import Hypothesis, StudyDesign, Test
-from gazerig.features.study.measures import GAZE_MEASURES, measures
 from gazerig.features.study.order import PAIR, balanced_group_size, block_trials, orders
 from gazerig.features.study.participation import LEAST_SAME
 from gazerig.features.study.power import MOST, PowerClaim, power_claim, power_of
 from gazerig.features.study.questionnaire import Item, Questionnaire, Texts
+from gazerig.features.study.scores import GAZE_MEASURES, measures
 
 TESTS: Mapping[Test, str] = {
     "signed_rank": "Wilcoxon's signed-rank test of participants' differences, zeros left out",
@@ -37,12 +37,27 @@ def text(
     hypotheses = [
         {
             "sentence": sentence(one, design),
-            "analysis": _analysis(one),
+            "analysis": (
+                f"`{one.measure}`, `{one.better}` against `{one.than}`: {TESTS[one.test]}."
+                + f" Exploratory, deciding nothing: {'; '.join(TESTS[test] for test in one.also)}."
+                * bool(one.also)
+            ),
             "size": size_words(design, found),
         }
         for one, found in zip(design.hypotheses, claims, strict=True)
     ]
-    trials = design.trials
+    trials, pairs = design.trials, len(block_trials(design))
+    shown = f"each of the {pairs} pairs of conditions, one after the other"
+    if design.task == "rating":
+        shown = f"each of the {len(design.conditions)} conditions"
+    elif pairs == 1:
+        shown = "the pair of conditions, one after the other"
+    practice = rests = ""
+    if trials.practice:
+        many = f"{trials.practice} practice trial{'s' if trials.practice > 1 else ''}"
+        practice = f"Before it, {many}."
+    if trials.rest_every and len(orders(design, 1)) > trials.rest_every:
+        rests = f"After every {trials.rest_every} trials a rest of at least {trials.rest_s:g} s."
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
@@ -50,9 +65,9 @@ def text(
     made = environment.get_template("preregistration.md.jinja").render(
         design=design, program=program, sha256=sha256, hypotheses=hypotheses,
         conditions=list(_conditions(design, changes)), shown=_presentation(design),
-        trials=_trials(design),
+        trials=shown,
         repeated=f", {trials.repetitions} times" if trials.repetitions > 1 else "",
-        course=" ".join(filter(None, (_order(design), _practice(design), _rests(design)))),
+        course=" ".join(filter(None, (_order(design), practice, rests))),
         minutes=minutes(design, questionnaires),
         rows=list(_rows(design)), questionnaires=list(_asked(design, questionnaires)),
         objective=[(n, GAZE_MEASURES.get(n, "as in gazerig report")) for n in design.objective],
@@ -108,12 +123,6 @@ def minutes(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) ->
     return ceil((seconds + once * _QUESTION_S + rests * design.trials.rest_s + 120.0) / 60.0)
 
 
-def _analysis(one: Hypothesis) -> str:
-    also = "; ".join(TESTS[test] for test in one.also)
-    beside = f" Exploratory, deciding nothing: {also}." if also else ""
-    return f"`{one.measure}`, `{one.better}` against `{one.than}`: {TESTS[one.test]}.{beside}"
-
-
 def _conditions(
     design: StudyDesign, changes: Mapping[str, Mapping[str, object]]
 ) -> Iterator[dict[str, str]]:
@@ -144,14 +153,6 @@ def _presentation(design: StudyDesign) -> str:
     )
 
 
-def _trials(design: StudyDesign) -> str:
-    if design.task == "rating":
-        return f"each of the {len(design.conditions)} conditions"
-    if len(block_trials(design)) == 1:
-        return "the pair of conditions, one after the other"
-    return f"each of the {len(block_trials(design))} pairs of conditions, one after the other"
-
-
 def _order(design: StudyDesign) -> str:
     if design.trials.order == "random":
         return f"The order is random for each participant (seed {design.trials.seed})."
@@ -159,18 +160,6 @@ def _order(design: StudyDesign) -> str:
         f"Orders are Williams' squares (seed {design.trials.seed}): after every {balanced_group_size(design)} "
         "participants each has stood in each place, and after each other one, equally often."
     )
-
-
-def _practice(design: StudyDesign) -> str:
-    count = design.trials.practice
-    return f"Before it, {count} practice trial{'s' if count > 1 else ''}." if count else ""
-
-
-def _rests(design: StudyDesign) -> str:
-    trials = design.trials
-    if not trials.rest_every or len(orders(design, 1)) <= trials.rest_every:
-        return ""
-    return f"After every {trials.rest_every} trials a rest of at least {trials.rest_s:g} s."
 
 
 def _rows(design: StudyDesign) -> Iterator[tuple[str, str]]:

@@ -26,6 +26,7 @@ from gazerig.features.lab.report import blinks as blink_measures
 from gazerig.features.lab.report import eye_contact, face, landing, rests
 from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import compare_page, differences_of
+from gazerig.features.lab.report.face import published_walk, rig_walk
 from gazerig.features.lab.report.gaze_trace import (
     GazeTrace,
     GazeTraceBuilder,
@@ -44,7 +45,6 @@ from gazerig.features.lab.report.page import (
     write_all,
 )
 from gazerig.features.lab.report.plotting import COLOURS, Shown, png
-from gazerig.features.lab.report.reference_walk import published_walk, rig_walk
 from gazerig.features.lab.report.report import DRAWINGS, findings_of, measure_run, report_of
 from gazerig.features.lab.report.statistics import (
     MeasuredValue,

@@ -31,9 +31,9 @@ from gazerig.features.study.design import (
     Test,
     Trials,
 )
-from gazerig.features.study.measures import measures
 from gazerig.features.study.participation import participation
 from gazerig.features.study.power import power_claim
+from gazerig.features.study.scores import measures
 from gazerig.features.study.simulation import Population
 from gazerig.features.study.statistics import effects
 

@@ -35,14 +35,13 @@ from gazerig.features.study.journal import (
     TrialBegan,
     TrialEnded,
 )
-from gazerig.features.study.measures import measures
 from gazerig.features.study.participation import Participation, participation
 from gazerig.features.study.power import power_claim, power_of
 from gazerig.features.study.preregistration_text import sentence
 from gazerig.features.study.questionnaire import Questionnaire
 from gazerig.features.study.report import apa
 from gazerig.features.study.rules import consistency_rules
-from gazerig.features.study.scores import item_answers, scores, wins
+from gazerig.features.study.scores import item_answers, measures, scores, wins
 from gazerig.features.study.simulation import Population, levels
 from gazerig.features.study.statistics import effects, ranks
 from gazerig.features.study.statistics.contingency import chi_square, counts_of

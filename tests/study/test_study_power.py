@@ -9,7 +9,6 @@ from scipy import stats
 from study_records import QUESTIONS, design, pairs, records
 
 from gazerig.features.study.design import DECIDING, Hypothesis, Test, Trials
-from gazerig.features.study.measures import measures
 from gazerig.features.study.participation import participation
 from gazerig.features.study.power import (
     MOST,
@@ -21,7 +20,7 @@ from gazerig.features.study.power import (
     sample_size_by_formula,
 )
 from gazerig.features.study.run.study_file import load_study
-from gazerig.features.study.scores import scores, wins
+from gazerig.features.study.scores import measures, scores, wins
 from gazerig.features.study.simulation import (
     BETWEEN_SD,
     ITEM_SD,

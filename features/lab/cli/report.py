@@ -256,8 +256,8 @@ def _run_header(
     walk: "Walk",
 ) -> "RunHeader":
     """Return a run's description with the style of its gaze."""
+    from gazerig.features.lab.report.face import rig_walk
     from gazerig.features.lab.report.page import RunHeader
-    from gazerig.features.lab.report.reference_walk import rig_walk
 
     gaze = rig.gaze
     styles = (

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gazerig.features.lab.report import face
+from gazerig.features.lab.report.face import published_walk
 from gazerig.features.lab.report.plotting import (
     HUMAN,
     HUMAN_FILL,
@@ -19,7 +20,6 @@ from gazerig.features.lab.report.plotting import (
     legend,
     nothing,
 )
-from gazerig.features.lab.report.reference_walk import published_walk
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.heatmap import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas

@@ -9,8 +9,8 @@ from io import BytesIO
 from typing import Any, Literal, NamedTuple
 
 from gazerig.drivers.errors import SetupError, extra_hint
+from gazerig.features.lab.report.face import ReferenceWalk
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.reference_walk import ReferenceWalk
 
 try:
     import matplotlib as mpl

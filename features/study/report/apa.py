@@ -10,7 +10,7 @@ from markupsafe import Markup
 from gazerig.features.study.analysis import StudyAnalysis
 from gazerig.features.study.decisions import Decision
 from gazerig.features.study.design import Test
-from gazerig.features.study.measures import Measure
+from gazerig.features.study.scores import Measure
 from gazerig.features.study.statistics.effects import EffectSize, StatisticalTest
 
 TEST_NAMES: dict[Test, str] = {

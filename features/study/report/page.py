@@ -2,7 +2,7 @@
 
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import isfinite, nan
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +15,6 @@ from gazerig.features.study.analysis import ChoiceSummary, MeasureSummary, Study
 from gazerig.features.study.decisions import Decision
 from gazerig.features.study.journal import STEP_DEG
 from gazerig.features.study.report import apa, figures
-from gazerig.features.study.statistics.effects import StatisticalTest
 
 Progress = Callable[[str, float], None]
 _CLASSES = {
@@ -84,27 +83,41 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
     sections = []
     for k, one in enumerate(study.measures):
         progress("drawing", k / max(1, len(study.measures)))
-        if not _in_a_scale(one, study):
-            sections.append(_measure_section(one, study))
+        measure = one.measure
+        item = measure.items[0] if measure.kind == "item" else ""
+        if not item or not study.questionnaires[measure.questionnaire].items[item].scale:
+            sections.append(_measure_section(one, study))  # items of a scale are shown with it
     progress("drawing", 1.0)
+    tests = [
+        TestLine(
+            _label(one, study), apa.TEST_NAMES[test.key], test is one.test, apa.statistic(test),
+            apa.chance(test.p),
+            apa.chance(test.exact_p) if isfinite(test.exact_p) else Markup(""),
+            apa.chance(one.corrected_p) if test is one.test else Markup(""),
+            apa.effect(test.effect), test.notes,
+        )
+        for one in study.decisions
+        for test in (one.test, *one.also)
+        if test is not None
+    ]  # fmt: skip
+    forest = StudyFigure(
+        "Effects", figures.forest_png(study, [_label(one, study) for one in study.decisions]),
+        "Squares: the effect of each hypothesis; lines: its 95 % interval. Right of zero lies what "
+        "was expected.",
+    )  # fmt: skip
+    # Single exclusions of participants who count.
+    left_out_rows = Counter(
+        row.left_out for one in study.counted for row in one.answers if row.left_out
+    )
     return render(
         "study.html", Path(__file__).parent, study=study, made_by=made_by, banners=banners(study),
         facts=_facts(study), hypotheses=[_line(one, study) for one in study.decisions],
-        tests=list(_tests(study)), forest=_forest(study) if study.decisions else None, sections=sections,
+        tests=tests, forest=forest if study.decisions else None, sections=sections,
         choices=[_choice_section(one, study) for one in study.choices],
         checks=[(_label(one, study), one.checks) for one in study.decisions if one.checks],
-        left_out=[one for one in study.people if one.left_out], rows=_rows_left_out(study),
+        left_out=[one for one in study.people if one.left_out], rows=left_out_rows.most_common(),
         remarks=study.remarks, plan=study.design.plan, rules=_rules(study),
         css=lambda fine: "pass" if fine else "uncertain", p=apa.chance, isfinite=isfinite,
-    )  # fmt: skip
-
-
-def _forest(study: StudyAnalysis) -> StudyFigure:
-    names = [_label(one, study) for one in study.decisions]
-    return StudyFigure(
-        "Effects", figures.forest_png(study, names),
-        "Squares: the effect of each hypothesis; lines: its 95 % interval. Right of zero lies what "
-        "was expected.",
     )  # fmt: skip
 
 
@@ -147,41 +160,32 @@ def _facts(study: StudyAnalysis) -> tuple[tuple[str, str], ...]:
     design, people = study.design, study.people
     dates = sorted(one.opened_utc for one in people)
     plan = design.plan
+    deleted = f"; data of {study.deleted} more were deleted as they wished" if study.deleted else ""
+    many = design.trials.repetitions
+    times = "once" if many == 1 else f"{many} times"
+    steps = [t.measured.get(STEP_DEG, nan) for one in study.people for t in one.trials]
+    known = [step for step in steps if isfinite(step)]
+    switches = [
+        ("switches", f"largest step of a commanded joint {max(known):.2f} deg in a tick, "
+                     f"{len(known)} switches")
+    ] if known else []  # fmt: skip
     return (
         ("study", study.name),
         ("design (SHA-256)", f"{study.design_sha256}; all {len(people)} participants carry it"),
         ("participants", f"{len(people)} came, {len(study.counted)} count, {plan.participants} "
-                         f"were planned{_deletion_text(study.deleted)}"),
+                         f"were planned{deleted}"),
         ("from, to", f"{dates[0]}, {dates[-1]}" if dates else ""),
         ("conditions", "; ".join(f"{k}: {study.label(k)}" for k in design.conditions)),
         ("task", "each was rated" if design.task == "rating" else "one of two was chosen"),
         ("shown", f"{design.trials.seconds:g} s {_SHOWN[design.presentation.on]}, "
-                  f"each {_times(design.trials.repetitions)}"),
-        *_switches(study),
+                  f"each {times}"),
+        *switches,
         ("plan", f"alpha {plan.alpha:g} over all hypotheses ({plan.correction}), power "
                  f"{plan.power:g} for d_z = {plan.effect:g}"),
     )  # fmt: skip
 
 
 _SHOWN = {"head": "of the head in the room", "film": "of film"}
-
-
-def _switches(study: StudyAnalysis) -> list[tuple[str, str]]:
-    """Return the largest step of a joint in the head's switches of condition, if recorded."""
-    steps = [t.measured.get(STEP_DEG, nan) for one in study.people for t in one.trials]
-    known = [step for step in steps if isfinite(step)]
-    if not known:
-        return []
-    return [("switches", f"largest step of a commanded joint {max(known):.2f} deg in a tick, "
-                         f"{len(known)} switches")]  # fmt: skip
-
-
-def _deletion_text(count: int) -> str:
-    return f"; data of {count} more were deleted as they wished" if count else ""
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
 
 
 def _rules(study: StudyAnalysis) -> tuple[str, ...]:
@@ -195,12 +199,6 @@ def _rules(study: StudyAnalysis) -> tuple[str, ...]:
     if rules.incomplete == "exclude":
         found.append("participants who did not finish")
     return tuple(found)
-
-
-def _rows_left_out(study: StudyAnalysis) -> list[tuple[str, int]]:
-    """Return the reasons of single exclusions of participants who count, with their numbers."""
-    why = Counter(row.left_out for one in study.counted for row in one.answers if row.left_out)
-    return why.most_common()
 
 
 def _label(one: Decision, study: StudyAnalysis) -> str:
@@ -219,33 +217,6 @@ def _line(one: Decision, study: StudyAnalysis) -> HypothesisLine:
     if not said.two_sided:
         expected += " (one-sided)"
     return HypothesisLine(expected, apa.sentence(one, study), one.verdict, _CLASSES[one.verdict])
-
-
-def _tests(study: StudyAnalysis) -> Iterator[TestLine]:
-    for one in study.decisions:
-        planned = (one.test,) if one.test is not None else ()
-        for test in (*planned, *one.also):
-            yield _test_line(one, test, study)
-
-
-def _test_line(one: Decision, test: StatisticalTest, study: StudyAnalysis) -> TestLine:
-    planned = test is one.test
-    return TestLine(
-        _label(one, study), apa.TEST_NAMES[test.key], planned, apa.statistic(test),
-        apa.chance(test.p),
-        apa.chance(test.exact_p) if isfinite(test.exact_p) else Markup(""),
-        apa.chance(one.corrected_p) if planned else Markup(""),
-        apa.effect(test.effect), test.notes,
-    )  # fmt: skip
-
-
-def _in_a_scale(one: MeasureSummary, study: StudyAnalysis) -> bool:
-    """Return whether an item is shown with its scale."""
-    measure = one.measure
-    if measure.kind != "item":
-        return False
-    item = study.questionnaires[measure.questionnaire].items[measure.items[0]]
-    return bool(item.scale)
 
 
 def _measure_section(one: MeasureSummary, study: StudyAnalysis) -> MeasureSection:

@@ -21,8 +21,8 @@ from gazerig.features.study.journal import (
     TrialBegan,
     TrialEnded,
 )
-from gazerig.features.study.measures import GAZE_MEASURES
 from gazerig.features.study.run.study_file import LoadedStudy
+from gazerig.features.study.scores import GAZE_MEASURES
 from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.robot.analysis.gaze_on_face import on_face
 from gazerig.robot.analysis.human_norms import BY_KEY
