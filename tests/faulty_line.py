@@ -9,11 +9,7 @@ from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
 
 IDS = (1, 2, 3)
-
-
 READ_ONE = (2, struct.pack("<HH", 132, 4))
-
-
 READ_ALL = struct.pack("<HH", 132, 4) + bytes(IDS)
 
 

@@ -22,30 +22,18 @@ from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
 
 DT = 0.005
-
-
 CENTRED = GeometryParams(0.0, 0.0, 0.0)
-
-
 DESK = GeometryParams(60.0, 40.0, 50.0)
-
-
 NO_RELIEF = HeadParams(goal_model="attention", recentre_after_ms=60_000.0, pursue_above_deg_s=0.0)
 """The paper's head: eq 7, and nothing after it."""
-
 
 EXACT = OculomotorParams(
     undershoot=0.0, endpoint_scatter_along=0.0, endpoint_scatter_across=0.0, refixation_deg=0.0
 )
 """Saccades land on their targets, and nothing moves between them."""
 
-
 AT_ONCE = replace(EXACT, eye_lag_ms=DT * 1e3)
-
-
 SACCADE = SaccadeParams(profile="min_jerk")
-
-
 HUMAN = SaccadeParams(profile="human")
 
 

@@ -9,13 +9,8 @@ from gazerig.sim_mock.maestro.board import build_board
 from gazerig.testing.bus_bench import rows
 
 CENTRE = 6000
-
-
 SPEED = 12_000.0
-
-
 LOW, HIGH = 4400, 7600
-
 
 SETUPS = (
     ServoConfig(0, "hobby", LOW, HIGH, SPEED, "eyes", rest_steps=6100),
@@ -23,10 +18,7 @@ SETUPS = (
     ServoConfig(5, "hobby", LOW, HIGH, SPEED, "brow", rest_steps=9000),
 )
 
-
 IDS = tuple(setup.id for setup in SETUPS)
-
-
 TICK_S = 0.01
 
 

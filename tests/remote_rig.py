@@ -16,8 +16,6 @@ from gazerig.robot.remote.request_handler import Pulse
 from gazerig.robot.remote.socket_server import RemoteServer
 
 RATE = "loop.rate_hz"
-
-
 BLINKS = "gaze.lids.blinks_per_min"
 
 

@@ -11,8 +11,6 @@ from gazerig.robot.dashboard.feed.page_process import REPLAY, SNAPSHOT, unpack
 from gazerig.robot.model.commands import Ask
 
 SECONDS = 6.0
-
-
 RATE_HZ = 200.0
 
 

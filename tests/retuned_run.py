@@ -17,11 +17,7 @@ from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.commands import Value
 
 RIG = load_rig("desk")
-
-
 DT_S = 1.0 / 200.0
-
-
 STEPS_PER_RAD = 4096.0 / (2.0 * pi)
 
 
@@ -117,7 +113,6 @@ STATE = {
     "_part", "_at", "_keeper", "_counting", "_shift", "_heated", "_outside_s", "_last",
     "_behaviour", "bus", "_nothing",
 }  # fmt: skip
-
 
 PLAIN = {str, int, float, bool, type(None)}
 

@@ -81,8 +81,6 @@ CASES = {
 }
 
 VOLTS = {"dynamixel": 5.0, "feetech": 7.4, "maestro": 5.0, "pca9685": 5.0}
-
-
 RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685": "maker"}
 """The shipped rig of each kind."""
 

@@ -29,8 +29,6 @@ from gazerig.robot.cli.terminal import DEBUG_LOGGER, tidied_up
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
 ON_BOARD = SerialPort("/dev/ttyS0", "n/a", "", None)
-
-
 Terminal = pytest.CaptureFixture[str]
 
 
@@ -98,7 +96,6 @@ LIGHT_HELP = (
     *("kinds", "schema", "record-camera", "fit-scanpath", "ctl set", "study"),
 )
 """Commands whose help is there at once; that of others imports what speaks to servos."""
-
 
 HELP = """
 import json, os, sys

@@ -30,8 +30,6 @@ GAZERIG = (
 )
 SPEED = "gaze.saccade.max_speed_deg_s"
 RATE = "loop.rate_hz"
-
-
 ROOT = Path(__file__).parents[1]
 
 

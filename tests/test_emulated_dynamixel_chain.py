@@ -30,16 +30,9 @@ def test_the_crc_is_the_protocols():
 
 
 ONE = [(1, "xm430-w210", 166, 38)]
-
-
 TWO = [(2, "xm430-w210", 2079, 38), *ONE]
-
-
 THREE = [(3, "xm430-w210", 166), (7, "xm430-w210", 2079), (4, "xm430-w210", 1023)]
-
-
 DONE = "FF FF FD 00 01 04 00 55 00 A1 0C"
-
 
 MANUALS: dict[str, tuple[Any, ...]] = {
     "ping": (ONE, PING.hex(), "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D"),
@@ -80,7 +73,6 @@ MANUALS: dict[str, tuple[Any, ...]] = {
     ),
 }  # fmt: skip
 """Examples of the manual: servos, what is sent, what is answered."""
-
 
 WRITTEN = {
     "write": [(1, 116, 4, 512)],

@@ -32,8 +32,6 @@ from gazerig.robot.recording.gaze_angles import (
 )
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
-
-
 SETTLED_S = 3.0  # at the start the guard lets the eyes follow the plan only slowly
 
 

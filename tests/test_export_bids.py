@@ -17,7 +17,6 @@ from gazerig.robot.recording.gaze_angles import gaze_in_space
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
-
 ABOUT = DatasetDescription(
     "desk", "face-to-face", RATE_HZ, "2026-01-01T00:00:00+00:00", "gazerig 0"
 )

@@ -15,17 +15,9 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
-
-
 ROOT = Path(__file__).parents[1]
-
-
 OTHER_SDK = ROOT / ".venv" / "other-sdk"
-
-
 ABSENT = {"acceleration_limit", "torque_limit", "moving_speed", "current_limit", "goal_current"}
-
-
 STEADY_STEPS = 12
 """Friction keeps a servo with factory gains so far from its goal."""
 

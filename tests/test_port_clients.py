@@ -21,8 +21,6 @@ def path():
 
 
 PING = bytes.fromhex("FFFFFD0001030001194E")
-
-
 PONG = 14
 
 

@@ -134,10 +134,7 @@ OF_GAZE = (
     "gestures",
 )  # fmt: skip
 
-
 OF_BODY = ("guard", "body", "kinematics", "head", "oculomotor")
-
-
 OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor", "animation")
 
 
@@ -149,8 +146,6 @@ def running_parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]
 
 
 IN_PICTURES = ("detector.", "motion.")
-
-
 SECTIONS = [("gaze", OF_GAZE), ("joints", OF_BODY), ("guard", OF_BODY), ("", OF_SIGHT)]
 
 

@@ -35,8 +35,6 @@ LET_GO = "(not )?parked, torque off"
 
 ASKED = RunOptions(mock=True, world="two-heads", no_pictures=True, rig="minimal", no_page=True)
 COMMAND = ("run", "minimal", "--mock", "--world", "two-heads", "--no-pictures", "--no-page")
-
-
 branched = pytest.mark.usefixtures("branched_children_here")
 
 
