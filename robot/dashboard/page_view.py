@@ -93,7 +93,19 @@ class PageView:
         self._panel.update(news.snapshots)
         if news.snapshots:
             self._newest = news.snapshots[-1]
-            self._tell(self._stop_state())
+            shot = self._newest
+            if self._replay is not None:  # it can neither be stopped nor resumed
+                self._tell({"recording": True, **leads_state(Leader("recording"), shot)})
+            else:
+                self._tell({
+                    "stopped": shot.stopped,
+                    "silent": False,
+                    # Joints without feedback jump when the torque is switched on.
+                    "without_feedback": len(shot.estimated),
+                    "emulated": self.emulated,
+                    "refused": refused_moves(self._menus, shot.joints),
+                    **leads_state(shot.leader, shot),
+                })  # fmt: skip
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
         self._world_now = news.world
@@ -106,24 +118,6 @@ class PageView:
             # Browsers receive a snapshot as a whole.
             with self._server.atomic(), self._widgets.hold():
                 self._draw()
-
-    def _stop_state(self) -> dict[str, object]:
-        """Return the state for the stop button; a recording can neither be stopped nor resumed.
-
-        without_feedback: number of joints without feedback, which jump when torque is switched on
-        """
-        shot = self._newest
-        if self._replay is not None:
-            return {"recording": True, **leads_state(Leader("recording"), shot)}
-        stopped, without_feedback = (shot.stopped, len(shot.estimated)) if shot else ("", 0)
-        return {
-            "stopped": stopped,
-            "silent": False,
-            "without_feedback": without_feedback,
-            "emulated": self.emulated,
-            "refused": refused_moves(self._menus, shot.joints if shot else None),
-            **leads_state(shot.leader if shot else Leader(), shot),
-        }
 
     def _take(self, kind: bytes, data: object) -> None:
         """Apply messages of the rig other than snapshots and frames."""
@@ -191,12 +185,11 @@ class PageView:
             self._tell({"stopped": "", "silent": True})
 
 
-def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
+def leads_state(leader: Leader, shot: Snapshot) -> dict[str, object]:
     """Return the source of control and the activity of the head, for the page's headline."""
-    t_s = shot.t_s if shot is not None else 0.0
     return {
         "leads": leader.kind,
-        "leads_words": sentence(leader, t_s),
-        "headline": shot.headline if shot is not None else "",
-        "busy": shot.busy if shot is not None else "",
+        "leads_words": sentence(leader, shot.t_s),
+        "headline": shot.headline,
+        "busy": shot.busy,
     }

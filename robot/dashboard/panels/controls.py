@@ -103,7 +103,14 @@ class LeadPanel:
             visible=False,
         )
         self.drag.on_change(lambda on, _: self._show_target(on))
-        self.free.on_press(lambda _, client: self._look_freely(client))
+
+        def look_freely(_: str, client: str) -> None:
+            self.drag.value = False
+            self._show_target(on=False)
+            self._let_go()
+            self._outbox.command(LookAt(None), client)
+
+        self.free.on_press(look_freely)
 
         # A coroutine: viser runs these in order, plain functions in any order.
         @self._gizmo.on_update
@@ -120,12 +127,6 @@ class LeadPanel:
         self._gizmo.visible = on
         if on:
             self._gizmo.position = self._target_m
-
-    def _look_freely(self, client: str) -> None:
-        self.drag.value = False
-        self._show_target(on=False)
-        self._let_go()
-        self._outbox.command(LookAt(None), client)
 
     def offer(self, name: str, choices: Sequence[str]) -> None:
         """Add a menu as a row of buttons, or replace its choices."""

@@ -112,20 +112,16 @@ class Inbox:
                 except queue.Full:
                     if self._refuse is not None:
                         self._refuse(message)
-        self._end_later()
-        if not self._over.is_set():
-            self._lost()
-
-    def _end_later(self) -> None:
-        """End the slow thread after its present request; requests that wait are dropped."""
+        # End the slow thread after its present request; requests that wait are dropped.
         while True:
             try:
                 self._later.put_nowait(_OVER)
+                break
             except queue.Full:
                 with contextlib.suppress(queue.Empty):
                     self._later.get_nowait()
-            else:
-                return
+        if not self._over.is_set():
+            self._lost()
 
     def _handle_later(self) -> None:
         waiting = [self._later.get()]
