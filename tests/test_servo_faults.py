@@ -14,14 +14,7 @@ import sts_rig
 from copied import copied
 from dynamixel_rig import WAYS
 from dynamixel_rig import Rig as DynamixelRig
-from moving_bus import (
-    LONGEST_S,
-    live_through_answers_out_of_order,
-    live_through_duplicates,
-    live_through_everybody_late,
-    live_through_harmless,
-    live_through_missing_ids,
-)
+from moving_bus import IDS, LONGEST_S, NAMES
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
@@ -102,26 +95,47 @@ def test_a_passing_fault_costs_little_and_passes(rig, fault):
      "fragment", "echo on", "delay 2 0.3", "stall 3 0.3"],
 )  # fmt: skip
 def test_what_is_harmless(rig, fault):
-    live_through_harmless(rig, fault)
+    rig.command(fault)
+    assert [rig.heard() for _ in range(20)] == [[True] * 4] * 20
+    assert rig.longest_s < LONGEST_S
 
 
 def test_answers_that_come_twice(rig):
-    live_through_duplicates(rig)
+    rig.command("duplicate all")
+    for _ in range(30):
+        assert rig.heard() == [True] * 4
 
 
 @pytest.mark.parametrize("late_ms", [3, 15, 60, 80, 200])
 def test_all_late_is_never_taken_for_fresh(rig, late_ms):
-    live_through_everybody_late(rig, late_ms)
+    for times in (1, 3, 12):
+        rig.command(f"delay all {late_ms} count {times}")
+        for _ in range(10):
+            rig.tick()
+        rig.until_all()
+    assert rig.longest_s < 0.3
 
 
 def test_answers_out_of_order(rig):
-    live_through_answers_out_of_order(rig)
+    rig.command("reorder count 1")
+    rig.tick()
+    assert rig.heard() == [True] * 4
 
 
 @pytest.mark.parametrize("policy", ["silence", "skip", "timeout"])
 @pytest.mark.parametrize("missing", [(1,), (4,), (2, 3)])
 def test_silent_servos_cost_only_themselves(rig, policy, missing):
-    live_through_missing_ids(rig, policy, missing)
+    rig.command(f"set after-missing {policy}")
+    for servo_id in missing:
+        rig.command(f"lose {servo_id}")
+    expected = [servo_id not in missing for servo_id in IDS]
+    assert [rig.heard() for _ in range(50)] == [expected] * 50
+    assert rig.longest_s < LONGEST_S
+    lines = rig.bus.events()
+    assert all(f"{NAMES[i - 1]} (servo {i}) does not answer" in lines for i in missing)
+    rig.command("clear")
+    assert rig.until_all() <= 60
+    assert any("answers again after" in line for line in rig.bus.events())
 
 
 def test_a_port_that_fails_is_opened_again(rig):
