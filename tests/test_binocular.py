@@ -230,6 +230,19 @@ def test_e29_reflex_without_a_target(hz: float, phase: float, residual: float) -
     assert abs(1.0 - z) == pytest.approx(residual, abs=0.02)
 
 
+@pytest.mark.parametrize("dt", [0.001, 0.005, 0.010])
+def test_e29_the_reflex_is_late_by_its_delay_and_no_part_of_a_tick(dt: float) -> None:
+    w = 2.0 * pi * 0.5
+    begin = aim(0.0, 0.0, 100.0, -4.0)
+    lost = begin._replace(v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
+    trace = eyes(lambda t: lost, 8.0, dt, begin, lambda t: radians(10.0) * sin(w * t))
+    keep = trace.t > 4.0
+    # An angle is held for a tick: its middle counts.
+    held_s = trace.t[keep] - 0.5 * dt
+    z = 2j * np.mean(-trace.version[keep] * np.exp(-1j * w * held_s)) / 10.0
+    assert -np.angle(z) / w == pytest.approx(0.010, abs=0.0005)
+
+
 @pytest.mark.parametrize("gain", [0.0, 0.5, 0.95, 1.3])
 def test_a_reflex_of_another_gain_takes_back_its_share_of_the_heads_turn(gain: float) -> None:
     """Without a target nothing else moves the eyes: the head turns 10 deg, they turn -gain 10."""

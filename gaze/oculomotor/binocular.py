@@ -162,6 +162,7 @@ class BinocularController:
         self._known = False
         self._smoothed, self._velocity = _NONE, _NONE
         self._heads: deque[tuple[float, Mat3]] = deque()
+        self._opposed: Mat3 | None = None
         self._demands: deque[tuple[float, float]] = deque()
 
     def fixate(
@@ -254,13 +255,17 @@ class BinocularController:
         return min(half_m / tan(0.5 * vergence), _FARTHEST_M) if vergence > 0.0 else _FARTHEST_M
 
     def _rotations(self, R_world_head: Mat3, t_s: float) -> tuple[Mat3, Mat3] | None:
-        """Return the head's rotations between which the reflex acts in this period."""
-        heads = self._heads
-        before = heads[0][1] if heads else None
+        """Return the head's rotations between which the reflex acts in this period.
+
+        Both are those of a delay before the middle of a period, in which the eyes hold an angle.
+        """
+        heads, before = self._heads, self._opposed
         heads.append((t_s, R_world_head))
         while len(heads) > 1 and heads[1][0] <= t_s - self._reflex_delay_s + 1e-9:
             heads.popleft()
-        return (before, heads[0][1]) if before is not None else None
+        then = heads[0][1]
+        self._opposed = _middle(then, heads[1][1]) if len(heads) > 1 else then
+        return None if before is None else (before, self._opposed)
 
     def _demand(self, vergence_rad: float, t_s: float) -> float | None:
         """Return the vergence that the target required a delay ago, None before the first."""
@@ -294,6 +299,12 @@ def _clip(v: Vec3, most: float) -> Vec3:
     """Return a vector no longer than ``most``."""
     size = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     return v if size <= most else scale(v, most / size)
+
+
+def _middle(a: Mat3, b: Mat3) -> Mat3:
+    """Return the mean of two rotations that differ by little: those of two ticks."""
+    x, y, z = (scale(add(p, q), 0.5) for p, q in zip(a, b, strict=True))
+    return x, y, z
 
 
 class OppositeAngles:
