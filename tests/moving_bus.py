@@ -1,4 +1,4 @@
-"""Four moving smart servos in this process, and the faults that all such buses live through."""
+"""Four moving smart servos in this process; a rig of each family makes the chain and the driver."""
 
 from typing import Any
 

@@ -4,7 +4,6 @@ import struct
 from typing import Any
 
 import pytest
-from dynamixel_vectors import PING, instruction, vector
 from fastcrc.crc16 import umts
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,6 +14,16 @@ from gazerig.sim_mock.dynamixel.memory import ACCESS, DATA_LENGTH, DATA_RANGE, D
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
+
+instruction = DynamixelBench.instruction
+
+
+def vector(text: str) -> bytes:
+    return bytes.fromhex(text.replace(" ", ""))
+
+
+PING = vector("FF FF FD 00 01 03 00 01 19 4E")
+
 
 ALERT = 0x80
 
