@@ -260,7 +260,12 @@ class BodyMotion:
             for one, target in zip(acts, at, strict=True)
             if f"{name} arm" in one.tracks
         ]
-        held = motions.PostureShares(rise(self.base.seated), self._guarding(), self._holding(name))
+        holds = np.zeros_like(self.t_s)
+        for thing in self.script.things:
+            holders = object_handover.holders(self.script, self.timelines, thing)
+            share = object_handover.holding_share(self.t_s, holders, self.name, name)
+            holds = np.maximum(holds, share)
+        held = motions.PostureShares(rise(self.base.seated), self._guarding(), holds)
         rest = motions.resting(frame, held, self._swing(side), self.person.gloves)
         hand = motions.hand(
             frame, self.t_s, [one for one, _ in mine], [target for _, target in mine], rest
@@ -293,14 +298,6 @@ class BodyMotion:
                     self.t_s, one.start_s, 0.5, one.end_s - one.start_s - 1.0, 0.5
                 )
                 total = np.maximum(total, 1.0 if whole else held)
-        return total
-
-    def _holding(self, side: str) -> Floats:
-        total = np.zeros_like(self.t_s)
-        for thing in self.script.things:
-            found = object_handover.holders(self.script, self.timelines, thing)
-            share = object_handover.holding_share(self.t_s, found, self.name, side)
-            total = np.maximum(total, share)
         return total
 
     def _leg(self, found: dict[str, Pose], side: float) -> None:

@@ -65,10 +65,13 @@ def refuse_excessive(path: Path) -> None:
                 rule = f"more than {MOST_ELEMENTS:,} elements, repeated ones counted as often"
                 raise SetupError(f"{path}: {rule}: leave some out")
             _check(file, element)
-            for asset in _assets(file.parent, folders, element):
-                if element.tag in ("include", "model"):
+            # The files that an element names, in all folders that MuJoCo searches.
+            for name in (value for key, value in element.items() if key.startswith("file")):
+                places = (file.parent / within / name for within in {"", *folders})
+                asset = next((place for place in places if place.exists()), None)
+                if asset is not None and element.tag in ("include", "model"):
                     waiting.append(asset)
-                else:
+                elif asset is not None:
                     _check_asset(file, element, asset)
 
 
@@ -82,16 +85,6 @@ def _repeated(
     yield element, times if element.tag == "replicate" else inside
     for child in element:
         yield from _repeated(child, inside)
-
-
-def _assets(folder: Path, folders: set[str], element: ElementTree.Element) -> Iterator[Path]:
-    """Yield the files that an element names, in all folders that MuJoCo searches."""
-    named = [value for key, value in element.items() if key.startswith("file")]
-    for name in named:
-        for within in {"", *folders}:
-            if (found := folder / within / name).exists():
-                yield found
-                break
 
 
 def _check(file: Path, element: ElementTree.Element) -> None:

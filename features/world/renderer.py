@@ -140,7 +140,13 @@ class Renderer:
                 mujoco.mjr_render(rect, self._scene, self._mjr)
                 mujoco.mjr_readPixels(rgb, z, rect, self._mjr)
         image = np.ascontiguousarray(rgb[::-1, :, ::-1])
-        return Rendered(image, None if z is None else _metres(z[::-1]))
+        if z is None:
+            return Rendered(image, None)
+        # The depth buffer is 1 at the nearest and 0 far away.
+        near, far, z = _NEAREST_M, _FARTHEST_M, z[::-1]
+        metres = (near * far / (near + z.astype(np.float64) * (far - near))).astype(np.float32)
+        metres[z <= 0.0] = np.inf
+        return Rendered(image, metres)
 
     def close(self) -> None:
         """Free everything; safe to call twice."""
@@ -193,14 +199,6 @@ def _geoms_of(model: mujoco.MjModel, bodies: Collection[str]) -> NDArray[np.bool
     for number in range(1, model.nbody):  # parents come first
         hidden[number] |= hidden[model.body_parentid[number]]
     return np.asarray(hidden[model.geom_bodyid])
-
-
-def _metres(z: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return distances along the axis from a depth buffer that is 1 at the nearest, 0 far away."""
-    near, far = _NEAREST_M, _FARTHEST_M
-    out = (near * far / (near + z.astype(np.float64) * (far - near))).astype(np.float32)
-    out[z <= 0.0] = np.inf
-    return out
 
 
 def _free(context: Any, mjr: Any) -> None:
@@ -262,22 +260,17 @@ class WorldPicture:
         self._place(self._data, t_s)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
-        renderer = self._fitting(*size_px)
+        if self._renderer is None or size_px[0] > self._size[0] or size_px[1] > self._size[1]:
+            wide, high = max(size_px[0], self._size[0]), max(size_px[1], self._size[1])
+            self.close()
+            self._renderer = Renderer(self._model, wide, high, self._params, self._hidden)
+            self._size = wide, high
         R_world_base, p_world_base_m = self._base
         R, p_m = compose(R_world_base, R), add(p_world_base_m, rotate(R_world_base, p_m))
-        return renderer.render(self._data, lens, R, p_m, size_px, depth=depth, rows=rows)
+        return self._renderer.render(self._data, lens, R, p_m, size_px, depth=depth, rows=rows)
 
     def close(self) -> None:
         """Free the renderer; safe to call twice."""
         if self._renderer is not None:
             self._renderer.close()
         self._renderer, self._size = None, (0, 0)
-
-    def _fitting(self, width: int, height: int) -> Renderer:
-        """Return a renderer for pictures of a size."""
-        if self._renderer is None or width > self._size[0] or height > self._size[1]:
-            wide, high = max(width, self._size[0]), max(height, self._size[1])
-            self.close()
-            self._renderer = Renderer(self._model, wide, high, self._params, self._hidden)
-            self._size = wide, high
-        return self._renderer

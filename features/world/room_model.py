@@ -109,21 +109,17 @@ class _Room:
         material = self.spec.add_material(name=name, specular=shine, shininess=0.3)
         material.emission = _GLOWS.get(colour, 0.0)
         if isinstance(colour, str):
-            self._picture(colour)
+            if self.spec.texture(f"room/{colour}") is None:
+                image, flat = texture(colour), mujoco.mjtTexture.mjTEXTURE_2D
+                made = self.spec.add_texture(name=f"room/{colour}", type=flat)
+                made.height, made.width, made.nchannel = (*image.shape[:2], 3)
+                made.data = image.tobytes()
             material.texrepeat = list(repeat)
             textures = list(material.textures)
             textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = f"room/{colour}"
             material.textures = textures
         else:
             material.rgba = [*(c / 255.0 for c in colour), 1.0]
-
-    def _picture(self, name: str) -> None:
-        if self.spec.texture(f"room/{name}") is not None:
-            return
-        image = texture(name)
-        made = self.spec.add_texture(name=f"room/{name}", type=mujoco.mjtTexture.mjTEXTURE_2D)
-        made.height, made.width, made.nchannel = (*image.shape[:2], 3)
-        made.data = image.tobytes()
 
 
 _WOOD: Colour = (128, 92, 62)

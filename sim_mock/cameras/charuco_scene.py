@@ -151,7 +151,14 @@ class BoardScene:
         params: BoardCameraParams | None = None,
     ) -> None:
         par = params if params is not None else BoardCameraParams()
-        self.mount, self.lens = offset_mount(camera), _lens(camera, par)
+        self.mount, field_deg = offset_mount(camera), camera.horizontal_field_deg
+        size = par.width_px, par.height_px
+        # The calibrated lens, or one that differs a little from the stated field of view.
+        self.lens = (
+            true_lens(*size, field_deg)
+            if camera.lens is None
+            else intrinsics_of_lens(camera.lens, radians(field_deg), *size)
+        )
         self.head_rad: Angles3 = (0.0, 0.0, 0.0)
         self._camera = BoardCamera(par, self.lens, board, rng)
         self._where = CameraMount(self.mount)
@@ -223,11 +230,3 @@ def hand_held_pose(
     p = centre - R @ (wide / 2, high / 2, 0.0)
     rows = [(row[0], row[1], row[2]) for row in R.tolist()]
     return (rows[0], rows[1], rows[2]), (float(p[0]), float(p[1]), float(p[2]))
-
-
-def _lens(camera: CameraParams, params: BoardCameraParams) -> Intrinsics:
-    """Return the calibrated lens, or one that differs a little from the stated field of view."""
-    size = (params.width_px, params.height_px)
-    if camera.lens is None:
-        return true_lens(*size, camera.horizontal_field_deg)
-    return intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), *size)

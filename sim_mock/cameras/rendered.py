@@ -141,7 +141,10 @@ class PixelCamera:
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
             par = self._params
-            size, motion = (par.width_px, par.height_px), self._motion(now_s, R, p)
+            size = par.width_px, par.height_px
+            motion = CameraMotion(R, p, R, p, 0.0)
+            if self._before is not None and now_s > self._before[0]:
+                motion = CameraMotion(R, p, *self._before[1:], now_s - self._before[0])
             since_s = now_s - self._start_s
             seen = expose(self._view, par, since_s, self.lens, size, motion, depth=par.depth)
             image = self._sensor.image(seen.image)
@@ -193,13 +196,6 @@ class PixelCamera:
     def close(self) -> None:
         """Stop, and free the view."""
         self._view.close()
-
-    def _motion(self, t_s: float, R: Mat3, p: Vec3) -> CameraMotion:
-        """Return the camera's pose now and at the previous call."""
-        if self._before is None or t_s <= self._before[0]:
-            return CameraMotion(R, p, R, p, 0.0)
-        before_s, R_before, p_before = self._before
-        return CameraMotion(R, p, R_before, p_before, t_s - before_s)
 
 
 class DrawnScene(NamedTuple):

@@ -62,7 +62,11 @@ def loop_of(get: Get, model: DynamixelModel, side: int) -> Loop:
     if mode == PWM:
         return Loop(bias=side * get("goal_pwm") / PWM_FULL, u_max=limit, slew=slew)
     limit = min(limit, abs(get("goal_pwm")) / PWM_FULL)
-    torque_max = _torque_limit(get, model) if mode in (CURRENT, CURRENT_POSITION) else inf
+    torque_max = inf
+    if mode in (CURRENT, CURRENT_POSITION):
+        # The goal current and its limit, as a share of the stall torque.
+        units = min(abs(get("goal_current")), get("current_limit"))
+        torque_max = units * model.current_unit_ma / 1000.0 / model.stall_current_a
     if mode == CURRENT:
         goal = side * get("goal_current")
         bias = FAR_BEYOND if goal > 0 else -FAR_BEYOND if goal < 0 else 0.0
@@ -85,12 +89,6 @@ def loop_of(get: Get, model: DynamixelModel, side: int) -> Loop:
         torque_max=torque_max,
         slew=slew,
     )
-
-
-def _torque_limit(get: Get, model: DynamixelModel) -> float:
-    """Return the torque that the goal current and its limit allow, as a share of stall."""
-    units = min(abs(get("goal_current")), get("current_limit"))
-    return units * model.current_unit_ma / 1000.0 / model.stall_current_a
 
 
 TRIPPED = 255

@@ -92,20 +92,19 @@ class EmulatedChannel:
             return
         way8 = self.target * EIGHTHS - self._at8
         sign = -1 if way8 < 0 else 1
-        velocity8 = sign * self._next_speed8(abs(way8), sign * self._velocity8)
+        # The speed towards the target for the next 10 ms; below 0: still away from it.
+        speed8, most8 = sign * self._velocity8, self.speed * EIGHTHS or abs(way8)
+        if self.acceleration:
+            wanted8 = min(most8, largest_braking_step(abs(way8), self.acceleration))
+            speed8 = min(max(wanted8, speed8 - self.acceleration), speed8 + self.acceleration)
+        else:
+            speed8 = min(most8, abs(way8))
+        velocity8 = sign * speed8
         at8 = self._at8 + velocity8
         self._at8 = min(max(at8, self.low * EIGHTHS), self.high * EIGHTHS)
         clipped = self._at8 != at8
         there = self._at8 == self.target * EIGHTHS and abs(velocity8) <= self.acceleration
         self._velocity8 = 0 if clipped or there or not self.acceleration else velocity8
-
-    def _next_speed8(self, way8: int, speed8: int) -> int:
-        """Return the speed towards the target for the next 10 ms; below 0: still away from it."""
-        most8 = self.speed * EIGHTHS or way8
-        if not self.acceleration:
-            return min(most8, way8)
-        wanted8 = min(most8, largest_braking_step(way8, self.acceleration))
-        return min(max(wanted8, speed8 - self.acceleration), speed8 + self.acceleration)
 
     def _arrive(self) -> None:
         self._at8, self._velocity8 = self.target * EIGHTHS, 0
@@ -236,15 +235,13 @@ class MaestroBody:
 
     def _run_periods(self, until: int) -> None:
         while self._period < until:
-            self._period = self._next_period(until)
+            following = self._period + 1
+            if self.script_channel is None and self.awake and self._at_rest():
+                # The next event is the end of the serial time-out, or none.
+                due = self._due()
+                following = until if due is None else max(following, min(until, due))
+            self._period = following
             self._pass()
-
-    def _next_period(self, now: int) -> int:
-        """Return the next period with an event."""
-        if self.script_channel is not None or not self.awake or not self._at_rest():
-            return self._period + 1
-        due = self._due()
-        return now if due is None else max(self._period + 1, min(now, due))
 
     def _due(self) -> int | None:
         """Return the period in which the serial time-out ends, None: never."""

@@ -111,8 +111,9 @@ class Terminal:
         """Remove the link and the terminal: a client gets an I/O error or a hang-up."""
         if not self.plugged:
             return
-        if self._link is not None and _links_to(self._link, os.ttyname(self._slave)):
-            self._link.unlink()
+        link, own = self._link, os.ttyname(self._slave)
+        if link is not None and link.is_symlink() and os.readlink(link) == own:
+            link.unlink()
         if self.watch is not None:
             self.watch.close()
         os.close(self._slave)
@@ -172,7 +173,3 @@ def _create_link(link: Path, target: str) -> None:
         link.symlink_to(target)
     except OSError as error:
         raise OSError(error.errno, os.strerror(error.errno or 0), str(link)) from None
-
-
-def _links_to(link: Path, target: str) -> bool:
-    return link.is_symlink() and os.readlink(link) == target

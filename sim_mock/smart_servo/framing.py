@@ -49,22 +49,20 @@ class Framing(ABC):
         if not self._unfinished:
             self._arrived_s = now_s
             known = self._known.get(data)
-            return self._search_alone(data) if known is None else known
+            if known is not None:
+                return known
+            found, self._unfinished = self._search(data, 0)
+            if len(found) == 1 and found[0].code in _READS and not self._unfinished:
+                if len(self._known) >= _MAX_KNOWN:
+                    self._known.clear()
+                self._known[data] = found
+            return found
         before = 0
         if now_s - self._arrived_s < self.gap_s:
             before = len(self._unfinished)
             data = self._unfinished + data
         self._arrived_s = now_s
         found, self._unfinished = self._search(data, before)
-        return found
-
-    def _search_alone(self, data: bytes) -> list[Instruction]:
-        """Return the instructions in bytes at the start of a packet; cache those of a read."""
-        found, self._unfinished = self._search(data, 0)
-        if len(found) == 1 and found[0].code in _READS and not self._unfinished:
-            if len(self._known) >= _MAX_KNOWN:
-                self._known.clear()
-            self._known[data] = found
         return found
 
     @abstractmethod
