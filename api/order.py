@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from types import TracebackType
 from typing import Literal, Protocol, Self
 
 from gazerig.robot.control.tick_feed import Progress
@@ -127,7 +128,12 @@ class Order:
         """Return the order itself."""
         return self
 
-    def __exit__(self, *raised: object) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         """Give up control."""
         self.end()
 

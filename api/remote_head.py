@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import TracebackType
 from typing import Self
 
 from gazerig.errors import HeadEnded, NotFound
@@ -39,7 +40,12 @@ class RemoteHead(Head):
         """Return the head itself."""
         return self
 
-    def __exit__(self, *raised: object) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         """Give up control and disconnect."""
         self._client.close()
 
@@ -116,7 +122,7 @@ def connect(
     fitting = [head for head in found if head.rig == rig]
     for head in found:
         if len(fitting) != 1 or head is not fitting[0]:
-            head.__exit__()
+            head.__exit__(None, None, None)
     if len(fitting) == 1:
         return fitting[0]
     there = ", ".join(f"{head.pid} ({head.rig})" for head in found) or "start one: gazerig run ..."
