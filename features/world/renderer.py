@@ -251,11 +251,7 @@ class WorldPicture:
     def draw(
         self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
     ) -> Rendered:
-        """Return a picture; see ``SceneView.draw``.
-
-        Raises:
-            NoRenderer: nothing on this machine can render.
-        """
+        """Return a picture; see ``SceneView.draw``."""
         t_s, lens, size_px, R, p_m = seen_by
         self._place(self._data, t_s)
         mujoco.mj_kinematics(self._model, self._data)

@@ -399,11 +399,7 @@ class WorldHobbyServo(HobbyServo):
         """Do nothing: the world moves it."""
 
     def turn(self, steps: float) -> None:
-        """Turn it by hand, as far as its joint's stops allow.
-
-        Raises:
-            ValueError: it is stuck.
-        """
+        """Turn it by hand, as far as its joint's stops allow."""
         if self.stuck:
             raise ValueError(f"channel {self.spec.channel} is stuck; free it first")
         self.shaft.turn(steps * self._unit)

@@ -56,11 +56,7 @@ class LineFaults(ABC):
         return {}
 
     def command(self, text: str) -> str:
-        """Run a command such as ``lose 3 count 2``; return a description of the effect.
-
-        Raises:
-            ValueError: the command is invalid; the message names the wrong word and valid ones.
-        """
+        """Run a command such as ``lose 3 count 2``; return a description of the effect."""
         return self.commands.obey(self, text)
 
     def label(self, servo_id: int | None) -> str:
@@ -113,11 +109,7 @@ class LineFaults(ABC):
         return self.wire.on(kind, self._chain.now_s())
 
     def choose(self, case: str, value: str) -> str:
-        """Choose the servos' behaviour where documents and devices differ.
-
-        Raises:
-            ValueError: the case or value is unknown.
-        """
+        """Choose the servos' behaviour where documents and devices differ."""
         self._chain.choose(case, value)
         return f"{case} is {value}"
 

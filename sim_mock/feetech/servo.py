@@ -241,11 +241,7 @@ class FeetechServo(EmulatedServo):
         self.restart()
 
     def fail(self, error: str) -> str:
-        """Trigger the overload protection, overheat the motor or break the angle sensor.
-
-        Raises:
-            ValueError: the error is unknown.
-        """
+        """Trigger the overload protection, overheat the motor or break the angle sensor."""
         if error != "overheating":
             return super().fail(error)
         self.temperature_c = self.memory.get("temperature_limit") + TOO_HOT_C

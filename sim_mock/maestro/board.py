@@ -146,11 +146,7 @@ class EmulatedMaestro:
         return mode != "mute"
 
     def choose(self, case: str, value: str) -> None:
-        """Change a setting of the board; it does not restart.
-
-        Raises:
-            ValueError: the case or value is unknown.
-        """
+        """Change a setting of the board; it does not restart."""
         self.body.advance()
         if case in LIMITS:
             steps = width_steps(case, value)
@@ -178,11 +174,7 @@ class EmulatedMaestro:
         self._forget()
 
     def here(self, channel: int) -> HobbyServo:
-        """Return the servo of a channel, advanced to the present time.
-
-        Raises:
-            KeyError: the board has no such channel.
-        """
+        """Return the servo of a channel, advanced to the present time."""
         self.body.advance()
         servos = self.body.servos
         if not 0 <= channel < len(servos):

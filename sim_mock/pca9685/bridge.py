@@ -59,11 +59,7 @@ class Bridge:
         return True
 
     def choose(self, case: str, value: str) -> None:
-        """Change a property of the boards.
-
-        Raises:
-            ValueError: the case or value is unknown.
-        """
+        """Change a property of the boards."""
         if case not in CASES:
             raise ValueError(f"set {case!r}: unknown; expected {', '.join(CASES)}")
         try:
@@ -81,11 +77,7 @@ class Bridge:
         self.body.restart()
 
     def here(self, place: int) -> HobbyServo:
-        """Return the servo of a channel, advanced to the present time.
-
-        Raises:
-            KeyError: the channel does not exist.
-        """
+        """Return the servo of a channel, advanced to the present time."""
         self.body.advance()
         if not 0 <= place < len(self.body.servos):
             raise KeyError(f"no channel {place}; channels are 0 to {len(self.body.servos) - 1}")

@@ -127,11 +127,7 @@ class ServoChain(Generic[S, Q]):
         self.refresh()
 
     def choose(self, case: str, value: str) -> None:
-        """Choose a quirk by its name, or whether servos check the baud rate.
-
-        Raises:
-            ValueError: the case or value is unknown.
-        """
+        """Choose a quirk by its name, or whether servos check the baud rate."""
         if case == "baud":
             if value not in ("heed", "any"):
                 raise ValueError(f"baud {value!r}: expected heed or any")

@@ -9,10 +9,10 @@ from world_rigs import WorldBench, arm, mujoco_or_skip, read, world_run, write
 mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.features.world.commands import COMMANDS  # noqa: E402
 from gazerig.features.world.model import world_model  # noqa: E402
 from gazerig.features.world.physics import World  # noqa: E402
 from gazerig.features.world.run.run_world import rig_in_world  # noqa: E402
+from gazerig.features.world.served_world import COMMANDS  # noqa: E402
 from gazerig.features.world.world_spec import WorldSpec  # noqa: E402
 from gazerig.robot.app.run_bus import emulated_lines  # noqa: E402
 from gazerig.robot.control.tick import Tick  # noqa: E402

@@ -74,11 +74,7 @@ class WorldCamera:
         return self._poses.begin_s
 
     def open(self) -> None:
-        """Start the process; without a renderer continue without pictures.
-
-        Raises:
-            SetupError: as the process does.
-        """
+        """Start the process; without a renderer continue without pictures."""
         self.seeing = self._process
         if self._process is not None:
             try:
