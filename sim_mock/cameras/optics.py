@@ -112,9 +112,8 @@ class OpticsParams:
 class CameraMotion(NamedTuple):
     """A camera's pose at an instant, and its pose before.
 
-    R, R_before: rotation in the world, optical axes; span_s: time between them, 0 if the pose
-        before
-    is unknown
+    R, R_before: rotation in the world, optical axes
+    span_s: time between them, 0 if the pose before is unknown
     """
 
     R: Mat3
@@ -176,16 +175,11 @@ def expose(
     seen = [band.depth_m for band in bands if band.depth_m is not None]
     if params.sub_exposures == 1:
         image = blur_along(image, motion.smear_px(params.exposure_ms / 1e3, lens))
-    return Rendered(_blur(image, params.blur_px), np.concatenate(seen) if seen else None)
-
-
-def _blur(image: ImageArray, blur_px: float) -> ImageArray:
-    """Blur a frame as a slightly soft lens does."""
-    if blur_px <= 0.0:
-        return image
-    side = 2 * ceil(2.0 * blur_px) + 1 if blur_px > 0.8 else 3
-    out: ImageArray = cv2.GaussianBlur(image, (side, side), blur_px).astype(np.uint8, copy=False)
-    return out
+    if params.blur_px > 0.0:
+        side = 2 * ceil(2.0 * params.blur_px) + 1 if params.blur_px > 0.8 else 3
+        soft = cv2.GaussianBlur(image, (side, side), params.blur_px)
+        image = soft.astype(np.uint8, copy=False)
+    return Rendered(image, np.concatenate(seen) if seen else None)
 
 
 def _bands(params: OpticsParams, height: int) -> Iterator[tuple[float, tuple[int, int] | None]]:

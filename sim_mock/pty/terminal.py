@@ -96,7 +96,13 @@ class Terminal:
         os.set_blocking(self.master, False)
         self.path = os.ttyname(self._slave)
         if self._baud is not None:
-            self._set_baud(self._baud)
+            words = list(
+                _TERMIOS2.unpack(fcntl.ioctl(self._slave, _TCGETS2, bytes(_TERMIOS2.size)))
+            )
+            words[2] &= ~(_BAUD_MASK | _BAUD_MASK << _INPUT_SHIFT)
+            words[2] |= _ANY_BAUD | _ANY_BAUD << _INPUT_SHIFT
+            words[5] = words[6] = self._baud
+            fcntl.ioctl(self._slave, _TCSETS2, _TERMIOS2.pack(*words))
         self.watch = ClientCounter(self.path)
         if self._link is not None:
             try:
@@ -138,13 +144,6 @@ class Terminal:
         """Return the baud rate that the client has set."""
         words = fcntl.ioctl(self.master, _TCGETS2, bytes(_TERMIOS2.size))
         return int(_TERMIOS2.unpack(words)[-1])
-
-    def _set_baud(self, baud: int) -> None:
-        words = list(_TERMIOS2.unpack(fcntl.ioctl(self._slave, _TCGETS2, bytes(_TERMIOS2.size))))
-        words[2] &= ~(_BAUD_MASK | _BAUD_MASK << _INPUT_SHIFT)
-        words[2] |= _ANY_BAUD | _ANY_BAUD << _INPUT_SHIFT
-        words[5] = words[6] = baud
-        fcntl.ioctl(self._slave, _TCSETS2, _TERMIOS2.pack(*words))
 
     def hold(self, held: bool) -> None:
         """Stop or resume reading the client's bytes, as an adapter with a full buffer does."""

@@ -176,18 +176,14 @@ class ServoChain(Generic[S, Q]):
         if self._stale:
             self.refresh()
         if not self._by_id:
-            return self._answer_wrong_baud(data)
+            # A client at a wrong baud rate gets nothing, or garbage made of its own bytes.
+            if self.quirks.wrong_baud == "silence" or not data:
+                return []
+            garbage = bytes(b & 0x6E | 0x80 for b in data[::2])
+            return [DeviceReply(len(data), [Piece(NO_DEVICE, garbage)])]
         found = self._framing.feed(data, now_s)
         replies = [DeviceReply(i.end, pieces) for i in found if (pieces := self._execute(i))]
         return self.faults.around(replies, data) if self._wire.any else replies
-
-    def _answer_wrong_baud(self, data: bytes) -> list[DeviceReply]:
-        """Answer a client at a wrong baud rate: nothing, or garbage made of its own bytes."""
-        if self.quirks.wrong_baud == "silence" or not data:
-            return []
-        return [
-            DeviceReply(len(data), [Piece(NO_DEVICE, bytes(b & 0x6E | 0x80 for b in data[::2]))])
-        ]
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Execute one instruction on the addressed servos; return the bytes that they send."""
