@@ -15,7 +15,8 @@ from websockets.sync.client import ClientConnection, connect
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.door.browsers import Browsers
 from gazerig.robot.dashboard.door.viser_server import open_server
-from gazerig.robot.dashboard.requests.stop_channel import StopListener, StopSender
+from gazerig.robot.dashboard.requests.stop_channel import StopListener
+from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 
 PATIENCE_S = 20.0

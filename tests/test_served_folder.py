@@ -11,11 +11,11 @@ import pytest
 if sys.platform != "linux":
     pytest.skip("terminals are emulated on Linux alone", allow_module_level=True)
 
-from gazerig.sim_mock.pty.server import PREFIX, ServedFolder, sweep
+from gazerig.sim_mock.pty.served_folder import PREFIX, ServedFolder, sweep
 
 HOLDS = (
     "import sys, time; from pathlib import Path;"
-    "from gazerig.sim_mock.pty.server import ServedFolder;"
+    "from gazerig.sim_mock.pty.served_folder import ServedFolder;"
     "folder = ServedFolder(Path(sys.argv[1])); (folder.path / 'state').touch();"
     "print(folder.path, flush=True); time.sleep(60)"
 )

@@ -43,7 +43,7 @@ from gazerig.robot.dashboard.feed.page_process import (
 from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.requests.outbox import DOOR, Outbox
 from gazerig.robot.dashboard.requests.pointer_to_look import PointerToLook
-from gazerig.robot.dashboard.requests.stop_channel import StopSender
+from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.command_json import as_json

@@ -14,7 +14,7 @@ from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 if TYPE_CHECKING:
-    from gazerig.sim_mock.pty.server import ServedFolder
+    from gazerig.sim_mock.pty.served_folder import ServedFolder
 
 STOP_S = 2.0
 
@@ -58,7 +58,7 @@ class _ServerProcess:
         self, buses: Sequence[Mapping[str, object]], surroundings: SentSurroundings | None = None
     ) -> list[str]:
         """Start it with these settings of buses; return the path of each."""
-        from gazerig.sim_mock.pty.server import ServedFolder  # Linux only
+        from gazerig.sim_mock.pty.served_folder import ServedFolder  # Linux only
 
         self._folder = ServedFolder()
         folder = self._folder.path

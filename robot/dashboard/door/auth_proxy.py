@@ -39,7 +39,7 @@ from gazerig.robot.dashboard.requests.outbox import (
     from_browser,
     leads,
 )
-from gazerig.robot.dashboard.requests.stop_channel import StopSender
+from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES, Widgets
 
 MOST_LINES = 32
