@@ -1,25 +1,12 @@
-"""Servos written as text (``1-6:xl330-m077,7:xc330-m288@1024``), and cases of each kind."""
+"""Servos written as text: ``1-6:xl330-m077,7:xc330-m288@1024`` (ids, model, start position)."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from gazerig.drivers.bus.servo_models import SERVOS, BusKind
 from gazerig.drivers.errors import SetupError
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
-from gazerig.sim_mock.dynamixel.chain import DynamixelChain
-from gazerig.sim_mock.feetech.chain import FeetechChain
-from gazerig.sim_mock.maestro import settings as maestro_settings
-from gazerig.sim_mock.pca9685.body import CASES as PCA9685_CASES
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-
-CASES: dict[BusKind, Mapping[str, str]] = {
-    "dynamixel": DynamixelChain.commands.cases,
-    "feetech": FeetechChain.commands.cases,
-    "maestro": maestro_settings.cases(),
-    "pca9685": PCA9685_CASES,
-}
-"""Kind -> cases, and their values as they are typed."""
-
 
 EXAMPLE = "1-6:xl330-m077,7-9:xc330-m288"
 MIDDLE = 2048

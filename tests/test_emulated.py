@@ -6,7 +6,7 @@ from typing import cast
 
 import pytest
 
-from gazerig.sim_mock.device_spec import CASES
+from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.devices import (
     BAUDS,
     DynamixelLine,

@@ -14,7 +14,8 @@ from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli import emulate_options as options
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import clear_errors
-from gazerig.sim_mock.device_spec import CASES, EXAMPLE, line_of
+from gazerig.sim_mock.device_cases import CASES
+from gazerig.sim_mock.device_spec import EXAMPLE, line_of
 from gazerig.sim_mock.devices import BAUDS, CHANNELS, Emulated, MaestroLine, Pca9685Line, PluginLine
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import ServerSettings, run

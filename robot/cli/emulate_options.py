@@ -7,7 +7,8 @@ import typer
 
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.robot.cli.terminal import complete_rig
-from gazerig.sim_mock.device_spec import CASES, DEFAULT_FIRMWARE, EXAMPLE
+from gazerig.sim_mock.device_cases import CASES
+from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE
 from gazerig.sim_mock.devices import MaestroLine
 
 DEFAULT_BAUD = 1_000_000

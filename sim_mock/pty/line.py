@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.device_spec import CASES
+from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.pty.terminal import Terminal
 from gazerig.sim_mock.wire import ServoLine
