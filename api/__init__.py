@@ -9,6 +9,7 @@ The names in ``__all__`` are stable; every change to them is listed in the chang
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gazerig import aio as aio
     from gazerig.config.faults import ConfigError as ConfigError
     from gazerig.config.schema import load_rig as load_rig
     from gazerig.drivers.errors import SetupError as SetupError
@@ -72,6 +73,10 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("gazerig")
+    if name == "aio":  # a module, imported at first use as well
+        from importlib import import_module
+
+        return import_module("gazerig.aio")
     if name in _HOME:
         from importlib import import_module
 

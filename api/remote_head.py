@@ -103,12 +103,14 @@ class RemoteHead(Head):
 
 
 def connect(
-    pid: int | None = None, *, rig: str | None = None, who: str = "a program"
-) -> RemoteHead:
+    pid: int | None = None, *, name: str | None = None, rig: str | None = None,
+    who: str = "a program",
+) -> RemoteHead:  # fmt: skip
     """Connect to a head that runs in another program of the same user.
 
     Args:
         pid: process id of the head, if several heads run.
+        name: its name (``gazerig run --name``), if several heads run.
         rig: its rig, if several heads run.
         who: name of this program in messages and on the page.
 
@@ -117,8 +119,8 @@ def connect(
             lists them.
     """
     if rig is None:
-        return RemoteHead(RobotClient.connect(pid, who))
-    found = [RemoteHead(client) for client in running(pid, who)]
+        return RemoteHead(RobotClient.connect(pid if name is None else name, who))
+    found = [RemoteHead(client) for client in running(pid if name is None else name, who)]
     fitting = [head for head in found if head.rig == rig]
     for head in found:
         if len(fitting) != 1 or head is not fitting[0]:

@@ -1,5 +1,6 @@
 """A head beside its program in real time: however its block ends, it parks and lets go."""
 
+import asyncio
 import os
 import re
 import signal
@@ -300,6 +301,34 @@ def test_the_first_of_two_heads_may_end_first(opened: Open) -> None:
     finally:
         second.__exit__(None, None, None)
     assert sys.getswitchinterval() == switching_s
+
+
+def test_orders_of_another_program_are_awaited(head: gazerig.Head) -> None:
+    async def show() -> None:
+        with pytest.raises(gazerig.NotFound, match="no rig named eva is running: .*process"):
+            await gazerig.aio.connect(name="eva").__aenter__()
+        async with gazerig.aio.connect(os.getpid(), who="a show") as far:
+            order = far.look_at(1.0, -0.4, 0.3)
+            assert (await order.reply()).lead and await order == "arrived"
+            assert await far.look_at_person(99) == "refused"
+            with pytest.raises(gazerig.Refused, match="three finite numbers"):
+                await far.look_at(float("nan"), 0.0, 0.0)
+            first, second = far.look_at(1.0, 0.4, 0.3), far.look_at(1.0, -0.2, 0.3)
+            assert await asyncio.gather(first, second) in (
+                ["taken over", "arrived"],
+                ["arrived", "taken over"],
+            )
+            assert await far.set({"gaze.head.comfort_deg": 11.0}) and await far.menus()
+            async for state in far.states(rate_hz=50.0):
+                assert state.led.startswith("a show")
+                break
+            async for event in far.events():
+                assert event.number == 1
+                break
+            assert await far.stop("a hand") == "arrived"
+            assert (await far.state()).stopped == "a hand"
+
+    asyncio.run(show())
 
 
 def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:

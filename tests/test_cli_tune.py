@@ -213,6 +213,14 @@ def test_stop_stops_every_rig_that_runs() -> None:
         for rig in both.values():
             rig.close()
         assert str(other.pid) in refused.stderr
+        named = json.loads(gazerig("ctl", "rigs", "--json").stdout)
+        assert [row["name"] for row in named] == ["my", "my"]
+        assert {row["pid"] for row in named} == set(both)
+        ambiguous = gazerig("ctl", "--rig", "my", "get", RATE)
+        assert ambiguous.returncode == 2 and "2 rigs named my are running" in ambiguous.stderr
+        assert gazerig("ctl", "--rig", str(other.pid), "get", RATE).returncode == 0
+        unknown = gazerig("ctl", "get", RATE, "--rig", "eva")
+        assert "no rig named eva is running: my (process " in unknown.stderr
 
 
 def test_look_and_character() -> None:

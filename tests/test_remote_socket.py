@@ -232,11 +232,17 @@ def test_several_rigs_are_named_and_chosen_by_process(folder: Path, rig: RobotCl
     with listening() as other:
         with pytest.raises(NoRobotError) as which:
             RobotClient.connect()
-        assert f"{os.getpid()} (desk)" in str(which.value) and str(other.pid) in str(which.value)
+        assert f"desk (process {os.getpid()})" in str(which.value) and str(other.pid) in str(
+            which.value
+        )
         assert "\n" not in str(which.value)
         with RobotClient.connect(os.getpid()) as mine:
             assert mine.pid == os.getpid()
-        with pytest.raises(NoRobotError, match=f"no rig runs as process 1: .*{other.pid}"):
+        with RobotClient.connect("desk") as mine:
+            assert mine.pid == os.getpid() and mine.name == "desk"
+        with pytest.raises(NoRobotError, match="no rig named eva is running: .*desk .*other "):
+            RobotClient.connect("eva")
+        with pytest.raises(NoRobotError, match=f"no rig of process 1 is running: .*{other.pid}"):
             RobotClient.connect(1)
 
 

@@ -1,5 +1,6 @@
 """Options of one run: the same value from the command line to the assembly."""
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -7,6 +8,7 @@ from typing import Literal
 from gazerig.drivers.errors import SetupError
 
 DEFAULT_SCENE = "visitor"
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 BUSES = ("emulated", "ideal")
 """Replacements of the servos: byte-true emulators, or servos without bytes."""
 
@@ -30,7 +32,7 @@ class RunOptions:
         film_delay_s: age of a film's frames in simulated time.
         placed_by: detections are placed by the head's pose at capture, or, for comparison only,
             by the newest pose, which makes the head overshoot.
-        rig, character, profile: by name or path.
+        rig, character, profile: by name or path; name: of this head, for other programs.
         behaviour, conversation: initial choices.
         seconds: duration of the run.
         page: HOST:PORT of the live page; no_page: without it.
@@ -77,6 +79,7 @@ class RunOptions:
     verbose: bool = False
     summary: str | None = None
     bus: str | None = None
+    name: str | None = None
 
     @property
     def looks_through(self) -> str | None:
@@ -128,6 +131,8 @@ class RunOptions:
             SetupError: they contradict each other.
         """
         _ = self.page_address
+        if self.name is not None and not _NAME.fullmatch(self.name):
+            raise SetupError(f"--name {self.name}: a letter, then at most 31 of a-z A-Z 0-9 _ -")
         self._refuse_bus()
         asked = [
             name

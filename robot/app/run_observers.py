@@ -32,6 +32,7 @@ from gazerig.robot.dashboard.requests.request_handler import PageRequestHandler
 from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
+from gazerig.robot.remote.client import rig_name
 from gazerig.robot.remote.live_server import LiveServer
 from gazerig.sim_mock.scenes.scene import ScenePicture
 
@@ -89,7 +90,8 @@ class RunObservers:
         self._detector = "" if computed else str(detector_status(made.live.rig.detector))
         self._tuning, self._recorder, self._world_recorded = tuning, recorder, False
         self._commanded = RobotGroup(made.robot, made.others)
-        about = {"rig": options.rig, "pid": os.getpid()}
+        name = options.name or rig_name(options.rig)
+        about = {"rig": options.rig, "name": name, "pid": os.getpid()}
         self._live = (
             LiveServer(
                 self._commanded,
@@ -100,7 +102,8 @@ class RunObservers:
                 say,
                 self._timing.figures,
                 made.fault,
-            )  # fmt: skip
+                lambda: {"page": self._page.url() if self._page is not None else None},
+            )
             if tuning is not None and not options.fast
             else None
         )

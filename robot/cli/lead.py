@@ -27,8 +27,13 @@ _NEGATIVE = {"ignore_unknown_options": True}
 """Click settings: -3 is a number, no option."""
 
 PidOption = Annotated[
-    int | None,
-    typer.Option("--pid", metavar="N", help="Of several running rigs that of process N."),
+    str | None,
+    typer.Option(
+        "--rig",
+        "--pid",
+        metavar="NAME|N",
+        help="Of several running rigs that of a name or process.",
+    ),
 ]
 
 

@@ -35,6 +35,7 @@ app = typer.Typer()
 @app.command(cls=RigCommand)
 def run(
     rig: RigArgument = "desk",
+    name: options.Name = None,
     mock: options.Mock = False,
     port: options.Port = None,
     scene: options.Scene = None,

@@ -7,6 +7,10 @@ import typer
 
 from gazerig.robot.cli.examples import complete_shipped, complete_world
 
+Name = Annotated[
+    str | None,
+    typer.Option(help="Name of this head, for gazerig ctl --rig NAME; else that of its file."),
+]
 Mock = Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")]
 Port = Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")]
 Scene = Annotated[

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
@@ -18,13 +19,22 @@ from gazerig.robot.cli import steer as cli_steer
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.parameter import JsonValue, Parameter
-from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.remote.client import RobotClient, running
 
 ctl = typer.Typer(
     name="ctl",
     help="Speak to a rig that runs in another terminal: parameters, where it looks, what it does.",
     no_args_is_help=True,
 )
+
+
+@ctl.callback()
+def choose(context: typer.Context, rig: PidOption = None) -> None:
+    """Speak to a rig that runs in another terminal: parameters, where it looks, what it does."""
+    if rig is not None and isinstance(context.command, TyperGroup):
+        context.default_map = {name: {"pid": rig} for name in context.command.commands}
+
+
 ctl.add_typer(cli_lead.app)
 ctl.add_typer(cli_animation.app)
 ctl.add_typer(cli_steer.app)
@@ -90,6 +100,29 @@ def _menus() -> dict[str, tuple[str, ...]]:
             return rig.menus()
     except DriverError:
         return {}
+
+
+@ctl.command()
+def rigs(
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a list of objects as JSON.")
+    ] = False,
+) -> None:
+    """List the rigs that run here: name, rig, process, address of the page with its token."""
+    with clear_errors():
+        found = []
+        for rig in running():
+            with rig:
+                now = rig.status()
+                row = {key: now.get(key) for key in ("name", "rig", "pid", "page")}
+                found.append(row)
+    if as_json:
+        print(json.dumps(found, indent=2))
+        return
+    for row in found:
+        print("  ".join(str(value) for value in row.values() if value is not None))
+    if not found:
+        say("no rig is running: start one with gazerig run ...")
 
 
 @ctl.command()

@@ -208,28 +208,29 @@ class RobotClient:
         self.pid = pid
 
     @classmethod
-    def connect(cls, pid: int | None = None, who: str = "") -> "RobotClient":
-        """Connect to the only rig that runs, or to that of a process.
+    def connect(cls, which: int | str | None = None, who: str = "") -> "RobotClient":
+        """Connect to the only rig that runs, or to that of a process or name.
 
         Args:
-            pid: Process id of the rig; None if only one runs.
+            which: Process id or name of the rig; None if only one runs.
             who: Name of this client in messages, e.g. "my show"; the process is added.
 
         Raises:
-            NoRobotError: no rig runs, or several run and ``pid`` is None.
+            NoRobotError: no rig runs, or not exactly one fits; the message lists those that run.
         """
-        found = running(pid, who)
-        for other in found[1:]:
-            other.close()
+        found = running(which, who)
         if len(found) == 1:
             return found[0]
+        for other in found:
+            other.close()
+        asked = "" if which is None else f" {_choice(which)}"
+        there = _names(running())
         if not found:
-            there = _names(running()) if pid is not None else ""
-            which = f"no rig runs as process {pid}" if pid is not None else "no rig is running"
-            raise NoRobotError(f"{which}: {there or 'start one with gazerig run ...'}")
-        names = _names(running())
+            raise NoRobotError(
+                f"no rig{asked} is running: {there or 'start one with gazerig run ...'}"
+            )
         raise NoRobotError(
-            f"{len(found)} rigs are running: {names}; choose one with --pid (pid=...)"
+            f"{len(found)} rigs{asked} are running: {there}; choose one with --rig NAME or --pid N"
         )
 
     def __enter__(self) -> "RobotClient":
@@ -256,6 +257,12 @@ class RobotClient:
     def status(self) -> dict[str, Any]:
         """Return the rig's status: name, target, reason, guard level, joints, last messages."""
         return cast(dict[str, Any], self._connection.ask("status"))
+
+    @property
+    def name(self) -> str:
+        """Return the name of the rig (``gazerig run --name``)."""
+        now = self.status()
+        return str(now.get("name") or rig_name(now["rig"]))
 
     def get(self, prefix: str = "") -> dict[str, JsonValue]:
         """Return the present values of all keys that begin with ``prefix``."""
@@ -497,13 +504,16 @@ class RobotClient:
         return tuple(cast(dict[str, list[str]], said)["notes"])
 
 
-def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
-    """Connect to every rig of this user that runs, or to that of one process.
+def running(which: int | str | None = None, who: str = "") -> list[RobotClient]:
+    """Connect to every rig of this user that runs, or to those of one process or name.
 
     Args:
-        pid: Process id of the rig; None: all.
+        which: Process id or name of the rig; None: all.
         who: As in ``RobotClient.connect``.
     """
+    if isinstance(which, str) and not which.isdecimal():
+        return _named(running(who=who), which)
+    pid = None if which is None else int(which)
     uid = user_id()
     place = folder(os.environ, uid)
     if not is_private(place, uid):  # who put a socket there is not known
@@ -523,15 +533,40 @@ def _wire(path: Path) -> Wire:
     return Wire(dial(path, CONNECT_S), ANSWER_BYTES)
 
 
+def rig_name(rig: str) -> str:
+    """Return the name of a rig without a name of its own: that of its file."""
+    return Path(rig).stem
+
+
+def _choice(which: int | str) -> str:
+    """Return a chosen process or name as text."""
+    return f"of process {which}" if str(which).isdecimal() else f"named {which}"
+
+
+def _named(rigs: list[RobotClient], name: str) -> list[RobotClient]:
+    """Return the rigs of a name, and close the other connections."""
+    found = []
+    for rig in rigs:
+        try:
+            named = rig.name == name
+        except DriverError:  # it ends or hangs
+            named = False
+        if named:
+            found.append(rig)
+        else:
+            rig.close()
+    return found
+
+
 def _names(rigs: list[RobotClient]) -> str:
-    """Return the processes and names of rigs as text, and close the connections."""
+    """Return the names and processes of rigs as text, and close the connections."""
     names = []
     for rig in rigs:
         with rig:
             try:
-                names.append(f"{rig.pid} ({rig.status()['rig']})")
+                names.append(f"{rig.name} (process {rig.pid})")
             except DriverError as error:
-                names.append(f"{rig.pid} ({error})")
+                names.append(f"process {rig.pid} ({error})")
     return ", ".join(names)
 
 

@@ -186,6 +186,7 @@ class LiveServer:
         say: Prints a line on the terminal.
         timing: Returns the timing statistics of the loop.
         fault: Executes a fault command of emulated servos; None if the servos are real.
+        changing: Returns the other fields of the status, as {"page": address}.
     """
 
     def __init__(
@@ -198,6 +199,7 @@ class LiveServer:
         say: Callable[[str], None],
         timing: Callable[[], LoopFigures | None] = lambda: None,
         fault: Callable[[str], str] | None = None,
+        changing: Callable[[], Mapping[str, object]] = dict,
     ) -> None:
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
@@ -206,8 +208,9 @@ class LiveServer:
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
         requests = RequestHandler(
-            robot, tuning, self._pulse, about, refusals, self._watch.saved, fault=fault
-        )
+            robot, tuning, self._pulse, about, refusals, self._watch.saved, fault=fault,
+            changing=changing,
+        )  # fmt: skip
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:

@@ -148,6 +148,7 @@ class RequestHandler:
         saved: Called with each file that was written.
         fixed: Reason why parameters cannot be changed, if they cannot.
         fault: Executes a fault command of emulated servos; None if the servos are real.
+        changing: Returns the other fields of the status, as {"page": address}.
     """
 
     def __init__(
@@ -160,9 +161,11 @@ class RequestHandler:
         saved: Callable[[Path], None] | None = None,
         fixed: str = FIXED,
         fault: Callable[[str], str] | None = None,
+        changing: Callable[[], Mapping[str, object]] = dict,
     ) -> None:
         self._params = params
         self._pulse = pulse
+        self._changing = changing
         self._about = dict(about)
         self._handler = CommandHandler(
             robot,
@@ -218,7 +221,7 @@ class RequestHandler:
         if version != self._unsaved[0]:  # count once for a program that polls
             unsaved = self._params.unsaved() if self._params is not None else ()
             self._unsaved = version, len(tuple(unsaved))
-        about = {**self._about, "version": version, "unsaved": self._unsaved[1]}
+        about = {**self._about, **self._changing(), "version": version, "unsaved": self._unsaved[1]}
         return {**about, **self._pulse.as_json()}
 
     def _wait_until_applied(self, notes: tuple[str, ...]) -> dict[str, object]:

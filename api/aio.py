@@ -1,0 +1,158 @@
+"""Orders to a running head that are awaited; a thin layer over ``gazerig.connect``.
+
+async with gazerig.aio.connect(who="my show") as head:
+    print(await head.look_at(1.0, 0.2, 0.3))  # arrived
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Generator
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+
+from gazerig.head import Head
+from gazerig.order import Order, Outcome
+from gazerig.remote_head import RemoteHead
+from gazerig.remote_head import connect as connect_now
+from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.model.reply import CommandReply
+
+_POLL_S = 0.02
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+class AsyncOrder:
+    """An order that was sent; ``await`` waits for its outcome, without limit.
+
+    Args:
+        sent: the order, once the head has replied.
+    """
+
+    def __init__(self, sent: "asyncio.Future[Order]") -> None:
+        self._sent = sent
+
+    def __await__(self) -> Generator[Any, None, Outcome]:
+        return self._outcome().__await__()
+
+    async def reply(self) -> CommandReply:
+        """Return the head's reply, as soon as it has accepted or refused the order."""
+        return (await self._sent).reply
+
+    async def why(self) -> str:
+        """Return why the order was refused, taken over or out of reach, "" if it was not."""
+        return (await self._sent).why
+
+    async def end(self) -> None:
+        """Give up control, if the order still has it."""
+        await asyncio.to_thread((await self._sent).end)
+
+    async def _outcome(self) -> Outcome:
+        order = await self._sent
+        while (outcome := await asyncio.to_thread(lambda: order.outcome)) is None:
+            await asyncio.sleep(_POLL_S)
+        return outcome
+
+
+def _order(
+    method: Callable[Concatenate[Head, _P], Order],
+) -> "Callable[Concatenate[AsyncHead, _P], AsyncOrder]":
+    def send(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> AsyncOrder:
+        work = asyncio.to_thread(method, head._connected, *args, **named)
+        return AsyncOrder(asyncio.ensure_future(work))
+
+    send.__doc__ = method.__doc__
+    return send
+
+
+def _call(
+    method: Callable[Concatenate[RemoteHead, _P], _T],
+) -> "Callable[Concatenate[AsyncHead, _P], asyncio.Task[_T]]":
+    def call(head: "AsyncHead", /, *args: _P.args, **named: _P.kwargs) -> "asyncio.Task[_T]":
+        work = asyncio.to_thread(method, head._connected, *args, **named)
+        return asyncio.ensure_future(work)
+
+    call.__doc__ = method.__doc__
+    return call
+
+
+class AsyncHead:
+    """A head that runs in another program; ``connect`` creates it.
+
+    The methods are those of ``gazerig.Head``, called in threads: orders return an ``AsyncOrder``,
+    which is on its way at once, all others something to await. The event loop never waits.
+    """
+
+    def __init__(self, connect: Callable[[], RemoteHead]) -> None:
+        self._connect = connect
+        self._head: RemoteHead | None = None
+
+    async def __aenter__(self) -> Self:
+        """Connect."""
+        self._head = await asyncio.to_thread(self._connect)
+        return self
+
+    async def __aexit__(self, *raised: object) -> None:
+        """Give up control and disconnect; the head continues to run."""
+        head = self._connected
+        await asyncio.to_thread(lambda: head.__exit__(None, None, None))
+
+    @property
+    def _connected(self) -> RemoteHead:
+        if self._head is None:
+            raise RuntimeError("connect first: async with gazerig.aio.connect() as head: ...")
+        return self._head
+
+    look_at = _order(Head.look_at)
+    look_towards = _order(Head.look_towards)
+    look_at_person = _order(Head.look_at_person)
+    look_at_pixel = _order(Head.look_at_pixel)
+    look_freely = _order(Head.look_freely)
+    jog = _order(Head.jog)
+    release_joints = _order(Head.release_joints)
+    play = _order(Head.play)
+    express = _order(Head.express)
+    level = _order(Head.level)
+    converse = _order(Head.converse)
+    behave = _order(Head.behave)
+    wink = _order(Head.wink)
+    stop = _order(Head.stop)
+    resume = _order(Head.resume)
+    get = _call(RemoteHead.get)
+    set = _call(RemoteHead.set)
+    save = _call(RemoteHead.save)
+    revert = _call(RemoteHead.revert)
+    menus = _call(RemoteHead.menus)
+
+    async def state(self) -> HeadState:
+        """Return the newest tick of the control loop."""
+        head = self._connected
+        return await asyncio.to_thread(lambda: head.state)
+
+    async def states(self, rate_hz: float = 50.0) -> AsyncIterator[HeadState]:
+        """Iterate over the newest states; those that are not read in time are dropped."""
+        last_s = float("-inf")
+        while True:
+            state = await self.state()
+            if state.t_s > last_s:
+                last_s = state.t_s
+                yield state
+            await asyncio.sleep(1.0 / rate_hz)
+
+    async def events(self) -> AsyncIterator[HeadEvent]:
+        """Iterate over all stored events, then over new ones, without end."""
+        number = 0
+        while True:
+            for event in await asyncio.to_thread(self._connected._events, number):
+                number = event.number
+                yield event
+            await asyncio.sleep(_POLL_S)
+
+
+def connect(
+    pid: int | None = None, *, name: str | None = None, rig: str | None = None,
+    who: str = "a program",
+) -> AsyncHead:  # fmt: skip
+    """Return a head to connect to in an ``async with`` block; the arguments of ``gazerig.connect``.
+
+    The block raises ``NotFound`` if no head runs, or several fit; the message lists them.
+    """
+    return AsyncHead(lambda: connect_now(pid, name=name, rig=rig, who=who))
