@@ -307,6 +307,7 @@ class DetectedFace:
         forward); None if the detector does not find it
     mesh: its dense mesh, None if none was computed
     clothing: colours of the clothes below it, None if they were not analysed or are not visible
+    signs: state of eyes and mouth from a detector without a mesh, None if it finds none
     """
 
     box_px: tuple[float, float, float, float]
@@ -315,6 +316,7 @@ class DetectedFace:
     gaze_camera: tuple[float, float, float] | None = None
     mesh: FaceMesh | None = None
     clothing: Clothing | None = None
+    signs: FaceSigns | None = None
 
 
 @dataclass(frozen=True, slots=True)

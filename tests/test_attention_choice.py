@@ -211,6 +211,24 @@ def test_e46_d_a_waved_hand_is_seen_within_400_ms() -> None:
     assert first(looks, "face", 4.0) <= 0.6
 
 
+def test_a_hand_that_goes_on_waving_gets_a_glance() -> None:
+    def waves(t: float) -> list[Row]:
+        swing = 0.15 * sin(2 * pi * 1.5 * (t - 2.0)) if t >= 2.0 else 0.0
+        return moved(boxer(t), 2, (0.0, swing, 0.1))
+
+    on = [t for t, look in lived(waves, 4.9) if look.kind == "hand" and t >= 2.0]
+    assert 2.0 < on[0] < 2.4 and 0.3 < len(on) / 30.0 < 1.6
+    assert on[-1] < 4.0
+
+
+def test_a_hand_that_sinks_is_no_target() -> None:
+    def sinks(t: float) -> list[Row]:
+        down = min(0.5, max(0.0, t - 2.0))
+        return moved(boxer(t), 2, (0.0, 0.0, 0.3 - down))
+
+    assert all(look.kind == "face" for t, look in lived(sinks, 4.0) if t > 1.5)
+
+
 def test_a_lowered_hand_that_moves_counts_for_the_person() -> None:
     def signs(t: float) -> list[Row]:
         return moved(boxer(t), 2, (0.0, 0.15 * sin(2 * pi * 1.5 * t), -0.1))

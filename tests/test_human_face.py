@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from human.measured_run import MeasuredRun, half_rate_run
-from human.row_03_rests import TABLE_S, beyond_the_law, visits
+from human.row_03_rests import beyond_the_law, visits
 from human.row_09_mutual_gaze import nearest, stays
 from human.row_11_in_flight import pauses_ms
 
@@ -14,18 +14,19 @@ def run() -> MeasuredRun:
     return half_rate_run("face-to-face", seconds=45.0)
 
 
-def test_e63_rests_on_a_face_are_as_the_table_and_seldom_short(run: MeasuredRun) -> None:
+def test_e63_rests_on_a_face_are_as_different_as_peoples(run: MeasuredRun) -> None:
     found = visits(run)
     rests = np.array([visit.rest_s for visit in found])
     lasting = np.array([visit.seconds for visit in found])
-    assert len(found) > 100
-    assert 1.0 / lasting.mean() == pytest.approx(3.69, rel=0.1)
+    assert len(found) > 60
+    assert 2.3 < 1.0 / lasting.mean() < 3.2
     assert (rests < 0.15 - 1e-6).mean() <= 0.08
-    # Of 120 rests a slot of 10 ms has .03 more than the law's by chance.
+    assert 0.4 < rests.std() / rests.mean() < 0.8
+    assert 0.03 < (rests > 0.5).mean() < 0.2
+    # Of 80 rests a slot of 10 ms has .04 more than the law's by chance.
     assert beyond_the_law(rests, [visit.part for visit in found]) < 0.09
-    for part in ("FL", "N", "RE"):
-        of = lasting[[visit.part == part for visit in found]]
-        assert of.mean() == pytest.approx(TABLE_S[part], rel=0.45), part
+    eyes = [visit.part in ("LE", "RE") for visit in found]
+    assert 0.33 < np.mean(eyes) < 0.6
 
 
 def test_e63_a_floor_by_max_is_seen_by_the_measure() -> None:

@@ -204,6 +204,7 @@ def test_a_blink_that_is_over_does_not_come_back_when_blinks_are_made_longer() -
 def test_a_higher_rate_begins_no_blink_within_a_blink() -> None:
     slow = LidParams(
         interval_distribution="fixed",
+        duration_spread=0.0,
         incomplete_share=0.0,
         sleepy_level=1.0,
         gaze_evoked_blink_jitter_ms=0.0,

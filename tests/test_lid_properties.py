@@ -127,6 +127,7 @@ def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
 ) -> None:
     whole = {"lower_close_share": 1.0, "incomplete_share": 0.0, "gaze_evoked_blink_literal": True}
     whole["gaze_evoked_blink_jitter_ms"] = 0.0
+    whole["duration_spread"] = 0.0
     never = {"blinks_per_min": 0.0, "gaze_evoked_blink_literal_deg": 0.0, "sleepy_level": 0.0}
     chosen = LidParams(**{**vars(params), **whole, **never, "sleepy_slowness": 0.0})
     model = Lids(chosen, np.random.default_rng(0))

@@ -24,7 +24,8 @@ AWAKE = 0.75
 
 
 def lids(seed: int = 0, **params: float | str | bool) -> Lids:
-    return Lids(LidParams(**params), np.random.default_rng(seed))  # type: ignore[arg-type]
+    alike = {"duration_spread": 0.0, "asymmetry": 0.0}
+    return Lids(LidParams(**{**alike, **params}), np.random.default_rng(seed))  # type: ignore[arg-type]
 
 
 def onsets(model: Lids, seconds: float, start_s: float = 0.0, dt_s: float = DT) -> list[float]:
@@ -372,3 +373,34 @@ def test_lids_follow_the_eyes_and_stay_between_shut_and_open() -> None:
 
 def test_same_dice_same_blinks() -> None:
     assert onsets(lids(7), 60.0) == onsets(lids(7), 60.0) != onsets(lids(8), 60.0)
+
+
+def test_no_two_blinks_are_alike_and_no_two_eyes() -> None:
+    model = lids(3, duration_spread=0.2, asymmetry=0.06)
+    rows = np.array([model.step(k * DT, 0.0, None) for k in range(round(600.0 / DT))])
+    edges = np.flatnonzero(np.diff(rows[:, 2]))
+    lasting = DT * (edges[1::2] - edges[::2])[: len(edges) // 2]
+    assert 0.02 < lasting.std() < 0.08 and 0.25 < lasting.mean() < 0.33
+    apart = np.abs(rows[:, 0] - rows[:, 1])
+    assert 0.01 < apart.max() < 0.2 and apart[rows[:, 2] == 0.0].max() == 0.0
+    # A complete blink shuts both eyes.
+    shut = rows[:, :2].min(axis=1) < 1e-6
+    assert shut.any() and rows[shut, :2].max() < 0.2
+
+
+def test_the_eyes_turn_down_and_towards_the_nose_in_a_blink_and_back_before_the_lids() -> None:
+    model = lids(3, incomplete_share=0.0, blinks_per_min=20.0)
+    turns, shut = [], []
+    for k in range(round(60.0 / DT)):
+        shut.append(model.step(k * DT, 0.0, None).blink)
+        turns.append(model.eye_turn_rad(k * DT) or ((0.0, 0.0), (0.0, 0.0)))
+    (left_yaw, left_pitch), (right_yaw, right_pitch) = np.degrees(np.array(turns)).transpose(
+        1, 2, 0
+    )
+    assert left_pitch.min() == pytest.approx(-1.3, abs=0.1) and left_pitch.max() < 1e-9
+    assert left_yaw.min() == pytest.approx(-0.7, abs=0.1) and right_yaw.max() == pytest.approx(
+        0.7, abs=0.1
+    )
+    assert (right_pitch == left_pitch).all()
+    assert not np.any((left_pitch < -1e-9) & ~np.array(shut))
+    assert lids(eye_down_deg=0.0, eye_nasal_deg=0.0).eye_turn_rad(0.0) is None

@@ -1,5 +1,6 @@
 """Rules name persons by what they do: in the YAML, from frame to frame, and in a scene of three."""
 
+from dataclasses import replace
 from math import pi, sin
 from pathlib import Path
 
@@ -43,6 +44,42 @@ def percept(
         Face(id, p, EYE, R, (p,) * 8, 0.9, looks_at_head=id in looks) for id, p in faces.items()
     )
     return Percept(t_s, Bodies(ids, kinds, places, v, np.zeros((n, 3)), np.full(n, 0.1)), seen)
+
+
+def equal_people(
+    speaks: int | None, seconds: float = 240.0, seed: int = 0
+) -> tuple[dict[int, float], list[float]]:
+    """Return the share of looks at three equal people, and the lengths of stays."""
+    model = Attention(
+        AttentionParams(),
+        FieldOfView(FieldOfViewParams()),
+        BottomUp(BottomUpParams()),
+        TopDown(TopDownParams(nearness=0.0)),
+        Idle(IdleParams()),
+        stay_rng=np.random.default_rng(seed),
+    )
+    places = {5: (1.0, 0.4, 0.0), 6: (1.0, 0.0, 0.0), 7: (1.0, -0.4, 0.0)}
+    looks: list[int] = []
+    for k in range(round(seconds * 20)):
+        seen = percept(0.05 * k, places, (5, 6, 7))
+        faces = tuple(replace(face, speaks=face.id == speaks) for face in seen.faces)
+        looks.append(model.choose(replace(seen, faces=faces), looking(), 0.05 * k).id)
+    edges = np.flatnonzero(np.diff(looks))
+    return {id: looks.count(id) / len(looks) for id in places}, (0.05 * np.diff(edges)).tolist()
+
+
+def test_who_speaks_gets_most_looks_and_nobody_is_left_out() -> None:
+    mute, _ = equal_people(None)
+    assert all(0.2 < share < 0.5 for share in mute.values())
+    spoken, _ = equal_people(6)
+    assert 0.8 < spoken[6] < 0.95 and min(spoken.values()) > 0.02
+
+
+def test_stays_with_one_of_several_people_have_a_long_tail() -> None:
+    _, stays = equal_people(None)
+    assert np.std(stays) / np.mean(stays) > 0.4
+    assert max(stays) > 2.5 * np.median(stays)
+    assert max(stays) < 15.0
 
 
 def test_the_nearest_is_the_nearest_until_another_is_clearly_so() -> None:

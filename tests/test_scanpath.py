@@ -9,13 +9,25 @@ import pytest
 from present import present
 
 from gazerig.config.load import load, shipped
+from gazerig.gaze.scanpath.dwell import stationary
 from gazerig.gaze.scanpath.fit import FitParams, PartFixation, fit_walk
 from gazerig.gaze.scanpath.models import MarkovWalk
-from gazerig.gaze.scanpath.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalise
+from gazerig.gaze.scanpath.scanpath import (
+    Scanpath,
+    ScanpathParams,
+    Walk,
+    markov_walk,
+    normalise,
+    steps_and_dwells,
+)
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
-PRINTED = ScanpathParams(min_dwell_ms=0.0, diagonal="refixation", start="as_walk")
+PRINTED = ScanpathParams(
+    min_dwell_ms=0.0, diagonal="refixation", start="as_walk", least_shift_deg=0.0
+)
+ONE_REST = ScanpathParams(diagonal="one_rest", least_shift_deg=0.0)
 """The walk as the paper has it."""
 
 
@@ -146,7 +158,7 @@ def test_wrong_shapes_are_named() -> None:
 
 def rests(count: int, rate_scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the parts of a walk in their order of the matrix, and the rest on each."""
-    walk = markov_walk(ScanpathParams(rate_scale=rate_scale), WALK, np.random.default_rng(4))
+    walk = markov_walk(replace(ONE_REST, rate_scale=rate_scale), WALK, np.random.default_rng(4))
     parts, times, part = [], [], 0
     for _ in range(count):
         part = walk.next_part(part)
@@ -156,7 +168,7 @@ def rests(count: int, rate_scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_rests_are_never_short_and_keep_the_rate_of_the_table() -> None:
-    params = ScanpathParams()
+    params = ONE_REST
     parts, times = rests(40_000)
     assert (np.diff(parts) != 0).all()
     assert times.min() >= params.min_dwell_ms / 1e3
@@ -168,7 +180,7 @@ def test_rests_are_never_short_and_keep_the_rate_of_the_table() -> None:
 
 def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest() -> None:
     parts, times = rests(40_000)
-    visits = [times[parts == part].mean() + ScanpathParams().shift_ms / 1e3 for part in range(8)]
+    visits = [times[parts == part].mean() + ONE_REST.shift_ms / 1e3 for part in range(8)]
     table = (0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165)
     for name, visit, wanted in zip(WALK.order, visits, table, strict=True):
         low, high = (1.05, 1.25) if name in ("LE", "UP") else (0.95, 1.0)
@@ -178,7 +190,7 @@ def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest(
 @pytest.mark.parametrize("rate_scale", [0.5, 1.1])
 def test_a_rate_that_rests_allow_is_kept(rate_scale: float) -> None:
     _, times = rests(20_000, rate_scale=rate_scale)
-    visit_s = times.mean() + ScanpathParams().shift_ms / 1e3
+    visit_s = times.mean() + ONE_REST.shift_ms / 1e3
     assert visit_s == pytest.approx(0.2715 / rate_scale, rel=0.02)
 
 
@@ -214,7 +226,7 @@ def test_a_face_is_entered_at_the_part_nearest_to_the_gaze(
     gaze_m: tuple[float, float, float], part: str
 ) -> None:
     # The parts of FACE stand in a row, the first in the middle, the last farthest to the left.
-    walk = walker(6, ScanpathParams())
+    walk = walker(6, ONE_REST)
     wanted = {"first": PARTS[0], "last": PARTS[-1], "RE": PARTS[3]}[part]
     head = (0.0, 0.0, 0.2)
     assert walk.wander(TARGET, PERCEPT, 0.0, False, head, gaze_m).part == wanted
@@ -227,7 +239,7 @@ def test_a_face_is_entered_at_the_part_nearest_to_the_gaze(
 
 def test_the_first_rest_on_a_face_begins_when_the_gaze_arrives() -> None:
     """What "settled" says in the tick of entry is of what was looked at before."""
-    walk = walker(6, ScanpathParams())
+    walk = walker(6, ONE_REST)
     assert walk.rests_until_s == -inf
     entered = walk.wander(TARGET, PERCEPT, 0.0, True)
     assert walk.rests_until_s == inf and walk.looks.dwell[1] is None
@@ -354,3 +366,71 @@ def test_what_cannot_be_trusted_is_refused() -> None:
     refused(staring, "no transition starts at chin", replace(params, smoothing="none"))
     apart = [PartFixation("N", 3.0 * k, 0.25) for k in range(60)]
     refused(apart, "no two fixations on the face follow each other")
+
+
+# ---- the average observer, and one observer --------------------------------------------
+
+PEOPLE = load(shipped("scanpaths", "people"), Walk)
+
+
+def visited(face: Face, params: ScanpathParams | None = None, seed: int = 1) -> dict[str, float]:
+    """Return the share of the looks at each part of a face 1 m or more ahead."""
+    walk = Scanpath(params or ScanpathParams(), PEOPLE, np.random.default_rng(seed))
+    percept, parts = Percept(0.0, Bodies(), (face,)), []
+    target = TARGET._replace(p_world_m=face.p_world_m)
+    shift = None
+    for k in range(40_000):
+        look = walk.wander(target, percept, k * 0.02, settled=True)
+        if look.shift != shift:
+            parts.append(present(look.part))
+            shift = look.shift
+    return {part: parts.count(part) / len(parts) for part in PARTS}
+
+
+def face_at(away_m: float, speaks: bool = False) -> Face:
+    R = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
+    centre = (away_m, 0.0, 0.2)
+    parts = tuple(
+        (centre[0] - x, centre[1] - y, centre[2] + z)
+        for x, y, z in (PARTS_FACE_M[part] for part in PARTS)
+    )
+    return Face(3, centre, (0.0, 0.0, 0.0), R, parts, 0.9, speaks=speaks)
+
+
+def test_the_average_observer_looks_at_the_eyes_most() -> None:
+    share = visited(face_at(0.8))
+    assert 0.40 < share["LE"] + share["RE"] < 0.50
+    assert 0.18 < share["N"] < 0.27 and 0.07 < share["M"] < 0.14
+    never = np.array(WALK.matrix) == 0.0
+    assert (np.array(PEOPLE.matrix)[never] == 0.0).all(), "shifts of the paper and no others"
+
+
+def test_speech_draws_looks_to_the_mouth() -> None:
+    quiet, loud = visited(face_at(0.8)), visited(face_at(0.8, speaks=True))
+    assert 1.35 < loud["M"] / quiet["M"] < 4.0
+
+
+def test_a_spot_of_ones_own_draws_looks() -> None:
+    high, low = (visited(face_at(0.8), ScanpathParams(spot_height_mm=mm)) for mm in (20.0, -30.0))
+    assert high["LE"] + high["RE"] > low["LE"] + low["RE"] + 0.1
+    assert low["M"] > high["M"] + 0.06
+    left, right = (visited(face_at(0.8), ScanpathParams(spot_left_mm=mm)) for mm in (30.0, -30.0))
+    assert left["LE"] / left["RE"] > 1.5 * right["LE"] / right["RE"]
+
+
+def test_parts_of_a_far_face_that_are_close_together_are_one_look() -> None:
+    far = visited(face_at(2.2))
+    assert far["M"] < 0.06 < visited(face_at(0.8))["M"], "a degree below the nose"
+    assert len({part for part, share in visited(face_at(9.0)).items() if share > 0.0}) == 1
+
+
+def test_rests_of_the_average_observer_are_as_different_as_peoples() -> None:
+    steps, dwells = steps_and_dwells(ScanpathParams(), PEOPLE)
+    share, rng = stationary(steps), np.random.default_rng(3)
+    parts = rng.choice(8, 20_000, p=share)
+    rests = np.array([dwells[part](rng) for part in parts])
+    assert 0.5 < rests.std() / rests.mean() < 0.62
+    assert 0.07 < (rests > 0.5).mean() < 0.14
+    eyes = np.isin(parts, [PEOPLE.order.index(part) for part in ("LE", "RE")])
+    assert 0.003 < (rests[eyes] > 1.0).mean() < 0.04
+    assert 2.0 < 1.0 / (rests.mean() + 0.036) < 3.0

@@ -8,7 +8,7 @@ which the paper's comparison needs: so the gaze does not leave a single person b
 several people share it.
 """
 
-from math import inf
+from math import exp, inf, log, sqrt
 from operator import mul
 
 import numpy as np
@@ -17,7 +17,7 @@ from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.comparison import NO_BODY, TargetComparison
 from gazerig.gaze.attention.face_memory import FaceMemory
-from gazerig.gaze.attention.habituation import Habituation
+from gazerig.gaze.attention.habituation import NO_STAY, Habituation, Stay
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.params import AttentionParams
 from gazerig.gaze.attention.persons import Persons
@@ -29,6 +29,7 @@ from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _NO_ONE: frozenset[int] = frozenset()
 _SPEED_OVER_S = 0.2  # longest interval for a speed of the head from two positions
+_LONGEST_EXTRA_S = 6.0  # beyond 15 s on one face a look is a stare
 _DECIDED_S = 0.2
 """Time within which a camera may show the target of a new behaviour after the change."""
 
@@ -43,6 +44,7 @@ class Attention:
         top_down: the rules.
         idle: gaze without a target in sight.
         rng: draws reaction times; None: every change of target is immediate.
+        stay_rng: draws the additional times of looks at one of several people; None: none.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class Attention:
         top_down: TopDown,
         idle: Idle,
         rng: np.random.Generator | None = None,
+        stay_rng: np.random.Generator | None = None,
     ) -> None:
         self._params = params
         self._field_of_view = field_of_view
@@ -63,6 +66,7 @@ class Attention:
         self._reaction = Reaction(params.reaction, rng)
         self._memory = FaceMemory()
         self._persons = Persons()
+        self._stay_rng = stay_rng
         self.reset(0.0)
 
     def retune(self, params: AttentionParams) -> None:
@@ -86,7 +90,7 @@ class Attention:
         self._since_s = -inf
         self._identity: tuple[str, int] | None = None
         self._place = _STILL
-        self._favoured_id = -1
+        self._stay = NO_STAY
         self._behaviour = self.top_down.behaviour
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
@@ -145,13 +149,16 @@ class Attention:
         bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)
         if "face" in percept.bodies.kinds:  # a remembered face never wins against a visible one
             bodies = percept.bodies
-        self._persons.update(percept, state.p_world_head_m)
+        recovery_s = self._params.habituation.rhythm_recovery_s
+        self._persons.update(percept, state.p_world_head_m, recovery_s)
         if self.top_down.plans:
             self.top_down.plan(percept, state.p_world_head_m, t_s)
         trait = self.top_down.rule.person
         self.top_down.named_ids = self._persons.named(trait) if trait is not None else _NO_ONE
         ratio = self._params.looks_elsewhere_ratio
-        elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
+        elsewhere = [
+            face.id for face in percept.faces if face.looks_at_head is False and not face.speaks
+        ]
         worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
         made = self._compare(bodies, worth, state, t_s)
         self._note_gestures(made)
@@ -171,7 +178,7 @@ class Attention:
             row = present if made.total[row] < favoured else row
         named = made.rule_target is not None and row in made.rule_target.rows
         if named:
-            self._favoured_id = made.bodies.ids[row]
+            self._stay_with(made.bodies.ids[row])
         winner = made.target(row, percept.captured_s)
         # A change of mind waits neither for a reaction nor for the end of a fixation.
         if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
@@ -182,6 +189,17 @@ class Attention:
         if present is not None:
             return made.target(present, percept.captured_s)
         return self._target and self._target._replace(plan=made.plan)
+
+    def _stay_with(self, id: int) -> None:
+        """Draw the additional time of a look at another one of several people."""
+        if id == self._stay.id:
+            return
+        par, extra_s = self._params.habituation, 0.0
+        if self._stay_rng is not None and par.stay_s > 0.0:
+            variance = log(1.0 + par.stay_spread**2)
+            deviation = sqrt(variance) * float(self._stay_rng.standard_normal())
+            extra_s = min(par.stay_s * exp(deviation - 0.5 * variance), _LONGEST_EXTRA_S)
+        self._stay = Stay(id, extra_s)
 
     def _shows_nothing_salient(self, made: TargetComparison) -> bool:
         """Return whether there are no bodies, or only things of low salience, for idle gaze."""
@@ -206,7 +224,7 @@ class Attention:
         rule_target = self.top_down.step(rows, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
         left = self._habituation.step(rows, eye, attended, t_s)
-        habituation = [*map(mul, left, worth), 1.0]
+        habituation = [*map(mul, map(mul, left, worth), self._novelty(bodies.ids)), 1.0]
         rule = [0.0] * (n + 1)
         amount = [*[terms.total for terms in motion], 0.0]
         point = rule_target is not None and rule_target.point_world_m is not None
@@ -228,6 +246,16 @@ class Attention:
         return TargetComparison(
             bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
         )
+
+    def _novelty(self, ids: tuple[int, ...]) -> list[float]:
+        """Return the factor 0..1 of each body by the repetition of its motion; 0: no target."""
+        if self.top_down.plans:  # in a match every motion of a fist counts
+            return [1.0] * len(ids)
+        persons, ratio = self._persons, self._params.habituation.rhythm_ratio
+        sunk = self._params.sinking_ratio
+        return [
+            (sunk if id in persons.sinking else 1.0) * ratio ** persons.repeats(id) for id in ids
+        ]
 
     def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
         """Return the limit of each body's motion, and the share of it that counts."""
@@ -264,14 +292,26 @@ class Attention:
         moved = self._gestures
         mine = [worth[row] * (1.0 + moved.get(ids[row], 0.0)) for row in rule_target.rows]
         weights = [near * one for near, one in zip(rule_target.nearness, mine, strict=True)]
+        weights = self._favour_speakers(named, weights)
+        factors = self._habituation.share(named, weights, attended, t_s, self._stay)
         shares = [
-            factor * one * (rule_target.stay if id == self._favoured_id else 1.0)
-            for id, factor, one in zip(
-                named, self._habituation.share(named, weights, attended, t_s), mine, strict=True
-            )
+            factor * one * (rule_target.stay if id == self._stay.id else 1.0)
+            for id, factor, one in zip(named, factors, mine, strict=True)
         ]
         most = max(*shares, 1e-9)
         return [one / most for one in shares]
+
+    def _favour_speakers(self, ids: list[int], weights: list[float]) -> list[float]:
+        """Return the weights of people such that those who speak have their share of the sum."""
+        share, speaking = self._params.speaker_share, self._persons.speaking
+        spoken = sum(one for id, one in zip(ids, weights, strict=True) if id in speaking)
+        mute = sum(weights) - spoken
+        if share == 0.0 or spoken <= 0.0 or mute <= 0.0:
+            return weights
+        ratio = max(1.0, share / (1.0 - share) * mute / spoken)
+        return [
+            ratio * one if id in speaking else one for id, one in zip(ids, weights, strict=True)
+        ]
 
     def _gaze(self, state: GazeState) -> Vec3:
         """Return the gaze direction of both eyes, of any length, if the salience depends on it."""

@@ -27,6 +27,16 @@ class _Left(NamedTuple):
     at_s: float
 
 
+class Stay(NamedTuple):
+    """A look at one of several bodies: its id, and the additional surplus that it may reach."""
+
+    id: int
+    extra_s: float
+
+
+NO_STAY = Stay(-1, 0.0)
+
+
 class Habituation:
     """State of habituation of every identity, and the points left."""
 
@@ -70,7 +80,12 @@ class Habituation:
         ]
 
     def share(
-        self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
+        self,
+        ids: Sequence[int],
+        weights: Sequence[float],
+        attended_id: int,
+        t_s: float,
+        stays: Stay = NO_STAY,
     ) -> list[float]:
         """Return the factor 0..1 of each of several bodies that a rule selects.
 
@@ -81,12 +96,17 @@ class Habituation:
             weights: of each; viewing times are in proportion to them.
             attended_id: what has been looked at since the step before; -1 for nothing.
             t_s: now.
+            stays: the present look at one of them, and its additional time.
         """
         floor, rate = self._params.rule_floor, self._params.decay_rate_1_s
         if rate == 0.0 or floor == 1.0:
             return [1.0] * len(ids)
         surpluses = self._shared.step(ids, weights, attended_id, t_s)
-        return [floor + (1.0 - floor) * exp(-rate * one) for one in surpluses]
+        extra = [stays.extra_s if id == stays.id else 0.0 for id in ids]
+        return [
+            floor + (1.0 - floor) * exp(-rate * max(0.0, one - more))
+            for one, more in zip(surpluses, extra, strict=True)
+        ]
 
     def _advance(self, attended_id: int, t_s: float) -> None:
         """Update all factors and the points left to the present time."""

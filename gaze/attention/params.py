@@ -16,6 +16,14 @@ class HabituationParams:
     recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the salience factors of everything else recover to 1"] = 1.0
     rule_floor: Annotated[float, Bounds(0, 1),
         "lowest salience factor of one of several targets of a rule; lower: the gaze changes sooner between people"] = 0.0
+    stay_s: Annotated[float, Bounds(0, 60),
+        "mean of the time, drawn for each look at one of several people, by which it lasts longer than a balance between them asks "
+        "for; 0: none"] = 2.0
+    stay_spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of that time; larger: more long looks among short ones"] = 1.2
+    rhythm_ratio: Annotated[float, Bounds(0, 1),
+        "factor on the salience of a hand at each change of direction of its motion to and fro at the face, outside a boxing match; "
+        "1: none"] = 0.6
+    rhythm_recovery_s: Annotated[float, Bounds(0.1, 600), "time constant with which that salience recovers"] = 2.0
     inhibition_of_return_strength: Annotated[float, Bounds(0, 1),
         "how strongly the point that the gaze has just left is avoided; 0: not at all"] = 0.5
     inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that inhibition around the point"] = 4.0
@@ -49,7 +57,11 @@ class AttentionParams:
     min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
     stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
     looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
-        "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
+        "share of its salience that a face keeps while the person does not look at the head, and does not speak; 1: all"] = 0.6
+    speaker_share: Annotated[float, Bounds(0, 0.99),
+        "share of the looks at several people that those who speak get, if someone speaks; 0: speech has no effect"] = 0.88
+    sinking_ratio: Annotated[float, Bounds(0, 1),
+        "share of its salience that a person's hand keeps while it sinks, outside a boxing match; 1: all"] = 0.0
     own_motion_ratio: Annotated[float, Bounds(0, 1),
         "share of their motion that a person's own hands and clothes keep for themselves, unless they are raised to the face or "
         "reach out; the rest counts for the face; 1: all"] = 0.3

@@ -4,12 +4,13 @@ Rules can name people by it (gazerig.gaze.attention.top_down), independent of th
 
 A hand waves when its velocity across the view has changed sides twice within a little more than a
 second, faster than a hand that only gestures, at the height of the face; the person who waves is
-the one with the face nearest to it.
+the one with the face nearest to it. Each further change of side of a hand at the face makes its
+motion less new: people look less and less at what repeats itself (Neo & Chua 2006).
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import dist, hypot, inf
+from math import dist, exp, hypot, inf
 
 from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.types import Percept, Vec3
@@ -29,6 +30,8 @@ _RAISED_M = 0.08
 _GESTURES_M_S, _GESTURES_S, _GESTURES = 0.25, 2.0, 0.5
 """A person gestures whose lower hands were faster than this, in this time window, for this
 share."""
+_SANK_S = 0.3
+"""Time for which a hand counts as sinking after it did."""
 _HAND, _OWN = "hand", "own"
 """The robot's own body never waves."""
 _TOGETHER_S = 0.5
@@ -39,11 +42,15 @@ _GONE_S = 120.0
 
 @dataclass(slots=True)
 class _Hand:
-    """Motion of a body other than a face: its side, and the times of its changes of side."""
+    """Motion of a body other than a face: its side, and the times of its changes of side.
+
+    repeats: number of changes of side soon after another, which decays as they are forgotten
+    """
 
     side: float = 0.0
     turned_s: list[float] = field(default_factory=list)
     seen_s: float = -inf
+    repeats: float = 0.0
 
 
 class Persons:
@@ -54,6 +61,8 @@ class Persons:
             bodies that reach out towards the head or are raised to the face.
         raised: ids of bodies that move within a person's reach at the height of the face; without
             hands of a person who gestures and does not wave, as signs reach the face, too.
+        sinking: ids of hands that move down, and of those that just did.
+        speaking: ids of the people who speak.
     """
 
     def __init__(self) -> None:
@@ -68,16 +77,20 @@ class Persons:
         self._gestures: dict[int, float] = {}
         self.parts: dict[int, int] = {}
         self.raised: set[int] = set()
+        self.sinking: set[int] = set()
+        self.speaking: frozenset[int] = frozenset()
+        self._sank_s: dict[int, float] = {}
         self._looking: frozenset[int] = frozenset()
         self._nearest = -1
         self._at_s = -inf
 
-    def update(self, percept: Percept, p_world_eye_m: Vec3) -> None:
+    def update(self, percept: Percept, p_world_eye_m: Vec3, recovery_s: float = 2.0) -> None:
         """Update with a new frame.
 
         Args:
             percept: its percept.
             p_world_eye_m: position of the eye.
+            recovery_s: time constant with which changes of side are forgotten.
         """
         bodies, before_s, self._at_s = percept.bodies, self._at_s, percept.captured_s
         rows = bodies.p_world_m.tolist()
@@ -90,6 +103,8 @@ class Persons:
             self._came_s.setdefault(id, self._at_s)
             self._seen_s[id] = self._at_s
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
+        self.speaking = frozenset(face.id for face in percept.faces if face.speaks)
+        self._forget_repeats(max(0.0, self._at_s - before_s), recovery_s)
         self._update_nearest(faces, p_world_eye_m)
         self.parts, self.raised = {}, set()
         moving: set[int] = set()
@@ -97,10 +112,13 @@ class Persons:
             if faces and id not in faces and bodies.kinds[row] != _OWN:
                 x, y, z = rows[row]
                 vx, vy, vz = bodies.v_world_m_s[row].tolist()
-                self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
                 low_of = self._update_part(id, (x, y, z), faces, p_world_eye_m)
+                self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
                 if bodies.kinds[row] == _HAND and hypot(vx, vy, vz) > _GESTURES_M_S:
                     moving.add(low_of)
+                    if -vz > max(_GESTURES_M_S, hypot(vx, vy)):
+                        self._sank_s[id] = self._at_s
+        self.sinking = set(self._within(self._sank_s, _SANK_S))
         share = min(1.0, (self._at_s - before_s) / _GESTURES_S)
         for id in faces:
             now = self._gestures.get(id, 0.0)
@@ -185,7 +203,22 @@ class Persons:
             return False
         hand.turned_s = [at for at in hand.turned_s if self._at_s - at <= _TURNS_WITHIN_S]
         hand.turned_s.append(self._at_s)
+        if id in self.raised and len(hand.turned_s) >= _TURNS:
+            hand.repeats += 1.0
         return len(hand.turned_s) >= _TURNS
+
+    def repeats(self, id: int) -> float:
+        """Return how often a hand has repeated its motion recently, 0 for a new motion.
+
+        The first change of side soon after another is still new.
+        """
+        hand = self._hands.get(id)
+        return 0.0 if hand is None else max(0.0, hand.repeats - 1.0)
+
+    def _forget_repeats(self, dt_s: float, recovery_s: float) -> None:
+        """Let the number of changes of side decay."""
+        for hand in self._hands.values():
+            hand.repeats *= exp(-dt_s / recovery_s)
 
     def _within(self, at_s: Mapping[int, float], lasts_s: float) -> frozenset[int]:
         return frozenset(id for id, one_s in at_s.items() if self._at_s - one_s <= lasts_s)

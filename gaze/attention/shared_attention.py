@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 _FADES_S = 10.0
 """Time constant with which a surplus decays: a minute of looks need not be compensated."""
-_LARGEST_S = 5.0
+_LARGEST_S = 8.0
 _KEPT_S = 60.0
 _FIRST_S = 0.1
 """Initial surplus of a body of weight 0: the heaviest of new bodies comes first."""

@@ -59,6 +59,45 @@ class LidClosure(NamedTuple):
         since_s = (t_s - self.onset_s) / self.slow
         return self.depth * closure(since_s, self.close_s, self.hold_s, self.open_s)
 
+    def eye_turn(self, t_s: float) -> float:
+        """Return the turn of the eyes with it, 0..1: it ends before that of the lids."""
+        since_s = (t_s - self.onset_s) / self.slow
+        out_s = _EYES_OUT * self.close_s
+        back_s = self.close_s - out_s + self.hold_s + _EYES_BACK * self.open_s
+        if not 0.0 < since_s < out_s + back_s:
+            return 0.0
+        if since_s < out_s:
+            return self.depth * min_jerk(since_s / out_s)
+        return self.depth * (1.0 - min_jerk((since_s - out_s) / back_s))
+
+    def vary(self, params: LidParams, rng: np.random.Generator) -> "LidClosure":
+        """Return it with durations drawn about its own."""
+        if params.duration_spread == 0.0:
+            return self
+        close, hold, open = np.exp(params.duration_spread * rng.standard_normal(3)).tolist()
+        return self._replace(
+            close_s=close * self.close_s, hold_s=hold * self.hold_s, open_s=open * self.open_s
+        )
+
+    def both(self, params: LidParams, rng: np.random.Generator) -> "tuple[LidClosure, LidClosure]":
+        """Return it for the left and the right lids, which differ a little."""
+        if params.asymmetry == 0.0:
+            return self, self
+        open, depth = (0.5 * params.asymmetry * rng.standard_normal(2)).tolist()
+        if self.depth >= 1.0:  # both eyes shut, at the same time
+            depth = 0.0
+        left, right = (
+            self._replace(
+                open_s=self.open_s * max(0.5, 1.0 + sign * open),
+                depth=min(max(self.depth * (1.0 + sign * depth), 0.0), 1.0),
+            )
+            for sign in (1.0, -1.0)
+        )
+        return left, right
+
+
+_EYES_OUT, _EYES_BACK = 0.9, 0.6
+"""Shares of the lids' closing and opening times: end of the eyes' turn out, and back."""
 
 _NEARLY_SHUT = 0.95
 """Depth above which a blink counts as complete."""

@@ -14,6 +14,11 @@ meet, perhaps in the middle, so a lower lid at rest would leave a gap. Therefore
 ``lower_close_share`` is 1. If the upper lid's shut point is calibrated at the edge of a resting
 lower lid, a rig can blink as people do: share 0 to 0.2.
 
+No two blinks of people are alike: durations differ by tens of ms, half of the blinks stop between
+a quarter and nearly all of the way (Ousler 2014), and the lids of both eyes differ a little. The
+eyes turn 1 to 5 deg down and towards the nose in a blink (Collewijn 1985; 1 to 2 deg, Riggs 1987),
+faster than the lids: they turn back before these are shut.
+
 No measurement of the lower lid in sleepiness is known; the muscle that lifts it
 tires with the others, so it rises by little.
 """
@@ -43,6 +48,13 @@ class LidParams:
     close_ms: Annotated[float, Bounds(30, 500), "duration of closing in a blink"] = 75.0
     hold_ms: Annotated[float, Bounds(0, 1000), "time that the lid stays shut in a blink"] = 35.0
     open_ms: Annotated[float, Bounds(50, 1500), "duration of opening in a blink"] = 175.0
+    duration_spread: Annotated[float, Bounds(0, 1),
+        "standard deviation of the logarithm of a blink's closing, shut and opening time, each drawn for itself; 0: all alike"] = 0.2
+    asymmetry: Annotated[float, Bounds(0, 0.5),
+        "standard deviation of the relative difference between both eyes' lids in a blink: of the opening time, and of the depth of an "
+        "incomplete one; 0: both alike"] = 0.06
+    eye_down_deg: Annotated[float, Bounds(0, 10), "turn of the eyes downwards and back in a complete blink; people 1 to 5; 0: none"] = 1.3
+    eye_nasal_deg: Annotated[float, Bounds(0, 10), "the same towards the nose"] = 0.7
     wink_hold_ms: Annotated[float, Bounds(0, 3000), "time that the lid stays shut in a wink"] = 200.0
     rest_opening: Annotated[float, Bounds(0.1, 1), "opening of the upper lids with level gaze, 0 shut to 1 open"] = 0.75
     follow_per_deg: Annotated[float, Bounds(0, 0.1),

@@ -7,7 +7,7 @@ and lower lid in contact; 1 is fully open. A blink moves both lids from their pr
 so they meet at any gaze direction.
 """
 
-from math import degrees, inf, tanh
+from math import degrees, inf, radians, tanh
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from gazerig.gaze.lids.blink import (
 )
 from gazerig.gaze.lids.lid_params import LidParams as LidParams
 from gazerig.gaze.lids.lid_rest import LidPair, LidsAtRest
+from gazerig.gaze.types import Angles2
 
 Side = Literal["left", "right"]
 LidMode = Literal["rest", "conversation"]
@@ -86,6 +87,7 @@ class Lids:
         self.blinks = 0
         self._t_s = t_s
         self._blink: LidClosure | None = None
+        self._sides: tuple[LidClosure, LidClosure] | None = None
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
         self._shut_until_s = -inf
         self._evoked_s = inf
@@ -180,18 +182,28 @@ class Lids:
             return tuple.__new__(LidOpenings, (upper, upper, False, lower, lower))
         if self._due(t_s, shift_rad):
             self._begin_blink(t_s)
-        blink = _closures(self._blink, t_s)
+        blinks = [_closures(side, t_s) for side in self._sides or (None, None)]
         (left, lower_left), (right, lower_right) = (
-            _more(blink, _closures(wink, t_s)) for wink in self._winks.values()
+            _more(blink, _closures(wink, t_s))
+            for blink, wink in zip(blinks, self._winks.values(), strict=True)
         )
         # Closings come out at 1 and a rounding error just before they are done.
         return LidOpenings(
             upper * max(0.0, 1.0 - left),
             upper * max(0.0, 1.0 - right),
-            blink[0] > 0.0,
+            blinks[0][0] > 0.0 or blinks[1][0] > 0.0,
             lower * max(0.0, 1.0 - lower_left),
             lower * max(0.0, 1.0 - lower_right),
         )
+
+    def eye_turn_rad(self, t_s: float) -> tuple[Angles2, Angles2] | None:
+        """Return the turns of left and right eye, (yaw, pitch), with a blink; None without any."""
+        par, blink = self._params, self._blink
+        share = 0.0 if blink is None else blink.eye_turn(t_s)
+        if share == 0.0:
+            return None
+        nasal, down = radians(share * par.eye_nasal_deg), -radians(share * par.eye_down_deg)
+        return (-nasal, down), (nasal, down)
 
     def closure(self, since_onset_s: float) -> float:
         """Return the closure of the upper lid by a full blink, 0..1, at a time after its onset."""
@@ -227,8 +239,10 @@ class Lids:
         blink = self._closing(t_s, par.hold_ms)._replace(
             depth=blink_depth(par, self._rng), slow=slow
         )
-        self._blink = blink
-        self._expect(blink)
+        self._blink = blink = blink.vary(par, self._rng)
+        self._sides = blink.both(par, self._rng)
+        for side in self._sides:
+            self._expect(side)
         double = is_double_blink(par, self._rng)
         pause_s = par.double_gap_ms / 1e3 if double else self._pause_s(blink.length_s)
         after_s, ends_s = blink.length_s + pause_s, t_s + blink.length_s

@@ -196,6 +196,10 @@ class Oculomotor:
         left, right = eyes = self._in_range(wanted)
         limited = () if eyes == wanted else self._limited(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
+        if lids.blink and (turns := self._lids.eye_turn_rad(t_s)) is not None:
+            left, right = self._in_range(
+                (_add_offset(left, turns[0]), _add_offset(right, turns[1]))
+            )
         if offset.lids != NO_OFFSET.lids:
             lids = lids.scaled(offset.lids)
         head = self._add_sway(head, offset.head_rad, t_s)

@@ -10,12 +10,23 @@ every tick.
 """
 
 from collections.abc import Sequence
-from math import radians
+from math import exp, radians
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from gazerig.gaze.angles import add, direction, norm, rotate, rotation, scale, sub, yaw_pitch
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    direction,
+    norm,
+    rotate,
+    rotate_back,
+    rotation,
+    scale,
+    sub,
+    yaw_pitch,
+)
 from gazerig.gaze.scanpath.dwell import Draw
 from gazerig.gaze.types import PARTS, Angles2, Face, Floats, Vec3
 
@@ -49,6 +60,32 @@ class ScanpathModel(Protocol):
         ...
 
 
+class Observer(NamedTuple):
+    """What one observer's looks at a face depend on, apart from the walk.
+
+    shift_m: preferred spot on a face, to its left of and above that of most people
+    width_m: standard deviation of looks about it; 0: the spot has no effect
+    speech_mouth_ratio: factor on looks at the mouth of a person who speaks
+    least_shift_rad: smallest angle between two parts for which the gaze shifts
+    """
+
+    shift_m: tuple[float, float] = (0.0, 0.0)
+    width_m: float = 0.0
+    speech_mouth_ratio: float = 1.0
+    least_shift_rad: float = 0.0
+
+    def spot_factor(self, left_m: float, up_m: float) -> float:
+        """Return the factor on the looks at a part at a place of the face."""
+        if self.width_m == 0.0:
+            return 1.0
+        along = left_m * self.shift_m[0] + up_m * self.shift_m[1]
+        return exp(along / (self.width_m * self.width_m))
+
+
+ANYONE = Observer()
+"""Draws from the walk as it is."""
+
+
 class MarkovWalk:
     """First-order Markov chain over the parts, with a dwell time drawn at each arrival.
 
@@ -63,13 +100,15 @@ class MarkovWalk:
         start: int,
         rng: np.random.Generator,
         enters_nearest: bool = False,
+        observer: Observer = ANYONE,
     ) -> None:
         self._parts = tuple(parts)
         self._columns = tuple(PARTS.index(part) for part in parts)
-        self._cumulative: list[list[float]] = np.cumsum(matrix, axis=1).tolist()
+        self._rows: list[list[float]] = np.asarray(matrix, dtype=float).tolist()
         self._dwells = tuple(dwells)
         self._start = start
         self._enters_nearest = enters_nearest
+        self._observer = observer
         self._rng = rng
         self.enter()
 
@@ -100,7 +139,7 @@ class MarkovWalk:
             if settled:
                 self._until_s = t_s + self.dwell_s(before)
         elif t_s >= until_s:
-            self._walk(until_s, t_s)
+            self._walk(until_s, t_s, face, p_world_head_m)
         moved = self._part != before
         if moved or face is not self._face:
             point = face.parts_world_m[self._columns[self._part]]
@@ -108,22 +147,50 @@ class MarkovWalk:
             self._face = None if moved else face
         return self._step
 
-    def next_part(self, part: int) -> int:
-        """Draw the part that follows ``part``, both as indices in the order given."""
-        draw = self._rng.random()
-        row = self._cumulative[part]
-        for following, edge in enumerate(row):
-            if draw < edge:
-                return following
-        return row.index(row[-1])  # rounding left the sum a hair below 1
+    def next_part(self, part: int, factors: Sequence[float] | None = None) -> int:
+        """Draw the part that follows ``part``, both as indices in the order given.
+
+        factors: on the probability of each part; the part stays if they leave none
+        """
+        row = self._rows[part]
+        if factors is not None:
+            row = [one * factor for one, factor in zip(row, factors, strict=True)]
+        total = sum(row)
+        if total == 0.0:
+            return part
+        draw, last = total * self._rng.random(), part
+        for following, one in enumerate(row):
+            if one > 0.0:
+                draw, last = draw - one, following
+                if draw < 0.0:
+                    break
+        return last  # rounding may leave the sum a hair above the draw
 
     def dwell_s(self, part: int) -> float:
         """Draw a dwell time of a part."""
         return self._dwells[part](self._rng)
 
-    def _walk(self, until_s: float, t_s: float) -> None:
+    def _factors(self, face: Face, p_world_head_m: Vec3) -> list[float]:
+        """Return the factor on the probability of each part, for this observer and face."""
+        observer, here = self._observer, self._columns[self._part]
+        way = sub(face.parts_world_m[here], p_world_head_m)
+        factors = []
+        for part, column in zip(self._parts, self._columns, strict=True):
+            place = face.parts_world_m[column]
+            _, left, up = rotate_back(face.R_world_face, sub(place, face.p_world_m))
+            factor = observer.spot_factor(left, up)
+            if part == "M" and face.speaks:
+                factor *= observer.speech_mouth_ratio
+            if column != here and observer.least_shift_rad > 0.0:
+                apart = angle_between(sub(place, p_world_head_m), way)
+                factor *= apart >= observer.least_shift_rad
+            factors.append(factor)
+        return factors
+
+    def _walk(self, until_s: float, t_s: float, face: Face, p_world_head_m: Vec3) -> None:
+        factors = self._factors(face, p_world_head_m)
         while t_s >= until_s:
-            following = self.next_part(self._part)
+            following = self.next_part(self._part, factors)
             if following != self._part:
                 self._part = following
                 self._until_s = None

@@ -3,10 +3,17 @@
 The measured walk is that of Nakamoto & Tsuruno 3.2. Its printed matrix has one decimal, so the rows
 sum to 0.8-1.1 and are normalised; rows are "from", columns "to". Only the point of a face target is
 replaced here; the head turns to the face's centre and not to each part (3.5).
+
+A matrix holds for everyone; three things change it. Each observer has a preferred spot on faces,
+from the brows to the mouth, that stays for months (Peterson & Eckstein 2013; Mehoudar et al. 2014);
+most people's is just below the eyes. If looks have a normal distribution about it, another spot
+multiplies the looks at a part by exp(part . shift / width^2). Speech draws looks to the mouth
+(Buchan et al. 2007). Parts that are seen too close together for a shift, on a far face, are one
+look.
 """
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, radians
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -17,6 +24,7 @@ from gazerig.gaze.scanpath.dwell import LAWS, Draw, rests_s, shift_dwell, statio
 from gazerig.gaze.scanpath.models import (
     FaceTracking,
     MarkovWalk,
+    Observer,
     RandomAngles,
     ScanpathModel,
     ScanpathStep,
@@ -80,14 +88,14 @@ class ScanpathParams:
     # fmt: off
     model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
         "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
-    transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "nakamoto_tsuruno"
+    transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "people"
     start: Annotated[str, Choices("nearest", "as_walk", *PARTS),
         "first face part, named as in the matrix; nearest: the one nearest to the gaze; as_walk: that of the matrix file"] = "nearest"
     viewers_left: Annotated[bool,
         "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
     diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
         "meaning of the matrix's diagonal, the same part again: another dwell (refixation), included in the dwell of the visit "
-        "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "one_rest"
+        "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "whole_visit"
     dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
     min_dwell_ms: Annotated[float, Bounds(0, 2000),
         "shortest dwell, from landing to departure; longer ones are distributed above it, with the same mean"] = 140.0
@@ -95,6 +103,14 @@ class ScanpathParams:
         "with diagonal one_rest: standard deviation over mean of a rest's time beyond min_dwell_ms"] = 0.6
     shift_ms: Annotated[float, Bounds(0, 500),
         "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 44.0
+    spot_height_mm: Annotated[float, Bounds(-100, 100),
+        "height of the observer's preferred spot on a face over that of most people, which is just below the eyes"] = 0.0
+    spot_left_mm: Annotated[float, Bounds(-80, 80), "the same distance towards the face's left"] = 0.0
+    spot_width_mm: Annotated[float, Bounds(0, 1000),
+        "standard deviation of the looks about that spot; smaller: the spot has more effect; 0: none"] = 60.0
+    speech_mouth_ratio: Annotated[float, Bounds(0.1, 20), "factor on the looks at the mouth of a person who speaks"] = 2.5
+    least_shift_deg: Annotated[float, Bounds(0, 10),
+        "smallest angle between two parts of a face for which the gaze shifts; the fovea covers less; 0: any"] = 1.5
     rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0
     simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "order of the parts in the simple model"] = ("N", "RE", "LE")
     simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000), "dwell on each part of simple_order"] = (459.42, 408.21, 408.21)
@@ -291,8 +307,18 @@ def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) ->
     start = walk.start if params.start in ("nearest", "as_walk") else params.start
     return MarkovWalk(
         _owners(params, walk.order), matrix, dwells, walk.order.index(start), rng,
-        enters_nearest=params.start == "nearest",
+        params.start == "nearest", observer_of(params),
     )  # fmt: skip
+
+
+def observer_of(params: ScanpathParams) -> Observer:
+    """Return what changes the walk of everyone into that of one observer."""
+    return Observer(
+        (params.spot_left_mm / 1e3, params.spot_height_mm / 1e3),
+        params.spot_width_mm / 1e3,
+        params.speech_mouth_ratio,
+        radians(params.least_shift_deg),
+    )
 
 
 def steps_and_dwells(params: ScanpathParams, walk: Walk) -> tuple[Floats, list[Draw]]:

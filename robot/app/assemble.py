@@ -224,6 +224,7 @@ class _Generators(NamedTuple):
     reaction: np.random.Generator
     head: np.random.Generator
     sway: np.random.Generator
+    stays: np.random.Generator
 
 
 def _components(
@@ -262,8 +263,14 @@ def _components(
         ),
         tracker=tracker,
         attention=Attention(
-            rig.gaze.attention, field_of_view, bottom_up, top_down, idle, random.reaction
-        ),
+            rig.gaze.attention,
+            field_of_view,
+            bottom_up,
+            top_down,
+            idle,
+            random.reaction,
+            random.stays,
+        ),  # fmt: skip
         field_of_view=field_of_view,
         bottom_up=bottom_up,
         top_down=top_down,

@@ -158,7 +158,7 @@ class FrameLocator:
         pose = face_pose(face.landmarks_px, lens) if reading is None else reading.pose
         if pose is None:
             return None
-        gaze, signs = face.gaze_camera, None
+        gaze, signs = face.gaze_camera, face.signs
         if reading is not None:
             gaze, signs = reading.gaze_camera or gaze, reading.signs
         focal_px = sqrt(lens.fx_px * lens.fy_px)

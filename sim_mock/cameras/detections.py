@@ -8,14 +8,14 @@ some are missed. Not modelled: motion blur, light, occlusion, false detections.
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, inf, radians
+from math import cos, inf, pi, radians
 from typing import Annotated
 
 import numpy as np
 
 from gazerig.drivers.camera.capture_loop import Locate
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.drivers.types import DetectedFace, Detections, FaceSigns, MovingBlob
 from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
@@ -27,6 +27,8 @@ _FARTHEST_FACE_M = 4.0
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
 _FACE_BOX_M = 0.17
+_LIPS_HZ, _LIPS_M = 4.5, 0.004
+"""Frequency and amplitude of the gap between the lips of a person who speaks."""
 _COS_TURNED_AWAY = cos(radians(60.0))
 _LANDMARKS_FACE_M: tuple[Vec3, ...] = tuple((x, y, z) for x, y, z in LANDMARKS_FACE_M.tolist())
 
@@ -107,7 +109,7 @@ class SceneCamera:
             blobs: list[MovingBlob] = []
             scene_s = now_s - self._start_s
             for index, person in enumerate(self._scene.people(scene_s)):
-                face = self._face(person, R, p)
+                face = self._face(person, R, p, scene_s)
                 if face is not None:
                     faces.append(face)
                 if person.hand is not None:
@@ -146,7 +148,7 @@ class SceneCamera:
     def close(self) -> None:
         """Stop; there is nothing to free."""
 
-    def _face(self, person: ScenePerson, R: Mat3, p: Vec3) -> DetectedFace | None:
+    def _face(self, person: ScenePerson, R: Mat3, p: Vec3, scene_s: float) -> DetectedFace | None:
         """Project the landmarks; a face that is cut off, far or turned away is not detected."""
         noise = self._rng.normal(0.0, self._params.landmark_noise_px, (5, 2))
         missed = self._rng.random() < self._params.missed_share
@@ -169,7 +171,9 @@ class SceneCamera:
         box = (x - size / 2, y - size / 2, size, size)
         if not self._inside(x, y, size / 2):
             return None
-        return DetectedFace(box, np.array(pixels) + noise, 0.98)
+        lips_m = _LIPS_M * (1.0 - cos(2.0 * pi * _LIPS_HZ * scene_s)) if person.speaks else 0.0
+        signs = FaceSigns(None, lips_m)
+        return DetectedFace(box, np.array(pixels) + noise, 0.98, signs=signs)
 
     def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
         """Project a hand or thing; nothing if it is behind the camera or outside the frame."""

@@ -57,7 +57,7 @@ _OUT_BACK_S = {
 """How long the hand of an act takes to its target, and back."""
 _FREES_M = {"face": (0.05, 0.04, -0.32), "chest": (0.0, 0.10, 0.15)}
 """How far both fists of an open guard leave their places; y is to the fist's own side."""
-_PERSON_ACTS = ("walk", "step", "look_at", "glance", "wave")
+_PERSON_ACTS = ("walk", "step", "look_at", "glance", "speak", "wave")
 _BOXER_ACTS = (*_PERSON_ACTS, "punch", "feint", "open_guard")
 _THING_ACTS = {"pinwheel": ("spin",), "hand": ("reach",)}
 
@@ -103,7 +103,12 @@ class FacesScene:
         faces = {name: self.face(name, t_s) for name in self._script.people}
         phase_s = t_s % self.round_s
         return tuple(
-            ScenePerson(face, self._direction(name, phase_s, faces), self._raised_hand(name, t_s))
+            ScenePerson(
+                face,
+                self._direction(name, phase_s, faces),
+                self._raised_hand(name, t_s),
+                self._speaks(name, phase_s),
+            )
             for name, face in faces.items()
         )
 
@@ -234,6 +239,11 @@ class FacesScene:
                 aside = _SIDES[one.act.side] * wave.aside_m + swing
                 return add(self.face(name, t_s), (-0.12, aside, -0.30 + 0.28 * up))
         return None
+
+    def _speaks(self, name: str, phase_s: float) -> bool:
+        return any(
+            one.act.do == "speak" and one.start_s <= phase_s < one.end_s for one in self._acts[name]
+        )
 
     def _fist(self, name: str, own: str, phase_s: float, face: Vec3) -> Vec3:
         """Return a fist: on guard in front of the chin, punching, waving, feinting or lowered."""

@@ -18,11 +18,13 @@ class ScenePerson(NamedTuple):
     p_world_face_m: tip of the nose
     face_yaw_pitch_rad: direction of the face, yaw 0 = along the world's +x
     hand: position of a raised hand, None while it is not raised
+    speaks: whether the lips move as in speech
     """
 
     p_world_face_m: Vec3
     face_yaw_pitch_rad: Angles2
     hand: Vec3 | None
+    speaks: bool = False
 
 
 class Thing(NamedTuple):

@@ -7,6 +7,7 @@ with --against a file that --save wrote, also what it was before. Nothing here p
 Each run (scene, profile, seed, overrides) is made once for all rows of a process.
 """
 
+from types import ModuleType
 from typing import Any
 
 from measured_rows import arguments, measure_all, progress
@@ -27,10 +28,18 @@ def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=300.0)
     parser.add_argument("--seeds", type=int, default=3, help="number of seeds, from 0")
+    parser.add_argument("--each", action="store_true", help="also the value of each seed")
     args = parser.parse_args()
-    inside = measure_all(
-        "human", args, parser, lambda row: row.measure(told, args.seconds, range(args.seeds))
-    )
+
+    def measure(row: ModuleType) -> dict[str, float]:
+        found: dict[str, float] = row.measure(told, args.seconds, range(args.seeds))
+        for seed in range(args.seeds) if args.each else ():
+            alone = row.measure(told, args.seconds, [seed])
+            progress("")
+            print(f"    seed {seed}: " + "; ".join(f"{k} {v:.3f}" for k, v in alone.items()))
+        return found
+
+    inside = measure_all("human", args, parser, measure)
     print(f"\n{inside} ({args.seconds:g} s, {args.seeds} seeds)")
 
 

@@ -4,7 +4,7 @@ The rig ``desk`` with byte-true emulated servos goes through the whole loop; wha
 columns, in memory, once for each process. ``tests/human/row_*.py`` measure on it.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -164,6 +164,28 @@ def half_rate_run(
     """Return an ideal run of 100 ticks a second, in half its processor time."""
     slower = {"loop.rate_hz": 100.0, **(overrides or {})}
     return ideal_run(scene, profile, seed, seconds, slower, **options)
+
+
+_worlds: dict[str, Counter[str]] = {}
+
+
+def world_targets(world: str, seed: int, seconds: float) -> Counter[str]:
+    """Return the ticks on each kind of target while a face is seen, in an unrendered world."""
+    key = repr((world, seed, seconds))
+    if key not in _worlds:
+        kinds: Counter[str] = Counter()
+        options = RunOptions(
+            True, True, seed, world=world, no_pictures=True, seconds=seconds, bus="ideal"
+        ).checked()
+        rig = with_options(load_rig(options.rig, options.character, options.profile), options)
+
+        def update(tick: Tick) -> None:
+            if tick.percept is not None and tick.percept.faces:
+                kinds.update((tick.target.kind,))
+
+        simulate(rig, options, watch=update)
+        _worlds[key] = kinds
+    return _worlds[key]
 
 
 @contextmanager

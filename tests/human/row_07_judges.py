@@ -1,4 +1,8 @@
-"""Independent judges find the saccades the robot commanded in its export, and hardly any other."""
+"""Independent judges find the saccades the robot commanded in its export, and hardly any other.
+
+All the time is judged. What a judge finds in a blink, of which the export tells, is the blink's own
+motion of the eyes.
+"""
 
 from collections.abc import Sequence
 
@@ -7,6 +11,8 @@ from human.measured_run import Runner
 from human.saccade_judges import JUDGES, exported, marks
 
 SCENES = ("visitor", "face-to-face")
+
+_NO_BLINKS = np.zeros((0, 2))
 
 WANTED = {
     f"{scene}, {judge}: {what}": band
@@ -23,12 +29,16 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         runs = [exported(run(scene, seed=seed, seconds=seconds)) for seed in seeds]
         for name, judge in JUDGES.items():
             seen = [judge(one) for one in runs]
-            each = [marks(*pair) for pair in zip(runs, seen, strict=True)]
-            all_of_it = [marks(*pair, True) for pair in zip(runs, seen, strict=True)]
-            out[f"{scene}, {name}: found, %"] = _percent([mark.ours for mark in each])
-            out[f"{scene}, {name}: not ours, %"] = _percent([~mark.theirs for mark in each])
-            every = [~mark.theirs for mark in all_of_it]
-            out[f"{scene}, {name}: not ours, fast following too, %"] = _percent(every)
+            pairs = list(zip(runs, seen, strict=True))
+            all_of_it = [marks(*pair, True) for pair in pairs]
+            bare = [marks(one._replace(blinks=_NO_BLINKS), saw, True) for one, saw in pairs]
+            slow = [marks(*pair) for pair in pairs]
+            out[f"{scene}, {name}: found, %"] = _percent([mark.ours for mark in all_of_it])
+            out[f"{scene}, {name}: not ours, %"] = _percent([~mark.theirs for mark in all_of_it])
+            every = [~mark.theirs for mark in bare]
+            out[f"{scene}, {name}: not ours, motion of blinks too, %"] = _percent(every)
+            out[f"{scene}, {name}: found, slow targets, %"] = _percent([m.ours for m in slow])
+            out[f"{scene}, {name}: not ours, slow, %"] = _percent([~m.theirs for m in slow])
     return out
 
 

@@ -40,6 +40,7 @@ class Exported(NamedTuple):
     commanded: (m, 2) onset and end of each commanded saccade as the export's events tell them;
     amplitude_deg: (m,) of it
     fast: (n,) whether what the robot followed moved faster than ``FAST_DEG_S``
+    blinks: (b, 2) onset and end of each blink, in which the eyes turn down and back
     """
 
     time_s: np.ndarray
@@ -47,13 +48,15 @@ class Exported(NamedTuple):
     commanded: np.ndarray
     amplitude_deg: np.ndarray
     fast: np.ndarray
+    blinks: np.ndarray
 
 
 class Marks(NamedTuple):
     """What a judge found of our saccades.
 
     ours: (m,) whether each commanded one overlaps one of the judge's
-    seen: (k, 2) onset and end of the judge's; theirs: (k,) whether each overlaps one of ours
+    seen: (k, 2) onset and end of the judge's; theirs: (k,) whether each overlaps one of ours, or
+        is the eyes' motion of a blink
     """
 
     ours: np.ndarray
@@ -78,11 +81,16 @@ def exported(run: MeasuredRun) -> Exported:
     gaze += np.random.default_rng(0).normal(0.0, NOISE_DEG, gaze.shape)
     saccades = [row for row in events if row["event"] == "saccade"]
     onset, length = _column(saccades, "onset_s"), _column(saccades, "duration_s")
+    blinks = [row for row in events if row["event"] == "blink"]
+    shut, shut_s = _column(blinks, "onset_s"), _column(blinks, "duration_s")
     late = time_s >= BEGIN_S
     kept = (onset >= BEGIN_S + _EDGE_S) & (onset + length <= time_s[-1] - _EDGE_S)
     commanded = np.column_stack([onset, onset + length])[kept]
     amplitude = _column(saccades, "amplitude_deg")[kept]
-    return Exported(time_s[late], gaze[late], commanded, amplitude, _fast(run)[late])
+    return Exported(
+        time_s[late], gaze[late], commanded, amplitude, _fast(run)[late],
+        np.column_stack([shut, shut + shut_s]),
+    )  # fmt: skip
 
 
 def _fast(run: MeasuredRun) -> np.ndarray:
@@ -141,11 +149,14 @@ def marks(run: Exported, seen: np.ndarray, with_fast: bool = False) -> Marks:
         with_fast: also those during fast following.
     """
     seen = seen[(seen[:, 0] >= run.time_s[0] + _EDGE_S) & (seen[:, 1] <= run.time_s[-1] - _EDGE_S)]
-    over: np.ndarray = (seen[None, :, 0] <= run.commanded[:, None, 1]) & (
-        seen[None, :, 1] >= run.commanded[:, None, 0]
+    over, blink = (
+        (seen[None, :, 0] <= spans[:, None, 1]) & (seen[None, :, 1] >= spans[:, None, 0])
+        for spans in (run.commanded, run.blinks)
     )
     ours, theirs = _judged(run, run.commanded, with_fast), _judged(run, seen, with_fast)
-    return Marks(np.any(over, axis=1)[ours], seen[theirs], np.any(over, axis=0)[theirs])
+    return Marks(
+        over.any(axis=1)[ours], seen[theirs], (over.any(axis=0) | blink.any(axis=0))[theirs]
+    )
 
 
 def _judged(run: Exported, spans: np.ndarray, with_fast: bool) -> np.ndarray:

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from gazerig.features.lab.report.gaze_trace import GazeTrace
 from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
 from gazerig.gaze.scanpath.dwell import Draw, dwell_distribution
-from gazerig.gaze.scanpath.scanpath import ScanpathParams, Walk, steps_and_dwells
+from gazerig.gaze.scanpath.scanpath import (
+    ScanpathParams,
+    Walk,
+    normalise,
+    observer_of,
+    steps_and_dwells,
+)
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -251,7 +257,10 @@ def rig_walk(params: ScanpathParams, walk: Walk) -> ReferenceWalk | None:
         return None
     steps, dwells = steps_and_dwells(params, walk)
     order = [walk.order.index(_OTHER.get(p, p) if params.viewers_left else p) for p in PARTS]
-    return ReferenceWalk(steps[np.ix_(order, order)], [dwells[i] for i in order])
+    observer = observer_of(params)
+    spot = [observer.spot_factor(*PARTS_FACE_M[part][1:]) for part in PARTS]
+    steps = normalise(steps[np.ix_(order, order)] * np.array(spot))
+    return ReferenceWalk(steps, [dwells[i] for i in order])
 
 
 _OTHER = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}

@@ -1,0 +1,125 @@
+"""Looks at a face go to the eyes, to the mouth in speech, and around a spot of each character.
+
+About .40 of the looks at a face are at the eyes (Janik et al. 1978), more at a person who may look
+back; speech draws them to the mouth (Buchan et al. 2007). Everyone has a place of their own, from
+the brows to the mouth, that stays for months (Peterson & Eckstein 2013; Mehoudar et al. 2014).
+"""
+
+from collections.abc import Sequence
+from math import atan2, hypot, pi, sin
+
+import numpy as np
+from human.measured_run import MeasuredRun, Runner
+from human.row_03_rests import SCENE, visits
+
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+
+WANTED = {
+    "looks at the eyes, %": (40.0, 60.0),
+    "right eye over left": (0.6, 2.0),
+    "looks at chin, sides and forehead, %": (5.0, 25.0),
+    "looks at the mouth, of a speaker over others": (1.5, 4.0),
+    "looks at the eyes of a speaker, %": (25.0, 55.0),
+    "mean height on the face, SD over seeds, mm": (0.0, 4.0),
+    "bold above shy, mm": (10.0, 50.0),
+    "shifts below 1.5 deg at a face 2 m away, %": (0.0, 15.0),
+}
+
+
+class Talker:
+    """A person who speaks for 6 s and is silent for 6 s, in turn, at one place."""
+
+    round_s = 12.0
+    behaviours: tuple[str, ...] = ()
+
+    def __init__(self, away_m: float = 0.95, talks: bool = True) -> None:
+        self.name = f"talker {away_m:g} m {talks}"
+        self._away_m, self._talks = away_m, talks
+
+    def speaks(self, t_s: float) -> bool:
+        """Return whether the person speaks."""
+        return self._talks and t_s % self.round_s < 0.5 * self.round_s
+
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        """Return the one person."""
+        sway = 0.008 * sin(2.0 * pi * 0.17 * t_s)
+        face: Vec3 = (self._away_m, sway, 0.24)
+        yaw, pitch = atan2(-face[1], 0.04 - face[0]), atan2(0.13 - face[2], hypot(*face[:2]))
+        return (ScenePerson(face, (yaw, pitch), None, self.speaks(t_s)),)
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        """Return nothing."""
+        return ()
+
+    def events(self) -> tuple[Event, ...]:
+        """Expect nothing."""
+        return ()
+
+
+TALKER, FAR = Talker(), Talker(2.0, talks=False)
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return the figures over all seeds."""
+    runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
+    parts = _parts(runs)
+    talk = [run(TALKER, seed=seed, seconds=seconds) for seed in seeds]
+    loud, quiet = (np.concatenate([_looks(one, spoken) for one in talk]) for spoken in (1, 0))
+    far = [run(FAR, seed=seed, seconds=min(seconds, 120.0)) for seed in seeds]
+    of = {
+        name: [run(SCENE, seed=seed, seconds=min(seconds, 120.0), character=name) for seed in seeds]
+        for name in ("bold", "shy")
+    }
+    heights = {name: [_height_mm(one) for one in them] for name, them in of.items()}
+    mine = [_height_mm(one) for one in runs]
+    eyes = np.isin(parts, ("LE", "RE"))
+    return {
+        "looks at the eyes, %": 100.0 * float(eyes.mean()),
+        "right eye over left": float((parts == "RE").sum() / max(1, (parts == "LE").sum())),
+        "looks at chin, sides and forehead, %": 100.0
+        * float(np.isin(parts, ("DN", "FL", "FR", "UP")).mean()),
+        "looks at the mouth, of a speaker over others": float(
+            (loud == "M").mean() / max(1e-9, (quiet == "M").mean())
+        ),
+        "looks at the eyes of a speaker, %": 100.0 * float(np.isin(loud, ("LE", "RE")).mean()),
+        "mean height on the face, SD over seeds, mm": float(np.std(mine)),
+        "bold above shy, mm": float(np.mean(heights["bold"]) - np.mean(heights["shy"])),
+        "shifts below 1.5 deg at a face 2 m away, %": 100.0 * _small(far),
+        "looks at the mouth of a speaker, %": 100.0 * float((loud == "M").mean()),
+        "looks at the nose, %": 100.0 * float((parts == "N").mean()),
+        "mean height above the nose, mm": float(np.mean(mine)),
+        "shy: looks at the eyes, %": 100.0 * float(np.isin(_parts(of["shy"]), ("LE", "RE")).mean()),
+        "bold: looks at the eyes, %": 100.0
+        * float(np.isin(_parts(of["bold"]), ("LE", "RE")).mean()),
+    }
+
+
+def _parts(runs: Sequence[MeasuredRun]) -> np.ndarray:
+    return np.array([visit.part for one in runs for visit in visits(one)])
+
+
+def _looks(one: MeasuredRun, spoken: int) -> np.ndarray:
+    """Return the parts to which the gaze goes while the person speaks, or does not."""
+    begins = np.flatnonzero(np.diff(one.shift) != 0) + 1
+    begins = begins[(one.part[begins] != "") & (one.part[begins - 1] != "")]
+    phase = one.t_s[begins] % TALKER.round_s
+    late = phase % (0.5 * TALKER.round_s) > 2.0  # speech and silence need time to be seen
+    return one.part[begins[late & ((phase < 0.5 * TALKER.round_s) == bool(spoken))]]
+
+
+def _height_mm(one: MeasuredRun) -> float:
+    """Return the mean height of the fixated parts above the tip of the nose, by time."""
+    on = one.part[one.part != ""]
+    return 1e3 * float(np.mean([PARTS_FACE_M[part][2] for part in on]))
+
+
+def _small(runs: Sequence[MeasuredRun]) -> float:
+    """Return the share of shifts between parts that are below 1.5 deg."""
+    sizes = []
+    for one in runs:
+        begins = np.flatnonzero(np.diff(one.shift) != 0) + 1
+        begins = begins[(one.part[begins] != "") & (one.part[begins - 1] != "")]
+        sizes += np.hypot(*(one.target_deg[begins] - one.target_deg[begins - 1]).T).tolist()
+    return float((np.array(sizes) < 1.5).mean())
