@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from gazerig.local_head import SimulatedHead as SimulatedHead
     from gazerig.opening import open as open
     from gazerig.order import Order as Order
-    from gazerig.order import Outcome as Outcome
     from gazerig.remote_head import connect as connect
     from gazerig.robot.control.head_state import GazeReading as GazeReading
     from gazerig.robot.control.head_state import HeadEvent as HeadEvent
     from gazerig.robot.control.head_state import HeadState as HeadState
     from gazerig.robot.control.head_state import JointReading as JointReading
     from gazerig.robot.control.head_state import Person as Person
+    from gazerig.robot.model.outcome import Outcome as Outcome
 
     __version__: str
 
@@ -48,7 +48,7 @@ _HOME = {
     "JointSolution": "gazerig.geometry",
     "NotFound": "gazerig.errors",
     "Order": "gazerig.order",
-    "Outcome": "gazerig.order",
+    "Outcome": "gazerig.robot.model.outcome",
     "Person": "gazerig.robot.control.head_state",
     "Refused": "gazerig.errors",
     "SetupError": "gazerig.drivers.errors",

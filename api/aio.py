@@ -5,14 +5,16 @@ async with gazerig.aio.connect(who="my show") as head:
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Generator
+from collections.abc import AsyncIterator, Callable, Container, Generator
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from gazerig.head import Head
-from gazerig.order import Order, Outcome
+from gazerig.order import Order
 from gazerig.remote_head import RemoteHead
 from gazerig.remote_head import connect as connect_now
+from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.model.outcome import Outcome
 from gazerig.robot.model.reply import CommandReply
 
 _POLL_S = 0.02
@@ -137,13 +139,16 @@ class AsyncHead:
                 yield state
             await asyncio.sleep(1.0 / rate_hz)
 
-    async def events(self) -> AsyncIterator[HeadEvent]:
-        """Iterate over all stored events, then over new ones, without end."""
+    async def events(
+        self, *, kinds: Container[EventKind] = ("message",)
+    ) -> AsyncIterator[HeadEvent]:
+        """Iterate over all stored events of these kinds, then over new ones, without end."""
         number = 0
         while True:
             for event in await asyncio.to_thread(self._connected._events, number):
                 number = event.number
-                yield event
+                if event.kind in kinds:
+                    yield event
             await asyncio.sleep(_POLL_S)
 
 

@@ -1,7 +1,7 @@
 """The interface of a head, whether it runs in this program or in another."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from functools import partial
 from math import radians
 from pathlib import Path
@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Literal, Self
 
 from gazerig.order import Order
+from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.head_state import (
     GazeReading,
     HeadEvent,
@@ -16,7 +17,6 @@ from gazerig.robot.control.head_state import (
     JointReading,
     Person,
 )
-from gazerig.robot.control.tick_feed import Progress
 from gazerig.robot.model.commands import (
     FAR_M,
     Ask,
@@ -35,6 +35,7 @@ from gazerig.robot.model.commands import (
     Stop,
     Value,
 )
+from gazerig.robot.model.outcome import Progress
 
 
 class Head(ABC):
@@ -317,12 +318,15 @@ class Head(ABC):
             raise Refused(f"rate_hz {rate_hz:g}: above 0")
         return self._states(1.0 / rate_hz, seconds)
 
-    def events(self, timeout_s: float | None = None) -> Iterator[HeadEvent]:
+    def events(
+        self, timeout_s: float | None = None, *, kinds: Container[EventKind] = ("message",)
+    ) -> Iterator[HeadEvent]:
         """Return an iterator over all events since the start; it waits for the next one.
 
-        The head stores the last 1000 events.
+        The head stores the last 1000 messages and the last 1000 events of other kinds.
 
         Args:
+            kinds: kinds of events, as in ``HeadEvent.kind``.
             timeout_s: ends after this time without an event; 0: after the stored events; None:
                 never.
         """
@@ -330,11 +334,12 @@ class Head(ABC):
         while True:
             for event in self._events(number):
                 number = event.number
-                yield event
+                if event.kind in kinds:
+                    yield event
             if timeout_s == 0.0:
                 return
-            self._pause(partial(self._has_events, number), timeout_s or 3600.0)
-            if timeout_s is not None and not self._has_events(number):
+            self._pause(partial(self._has_events, number, kinds), timeout_s or 3600.0)
+            if timeout_s is not None and not self._has_events(number, kinds):
                 return
 
     def sleep(self, seconds: float) -> None:
@@ -374,8 +379,8 @@ class Head(ABC):
                 yield state
             self._pause(lambda: False, every_s)
 
-    def _has_events(self, after: int) -> bool:
-        return bool(self._events(after))
+    def _has_events(self, after: int, kinds: Container[EventKind]) -> bool:
+        return any(event.kind in kinds for event in self._events(after))
 
     @abstractmethod
     def _events(self, after: int) -> tuple[HeadEvent, ...]:

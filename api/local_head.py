@@ -25,9 +25,10 @@ from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.line_queue import LineQueue
 from gazerig.robot.control.loop import TickLoop
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_feed import Progress, TickFeed
+from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Value
+from gazerig.robot.model.outcome import Progress
 
 _LOG = logging.getLogger("gazerig")
 _POLL_S = 0.004

@@ -3,24 +3,10 @@
 import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Literal, Protocol, Self
+from typing import Protocol, Self
 
-from gazerig.robot.control.tick_feed import Progress
-from gazerig.robot.model.lead import ARRIVED_RAD
+from gazerig.robot.model.outcome import Outcome, Progress, outcome_of
 from gazerig.robot.model.reply import CommandReply
-
-Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]
-"""How an order ended.
-
-arrived: the gaze was measured within 1 degree of the point, or the joint within 1 degree of its
-    angle; a gesture has ended; any other order was accepted
-refused: nothing was done; ``Order.why`` gives the reason
-out of reach: the gaze will rest more than 1 degree off the point, at the limits of the joints.
-    This is known as soon as the reply arrives. ``Order.why`` gives the error, and the joints that
-    limit it. The order keeps control, and the head goes as far as it can
-taken over: something else moves the head now, or control has ended; ``Order.why`` gives the reason
-timed out: none of these within the given time
-"""
 
 
 class OrderHost(Protocol):
@@ -140,35 +126,10 @@ class Order:
     def _update_outcome(self, now: Progress) -> bool:
         """Update from the newest owner and gesture; return whether the order has ended."""
         reply = self._accepted_reply()
-        if reply is None or self._outcome is not None:
-            return self._outcome is not None
-        played = reply.gesture.number if reply.gesture is not None else 0
-        if reply.refused:
-            self._end("refused", reply.refused)
-        elif played:
-            newest = now.gesture
-            if newest.number > played:
-                self._end("taken over", f"another gesture: {newest.name or newest.ended}")
-            elif newest.number == played and newest.ended:
-                self._end("taken over", newest.ended)
-            elif newest.number == played and not newest.name:
-                self._end("arrived", "")
-        elif reply.lead == 0:  # it takes no control: done as soon as accepted
-            self._end("arrived", "")
-        elif reply.error_rad > ARRIVED_RAD:
-            self._end("out of reach", reply.text())
-        elif now.lead.number == reply.lead:
-            if now.lead.arrived:
-                self._end("arrived", "")
-            elif not now.lead.active:
-                self._end("taken over", now.lead.ended)
-        elif now.lead.number > reply.lead:
-            self._end("taken over", now.led or now.lead.ended)
+        if reply is not None and self._outcome is None and (end := outcome_of(reply, now)):
+            outcome, self._why = end
+            self._outcome = outcome
         return self._outcome is not None
-
-    def _end(self, outcome: Outcome, why: str) -> None:
-        self._why = why
-        self._outcome = outcome
 
     def _accepted_reply(self) -> CommandReply | None:
         if self._reply is None:

@@ -10,9 +10,9 @@ from gazerig.head import Head
 from gazerig.order import Order
 from gazerig.robot.control.command_handler import as_value
 from gazerig.robot.control.head_state import HeadEvent, HeadState
-from gazerig.robot.control.tick_feed import Progress
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Value
+from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import RequestRejected, RobotClient, running
 
 _POLL_S = 0.02

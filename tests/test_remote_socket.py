@@ -445,7 +445,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
         (b"[]\n", "not understood"),
-        (b'{"do": "dance"}\n', "there is status; "),
+        (b'{"do": "dance"}\n', 'there is hello, "version"; status; '),
         (b'{"do": "get"}\n', "not understood"),
         (b'{"do": "get", "prefix": 1}\n', "not understood"),
         (b'{"do": "get", "prefix": "", "more": 1}\n', "not understood"),
@@ -641,10 +641,30 @@ def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(
 ) -> None:
     rig.get(RATE)  # let in with the usual rate
     monkeypatch.setattr(server_module, "EACH", RequestRate(1e-6, 0.0))
-    with RobotClient.connect() as greedy:
-        greedy.get()
+    with RobotClient.connect() as greedy:  # its greeting takes all
         with pytest.raises(RequestRejected, match="too many requests: ask again in"):
             greedy.get()
         greedy.stop("all the same")
+    assert rig.status()["stopped"] == "all the same"
+    rig.resume(confirmed=True)
+
+
+def test_a_client_of_another_version_is_told_so_once_and_may_stop(
+    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with raw(folder) as end:
+        wire = remote_socket.Wire(end, remote_socket.ANSWER_BYTES)
+        wire.write({"do": "hello", "version": 1, "tag": "a"}, 5.0)
+        greeting = {"version": 1, "rig": "desk", "pid": os.getpid()}
+        assert wire.read(5.0, 5.0) == {"ok": greeting, "tag": "a"}
+        for version in (2, "1", None):
+            wire.write({"do": "hello", "version": version}, 5.0)
+            answer = wire.read(5.0, 5.0)
+            assert isinstance(answer, dict) and "version" in answer["refused"]
+    with monkeypatch.context() as patch, RobotClient.connect() as newer:
+        patch.setattr(client, "VERSION", 2)
+        with pytest.raises(RequestRejected, match="version 2 of the messages: this rig has 1"):
+            newer.status()
+        newer.stop("all the same")
     assert rig.status()["stopped"] == "all the same"
     rig.resume(confirmed=True)

@@ -103,6 +103,7 @@ class RunObservers:
                 self._timing.figures,
                 made.fault,
                 lambda: {"page": self._page.url() if self._page is not None else None},
+                tuning.confined,
             )
             if tuning is not None and not options.fast
             else None

@@ -6,9 +6,10 @@ renew), a change of parameters (set, save, revert, character) or a question (``Q
 caller turns the result into JSON or a line of text.
 """
 
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.gesture_choices import GestureInfo
@@ -17,23 +18,33 @@ from gazerig.robot.model.commands import COMMANDS, Command, Tune, Value
 from gazerig.robot.model.parameter import ParamChange, Parameter, SavedFile
 from gazerig.robot.model.reply import Ticket
 
-QUESTIONS = (
-    "status",
-    'state, "after": number of the newest known event',
-    "menus",
-    "gestures",
-    'parameters, "prefix"',
-    'get, "prefix"',
-    "unsaved",
-    "differs",
-    "characters",
+QUESTIONS: dict[str, tuple[str, dict[str, Any]]] = {
+    "hello": ("Check the version of the messages; who the rig is", {"version": int}),
+    "status": ("Name, target, reason, guard, joints and last messages of the rig", {}),
+    "state": ("Newest tick, and the events numbered above after", {"after": int}),
+    "menus": ("Behaviours, modes of conversation, lid movements; the present one first", {}),
+    "gestures": ("Gestures, and why the rig refuses them", {}),
+    "parameters": ("Rules and defaults of keys that begin so", {"prefix": str}),
+    "get": ("Present values of keys that begin so", {"prefix": str}),
+    "unsaved": ("Values that differ from the rig's file", {}),
+    "differs": ("Values that differ from the defaults", {}),
+    "characters": ("Names of characters", {}),
+}
+CHANGES: dict[str, tuple[str, dict[str, Any]]] = {
+    "set": ("Apply values of keys, all of them or none", {"changes": dict[str, Value]}),
+    "save": ("Write the values to the rig's file, or to an absolute path", {"path": str | None}),
+    "revert": ("Apply the values of the rig's file again", {}),
+    "character": ("Apply another character to the rig", {"name": str}),
+    "fault": ("Execute a fault command of emulated servos (gazerig emulate)", {"text": str}),
+}
+"""Requests besides commands: what each does, and the types of its fields."""
+ORDERS: dict[str, type[Command]] = {name: COMMANDS[name] for name in COMMANDS if name != "tune"}
+"""Commands that programs may send."""
+REQUESTS = (
+    *(", ".join((name, *map(json.dumps, of))) for name, (_, of) in (QUESTIONS | CHANGES).items()),
+    *ORDERS,
 )
-CHANGES = (
-    'set, "changes": {key: value}', 'save, "path": absolute path or null', "revert",
-    'character, "name"', 'fault, "text": as of gazerig emulate',
-)  # fmt: skip
-REQUESTS = (*QUESTIONS, *CHANGES, *(name for name in COMMANDS if name != "tune"))
-"""Descriptions of all requests."""
+"""Names of all requests, with their fields."""
 
 REAL = "these servos are real: only emulated servos take fault commands (gazerig run --mock)"
 

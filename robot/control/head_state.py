@@ -12,6 +12,7 @@ from typing import Any
 from gazerig.gaze.angles import add, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
+from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, leader, target_name
 from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, Leader, LeadState
@@ -135,17 +136,23 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class HeadEvent:
-    """An event of the bus, of the camera or from a program's request.
+    """An event: a message, or a change of gaze, people or gesture.
 
     Attributes:
         number: Number of the event, from 1.
         t_s: The rig's own time.
         text: Description in one line.
+        kind: "message" (of the bus, the camera or a program's request), "saccade_start",
+            "saccade_landing", "blink", "target", "person_arrived", "person_left" or
+            "gesture_finished".
+        subject: Number of the person, name of the target or of the gesture, "" for none.
     """
 
     number: int
     t_s: float
     text: str
+    kind: EventKind = "message"
+    subject: int | str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,8 +214,8 @@ def head_state(tick: Tick) -> HeadState:
 
 def as_json(state: HeadState) -> dict[str, Any]:
     """Return a state as plain JSON values."""
-    named = {"lead": state.lead, "gesture": state.gesture, "leader": state.leader}
-    return {**asdict(state), **{name: list(value) for name, value in named.items()}}
+    named: dict[str, Any] = {"lead": state.lead, "gesture": state.gesture, "leader": state.leader}
+    return {**asdict(state), **{name: value._asdict() for name, value in named.items()}}
 
 
 def from_json(data: Mapping[str, Any]) -> HeadState:
@@ -230,22 +237,16 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
         )
         for one in data["people"]
     )
-    made["lead"] = _read(LeadState, data["lead"])
-    made["gesture"] = _read(GestureState, data["gesture"])
+    made["lead"] = LeadState(**_known_fields(LeadState, data["lead"]))
+    made["gesture"] = GestureState(**_known_fields(GestureState, data["gesture"]))
     if "leader" in data:
-        made["leader"] = _read(Leader, data["leader"])
+        made["leader"] = Leader(**_known_fields(Leader, data["leader"]))
     return HeadState(**made)
-
-
-def _read(kind: Any, values: Sequence[Any]) -> Any:
-    """Return a named tuple of JSON values; values unknown to this version are left out."""
-    known = values[: len(kind._fields)]
-    return kind(*[tuple(value) if isinstance(value, list) else value for value in known])
 
 
 def _known_fields(kind: Any, data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields that a class has, with JSON's lists as tuples."""
-    names = {one.name for one in fields(kind)}
+    names = kind._fields if hasattr(kind, "_fields") else {one.name for one in fields(kind)}
     return {
         name: tuple(value) if isinstance(value, list) else value
         for name, value in data.items()

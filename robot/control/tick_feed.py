@@ -2,30 +2,18 @@
 
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
+from itertools import takewhile
 
+from gazerig.robot.control.gaze_events import GazeEvents
 from gazerig.robot.control.head_state import HeadEvent
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.outcome import Progress
 
 _MOST_EVENTS = 1000
 
 
-class Progress(NamedTuple):
-    """The progress of a client's command and of a gesture.
-
-    Attributes:
-        lead, gesture: The newest ones.
-        led: Client that controls gaze or joints, and its command; "" without one.
-    """
-
-    lead: LeadState = NOBODY_LEADS
-    gesture: GestureState = NO_GESTURE
-    led: str = ""
-
-
 class TickFeed:
-    """One slot for the newest tick and a ring of events; the loop never waits for readers.
+    """One slot for the newest tick and rings of events; the loop never waits for readers.
 
     Attributes:
         newest: The newest tick, None before the first.
@@ -35,7 +23,9 @@ class TickFeed:
     def __init__(self) -> None:
         self.newest: Tick | None = None
         self.ticks = 0
-        self._events: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
+        self._messages: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
+        self._others: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)  # many: they push out none
+        self._changes = GazeEvents()
         self._number = 0
         self._joining: deque[Callable[[Progress], bool]] = deque()
         self._followers: list[Callable[[Progress], bool]] = []
@@ -44,9 +34,12 @@ class TickFeed:
         """Store the newest tick; called by the loop."""
         self.newest = tick
         self.ticks += 1
-        for event in tick.events:
+        for text in tick.events:
             self._number += 1
-            self._events.append(HeadEvent(self._number, tick.t_s, event))
+            self._messages.append(HeadEvent(self._number, tick.t_s, text))
+        for change in self._changes.update(tick):
+            self._number += 1
+            self._others.append(HeadEvent(self._number, tick.t_s, *change))
         while self._joining:
             self._followers.append(self._joining.popleft())
         if self._followers:
@@ -64,4 +57,17 @@ class TickFeed:
 
     def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
         """Return the stored events with numbers above ``after``, the oldest first."""
-        return tuple([one for one in list(self._events) if one.number > after])
+        found = [
+            *_later(self._messages, after),
+            *_later(self._others, after),
+        ]
+        return tuple(sorted(found, key=lambda event: event.number))
+
+    def messages(self) -> tuple[HeadEvent, ...]:
+        """Return the stored events of the bus, the camera and programs, the oldest first."""
+        return tuple(self._messages)
+
+
+def _later(events: deque[HeadEvent], after: int) -> list[HeadEvent]:
+    newest_first = reversed(list(events))  # a copy: the loop appends meanwhile
+    return list(takewhile(lambda event: event.number > after, newest_first))

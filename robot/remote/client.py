@@ -39,6 +39,7 @@ from gazerig.robot.model.parameter import JsonValue, ParamChange, Parameter, Sav
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.socket_io import (
     ANSWER_BYTES,
+    VERSION,
     MalformedMessage,
     Wire,
     dial,
@@ -90,6 +91,7 @@ class ClientConnection:
     def __init__(self, wire: Wire, pid: int, ending: Callable[[], None]) -> None:
         self._wire, self.pid, self._ending = wire, pid, ending
         self._lock = threading.Lock()
+        self._greeted = False
 
     def close(self) -> None:
         """Close the connection."""
@@ -104,9 +106,17 @@ class ClientConnection:
             ConnectionLost: the rig has ended, does not answer, or failed with an internal error.
         """
         with self._lock:
+            if not self._greeted and do != "stop":  # nothing may delay or refuse a stop
+                greeting = {"do": "hello", "version": VERSION}
+                self._result(self._answer(greeting, _ANSWER_S))
+                self._greeted = True
             answer = self._answer(
                 {"do": do, **fields}, _FILES_S if do in _WITH_FILES else _ANSWER_S
             )
+        return self._result(answer)
+
+    def _result(self, answer: object) -> object:
+        """Return the result in an answer, or raise what it states."""
         match answer:
             case {"ok": said}:
                 return said
@@ -251,7 +261,7 @@ class RobotClient:
         # Imported here, because ``gazerig stop`` must not wait for NumPy.
         from gazerig.robot.control.head_state import HeadEvent, from_json
 
-        events = tuple(HeadEvent(*one) for one in said["events"])
+        events = tuple(HeadEvent(**one) for one in said["events"])
         return (from_json(said["state"]) if said["state"] else None), events
 
     def status(self) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
-from gazerig.robot.control.command_handler import Commandable, ParamAccess
+from gazerig.robot.control.command_handler import Commandable, ParamAccess, PathGuard
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
@@ -187,6 +187,7 @@ class LiveServer:
         timing: Returns the timing statistics of the loop.
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, as {"page": address}.
+        paths: Rules for the files that a client of the network may name; None if any.
     """
 
     def __init__(
@@ -200,6 +201,7 @@ class LiveServer:
         timing: Callable[[], LoopFigures | None] = lambda: None,
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
+        paths: PathGuard | None = None,
     ) -> None:
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
@@ -209,7 +211,7 @@ class LiveServer:
         self._watch = FileWatch(self._files, self._read_again)
         requests = RequestHandler(
             robot, tuning, self._pulse, about, refusals, self._watch.saved, fault=fault,
-            changing=changing,
+            changing=changing, paths=paths,
         )  # fmt: skip
         self._server = RemoteServer(requests, say)
 

@@ -6,6 +6,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from functools import partial
 from math import degrees
 from pathlib import Path
@@ -17,6 +18,7 @@ from gazerig.robot.control.command_handler import (
     ParamAccess,
     ParamsChanged,
     ParamsSaved,
+    PathGuard,
     PendingCommand,
     QuestionAnswer,
     RequestResult,
@@ -35,6 +37,7 @@ from gazerig.robot.model.commands import REPEATED, Command
 from gazerig.robot.model.leader import sentence
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import LoopFigures
+from gazerig.robot.remote.socket_io import VERSION
 
 _TAKEN_UP_S = 1.0
 """Timeout of the loop's execution, s; a servo that answers late delays it by some 50 ms."""
@@ -85,7 +88,7 @@ class Pulse:
     def state(self, after: int) -> dict[str, object]:
         """Return the newest tick, None before the first, and events numbered above ``after``."""
         tick = self._feed.newest
-        events = [(one.number, one.t_s, one.text) for one in self._feed.events(after)]
+        events = [asdict(one) for one in self._feed.events(after)]
         return {"state": state_as_json(head_state(tick)) if tick else None, "events": events}
 
     def as_json(self) -> dict[str, object]:
@@ -124,7 +127,7 @@ class Pulse:
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
             "estimated": list(estimated_joints(tick)),
             "reckoned": list(estimated_joints(tick)),  # the key until this version
-            "said": [event.text for event in self._feed.events()[-_WORDS:]],
+            "said": [event.text for event in self._feed.messages()[-_WORDS:]],
         }
 
 
@@ -149,6 +152,7 @@ class RequestHandler:
         fixed: Reason why parameters cannot be changed, if they cannot.
         fault: Executes a fault command of emulated servos; None if the servos are real.
         changing: Returns the other fields of the status, as {"page": address}.
+        paths: Rules for the files that a client of the network may name; None if any.
     """
 
     def __init__(
@@ -162,20 +166,25 @@ class RequestHandler:
         fixed: str = FIXED,
         fault: Callable[[str], str] | None = None,
         changing: Callable[[], Mapping[str, object]] = dict,
+        paths: PathGuard | None = None,
     ) -> None:
         self._params = params
         self._pulse = pulse
         self._changing = changing
         self._about = dict(about)
-        self._handler = CommandHandler(
-            robot,
-            params,
-            self._status,
-            refusals,
-            saved,
-            fixed=fixed,
-            state=pulse.state,
-            fault=fault,
+        self._handler, self._network = (
+            CommandHandler(
+                robot,
+                params,
+                self._status,
+                refusals,
+                saved,
+                rules,
+                fixed=fixed,
+                state=pulse.state,
+                fault=fault,
+            )
+            for rules in (None, paths)
         )
         self._unsaved = -1, 0
 
@@ -183,15 +192,39 @@ class RequestHandler:
         """Execute one request; return {"ok": result} or {"refused": every broken rule}.
 
         Args:
-            request: Request {"do": verb, ...}.
+            request: Request {"do": verb, ...}. Its "tag" comes back with the answer; the page's
+                process marks requests of the network by "network": true.
             peer: Client at the other end, as "process 123", "" if unknown.
         """
+        tag: dict[str, object] = {}
+        handler = self._handler
+        if isinstance(request, dict):
+            tag = {key: request[key] for key in ("tag",) if key in request}
+            handler = self._network if request.get("network") is True else handler
+            request = {key: request[key] for key in request if key not in ("tag", "network")}
         try:
-            return {"ok": self._outcome_json(self._handler.do(request, partial(_signed, peer)))}
+            match request:
+                case {"do": "hello", "version": int(version), **rest} if not rest:
+                    return {"ok": self._greeting(version), **tag}
+            done = handler.do(request, partial(_signed, peer))
+            return {"ok": self._outcome_json(done), **tag}
         except _NotDone as error:
-            return {"refused": str(error), "reply": error.reply.as_json()}
-        except self._handler.refusals as error:
-            return {"refused": str(error)}
+            return {"refused": str(error), "reply": error.reply.as_json(), **tag}
+        except handler.refusals as error:
+            return {"refused": str(error), **tag}
+
+    def _greeting(self, version: int) -> dict[str, object]:
+        """Return the greeting of the rig.
+
+        Raises:
+            ValueError: The client has another version of the messages.
+        """
+        if version != VERSION:
+            raise ValueError(
+                f"version {version} of the messages: this rig has {VERSION}; "
+                "update gazerig or the program"
+            )
+        return {"version": VERSION, **self._about}
 
     def _outcome_json(self, outcome: RequestResult) -> object:
         """Return an outcome as JSON after the loop has executed it."""

@@ -21,6 +21,8 @@ from typing import Any, NamedTuple, NoReturn, Self
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.model.clock import RealClock
 
+VERSION = 1
+"""Version of requests and answers (docs/connect-your-program.md)."""
 REQUEST_BYTES = 1 << 16
 """Longest request, bytes. Parsing 64 KiB occupies the interpreter for less than 1 ms."""
 ANSWER_BYTES = 1 << 23

@@ -1,0 +1,78 @@
+"""Events of gaze, people and gestures, found in consecutive ticks."""
+
+from typing import Literal, NamedTuple, get_args
+
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_text import target_name
+from gazerig.robot.model.lead import GONE_S
+
+EventKind = Literal[
+    "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",
+    "person_left", "gesture_finished",
+]  # fmt: skip
+"""message: of the bus, the camera or a program's request; all others are found in the ticks."""
+EVENT_KINDS: tuple[EventKind, ...] = get_args(EventKind)
+
+
+class Change(NamedTuple):
+    """An event of a tick.
+
+    Attributes:
+        text: Description in one line.
+        kind: Kind of event.
+        subject: Number of the person, name of the target or of the gesture.
+    """
+
+    text: str
+    kind: EventKind
+    subject: int | str
+
+
+class GazeEvents:
+    """Compares each tick with the one before."""
+
+    def __init__(self) -> None:
+        self._last: Tick | None = None
+        self._seen_s: dict[int, float] = {}
+
+    def update(self, tick: Tick) -> list[Change]:
+        """Return the events of a tick; those of parking are not events."""
+        last, self._last = self._last, tick
+        if last is None or tick.parking:
+            return self._people(tick)
+        found: list[Change] = []
+        gaze, target = tick.gaze, tick.target
+        ballistic = last.gaze.phase == "saccade", gaze.phase == "saccade"
+        other = gaze.saccades != last.gaze.saccades
+        if ballistic[0] and (other or not ballistic[1]):
+            name = target_name(last.target)
+            found.append(Change(f"the eyes land at {name}", "saccade_landing", name))
+        if target is not last.target and target[3:5] + (target.part,) != (
+            last.target[3:5] + (last.target.part,)
+        ):
+            name = target_name(target)
+            found.append(Change(f"the target is {name}", "target", name))
+        if ballistic[1] and (other or not ballistic[0]):
+            name = target_name(target)
+            found.append(Change(f"saccade to {name}", "saccade_start", name))
+        if gaze.blink and not last.gaze.blink:
+            found.append(Change("blink", "blink", ""))
+        was, now = last.gesture, tick.gesture
+        if was.name and (was.number, was.name) != (now.number, now.name):
+            ended = now.ended if now.number == was.number else "another gesture"
+            text = f"{was.name} has finished" if not ended else f"{was.name} ended: {ended}"
+            found.append(Change(text, "gesture_finished", was.name))
+        return found + self._people(tick)
+
+    def _people(self, tick: Tick) -> list[Change]:
+        """Return arrivals, and departures of people who have not been seen for some time."""
+        found: list[Change] = []
+        for face in tick.percept.faces if tick.percept is not None else ():
+            if face.id not in self._seen_s:
+                found.append(Change(f"person {face.id} has arrived", "person_arrived", face.id))
+            self._seen_s[face.id] = tick.t_s
+        for person, seen_s in tuple(self._seen_s.items()):
+            if tick.t_s - seen_s > GONE_S:
+                del self._seen_s[person]
+                found.append(Change(f"person {person} has left", "person_left", person))
+        return found
