@@ -6,7 +6,7 @@ import numpy as np
 
 from gazerig.gaze.angles import add, norm, scale, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
@@ -16,7 +16,7 @@ def gaze_point(tick: Tick) -> Vec3:
     """Return where the measured eyes look, as far away as what they look at."""
     left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
     eye = scale(add(left, right), 0.5)
-    return add(eye, scale(cyclopean(tick), norm(sub(tick.target.p_world_m, eye))))
+    return add(eye, scale(cyclopean_direction(tick), norm(sub(tick.target.p_world_m, eye))))
 
 
 def in_picture(made: Assembly, point: Vec3, width_px: int, height_px: int) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
@@ -77,7 +77,10 @@ def fixations(ticks: tuple[Assembly, list[Tick]], masks: list[NDArray[np.uint8]]
     found: dict[int, Fixation] = {}
     for before, tick in pairwise(seen):
         dt_s = tick.t_s - before.t_s
-        fast = angle_between(cyclopean(before), cyclopean(tick)) > STILL_RAD_S * dt_s
+        fast = (
+            angle_between(cyclopean_direction(before), cyclopean_direction(tick))
+            > STILL_RAD_S * dt_s
+        )
         if tick.gaze.phase == "saccade" or fast or tick.t_s < BEGIN_S:
             continue
         fixation = found.setdefault(tick.gaze.fixations, Fixation(0.0, set(), []))

@@ -9,10 +9,10 @@ import pytest
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis.heatmap import (
+    align_face,
     density_s_m2,
-    face_from,
-    heatmap,
     share_per_part,
+    write_heatmap,
 )
 from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -59,7 +59,7 @@ def test_yellow_is_where_the_gaze_was_longest(tmp_path: Path) -> None:
     out = tmp_path / "map.png"
     seconds = np.full(8, 1.0)
     seconds[PARTS.index("N")], seconds[PARTS.index("UP")] = 10.0, 0.01
-    shares = heatmap(CENTRES, seconds, out)
+    shares = write_heatmap(CENTRES, seconds, out)
     picture = shown(out)
     red, green, blue = colour_at(picture, "N")
     assert red > 200 and green > 190 and blue < 90
@@ -86,32 +86,32 @@ def test_a_photograph_is_brought_to_the_same_measures(tmp_path: Path) -> None:
     photograph = MEDIA / "astronaut.png"
     if not photograph.is_file():
         pytest.skip(f"{photograph} is not there")
-    canvas = face_from(photograph)
+    canvas = align_face(photograph)
     assert canvas.shape == (HEIGHT_PX, WIDTH_PX, 3)
     for part in ("LE", "RE"):  # pupils are darker than the cheek below them
         column, row = np.rint(on_canvas(CENTRES[[PARTS.index(part)]])[0]).astype(int)
         eye = canvas[row - 20 : row + 21, column - 20 : column + 21, 0]
         cheek = canvas[row + 90 : row + 130, column - 20 : column + 21, 0]
         assert int(eye.min()) + 60 < float(np.median(cheek)), part
-    heatmap(CENTRES, np.ones(8), tmp_path / "map.png", photograph)
+    write_heatmap(CENTRES, np.ones(8), tmp_path / "map.png", photograph)
     assert shown(tmp_path / "map.png").shape[0] == HEIGHT_PX
 
 
 def test_what_cannot_be_mapped_is_refused(tmp_path: Path) -> None:
     out, blank = tmp_path / "map.png", tmp_path / "blank.png"
     with pytest.raises(ValueError, match="never on a face"):
-        heatmap(np.zeros((0, 2)), [], out)
+        write_heatmap(np.zeros((0, 2)), [], out)
     with pytest.raises(ValueError, match=r"wanted \(n, 2\) points"):
-        heatmap([(0.0, 0.0, 0.0)], [1.0], out)
+        write_heatmap([(0.0, 0.0, 0.0)], [1.0], out)
     with pytest.raises(ValueError, match="no time below 0"):
-        heatmap([(0.0, 0.0), (0.0, 0.0)], [1.0, -0.5], out)
+        write_heatmap([(0.0, 0.0), (0.0, 0.0)], [1.0, -0.5], out)
     with pytest.raises(ValueError, match="finite"):
-        heatmap([(0.0, float("nan"))], [1.0], out)
+        write_heatmap([(0.0, float("nan"))], [1.0], out)
     with pytest.raises(SetupError, match="is no image that can be read"):
-        heatmap(CENTRES, np.ones(8), out, tmp_path / "absent.png")
+        write_heatmap(CENTRES, np.ones(8), out, tmp_path / "absent.png")
     cv2.imwrite(str(blank), np.full((200, 200, 3), 128, np.uint8))
     with pytest.raises(SetupError, match="no face found"):
-        heatmap(CENTRES, np.ones(8), out, blank)
+        write_heatmap(CENTRES, np.ones(8), out, blank)
     with pytest.raises(SetupError, match="name another file"):
-        heatmap(CENTRES, np.ones(8), tmp_path / "nowhere" / "map.png")
+        write_heatmap(CENTRES, np.ones(8), tmp_path / "nowhere" / "map.png")
     assert not out.exists()

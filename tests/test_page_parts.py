@@ -21,8 +21,8 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import BusHealth, DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import PARTS, Salience
-from gazerig.robot.analysis.heatmap import on_canvas
-from gazerig.robot.analysis.human_norms import BY_KEY, fastest_peak, slowest_peak
+from gazerig.robot.analysis.heatmap import canvas_pixels
+from gazerig.robot.analysis.human_norms import BY_KEY, highest_peak_deg_s, lowest_peak_deg_s
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.control.tick_text import health_text
 from gazerig.robot.dashboard.feed.camera_overlay import (
@@ -509,7 +509,7 @@ def test_a_saccade_like_peoples_lies_in_their_range() -> None:
         column = band[np.abs(band[:, 0] - x).argsort()[:2], 1]
         return bool(column.min() <= y <= column.max())
 
-    low, high = float(slowest_peak(10.0)), float(fastest_peak(10.0))
+    low, high = float(lowest_peak_deg_s(10.0)), float(highest_peak_deg_s(10.0))
     assert inside((low + high) / 2)
     assert not inside(0.7 * low) and not inside(1.3 * high)
 
@@ -578,7 +578,7 @@ def test_the_map_is_brightest_where_the_gaze_was() -> None:
     assert picture.shape == (HIGH_PX, WIDE_PX, 3)
     yellow = picture[..., 0] + picture[..., 1] - 2 * picture[..., 2]
     row, column = np.unravel_index(yellow.argmax(), yellow.shape)
-    expected = on_canvas(np.zeros((1, 2)))[0] / SHRINK
+    expected = canvas_pixels(np.zeros((1, 2)))[0] / SHRINK
     assert (column, row) == pytest.approx(tuple(expected), abs=6.0)
 
 
@@ -609,7 +609,7 @@ def told(count: int, speed: float, seconds: float = 60.0) -> dict[str, RunFigure
     figures, dwell = RunFigures(), DwellChart()
     for k in range(count):
         t_s = seconds * k / count
-        peak = speed * float(fastest_peak(5.0))
+        peak = speed * float(highest_peak_deg_s(5.0))
         event = SeenSaccade(t_s, 0.035, 5.0, peak)
         figures.update(replace(looking(t_s), events=(event,)))
         dwell.update(SeenFixation(t_s, 0.3, "LE" if k % 2 else "M"))

@@ -96,9 +96,11 @@ def test_human_profiles_keep_the_band_for_small_ones_too(size: float) -> None:
 @pytest.mark.parametrize("size", [1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0])
 def test_the_human_law_lies_within_both_published_bands(size: float) -> None:
     peak = degrees(HUMAN.peak_speed_rad_s(radians(size)))
-    assert human_norms.slowest_peak(size) <= peak <= human_norms.fastest_peak(size)
+    assert human_norms.lowest_peak_deg_s(size) <= peak <= human_norms.highest_peak_deg_s(size)
     duration = HUMAN.duration_s(radians(size)) * 1e3
-    assert human_norms.shortest_ms(size) <= duration <= human_norms.longest_ms(size)
+    assert (
+        human_norms.shortest_duration_ms(size) <= duration <= human_norms.longest_duration_ms(size)
+    )
 
 
 @pytest.mark.parametrize("most", [500.0, 5000.0, 20_000.0])
@@ -143,8 +145,8 @@ def test_human_peak_comes_earlier_in_large_saccades() -> None:
 
     small, large = peak_at(8.0), peak_at(60.0)
     # The shaft's peak is later than the law's: row 6 of tests/human has that.
-    assert human_norms.peak_at(8.0) - 0.16 < small < human_norms.peak_at(8.0)
-    assert large == pytest.approx(human_norms.peak_at(60.0), abs=0.05)
+    assert human_norms.acceleration_share(8.0) - 0.16 < small < human_norms.acceleration_share(8.0)
+    assert large == pytest.approx(human_norms.acceleration_share(60.0), abs=0.05)
 
 
 def test_literal_frames_leave_a_fifth_at_each_and_do_not_know_the_tick() -> None:

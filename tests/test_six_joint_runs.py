@@ -16,7 +16,7 @@ from six_joints import SIX
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.analysis.blink_finder import UPPER, openings
+from gazerig.robot.analysis.blink_finder import UPPER, lid_openings
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.control.loop import Tick
@@ -122,9 +122,9 @@ class _Still:
 
 
 def test_absent_lids_count_for_nothing() -> None:
-    assert openings(0.2, 0.4, SIX, UPPER) == (0.2, 0.4)
-    assert openings(0.2, 1.0, ("left_upper_lid",), UPPER) == (0.2, 0.2)
-    assert openings(1.0, 1.0, ("eyes_pan",), UPPER) is None
+    assert lid_openings(0.2, 0.4, SIX, UPPER) == (0.2, 0.4)
+    assert lid_openings(0.2, 1.0, ("left_upper_lid",), UPPER) == (0.2, 0.2)
+    assert lid_openings(1.0, 1.0, ("eyes_pan",), UPPER) is None
 
 
 # --- exports

@@ -18,7 +18,7 @@ from gazerig.drivers.camera.recorder import RecordingWriter
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_limited
 from gazerig.drivers.files.file_output import output_file, output_text, refuse_existing, write_file
-from gazerig.robot.analysis.heatmap import face_from
+from gazerig.robot.analysis.heatmap import align_face
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.remote.live_server import look
 
@@ -50,7 +50,7 @@ READERS: dict[str, Callable[[str], object]] = {
     "profile": lambda path: load_rig("desk", None, path),
     "rules": load_rules,
     "walk": load_walk,
-    "face": lambda path: face_from(Path(path)),
+    "face": lambda path: align_face(Path(path)),
 }
 
 

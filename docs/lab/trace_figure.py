@@ -13,8 +13,8 @@ import numpy as np
 from gazerig.config.schema import load_rig
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.gaze.angles import yaw_pitch
-from gazerig.robot.analysis.human_norms import evoked_blink, head_deg
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.human_norms import evoked_blink_probability, mean_head_deg
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.scene_files import load_scene
 from gazerig.robot.control.tick import Tick
@@ -41,7 +41,7 @@ def of_profile(profile: str) -> Trace:
     rows: list[tuple[float, float, float, float]] = []
 
     def watch(tick: Tick) -> None:
-        yaw = np.degrees(yaw_pitch(cyclopean(tick))[0])
+        yaw = np.degrees(yaw_pitch(cyclopean_direction(tick))[0])
         head = np.degrees(tick.pose.head_rad[0])
         rows.append((tick.t_s, yaw, head, max(tick.pose.lid_left, tick.pose.lid_right)))
 
@@ -89,11 +89,11 @@ def of_person(seed: int = 4) -> Trace:
             gaze[k:end] = offset + face[k:end]
             looked_s += rest_s
             k = end
-        rare = evoked_blink(size) if size > 10.0 else 0.1
+        rare = evoked_blink_probability(size) if size > 10.0 else 0.1
         if rng.random() < rare and (not blinks or t[min(k, len(t) - 1)] - blinks[-1] > 2.0):
             blinks.append(t[min(k, len(t) - 1)] - rest_s + float(rng.normal(0.0, 0.04)))
         base = face[min(k, len(t) - 1)]
-    head[:] = _followed(t, np.sign(gaze) * head_deg(gaze), base)
+    head[:] = _followed(t, np.sign(gaze) * mean_head_deg(gaze), base)
     for begin in blinks:
         depth = 1.0 if rng.random() < 0.5 else rng.uniform(0.6, 0.95)
         since = t - begin

@@ -23,10 +23,10 @@ from gazerig.gaze.types import Vec3
 from gazerig.robot.control.tick import Tick
 
 
-class Happening(Protocol):
+class ExpectedResponse(Protocol):
     """An event of every round of a scene, and the response expected from the gaze.
 
-    asks: "look": be on a thing of this kind between start and end; "return": be on it
+    response: "look": be on a thing of this kind between start and end; "return": be on it
         again by the end
     start_s, end_s: from the beginning of a round
     place_world_m, within_m: place of that thing: looking at another of its kind elsewhere
@@ -39,7 +39,7 @@ class Happening(Protocol):
         ...
 
     @property
-    def asks(self) -> Literal["look", "return"]:
+    def response(self) -> Literal["look", "return"]:
         """Return how it is judged."""
         ...
 
@@ -69,7 +69,7 @@ class Happening(Protocol):
         ...
 
 
-class _Answer(NamedTuple):
+class _EventOutcome(NamedTuple):
     """Outcome of one event.
 
     latency_s: "look": from its start to the first look, None without one;
@@ -78,11 +78,11 @@ class _Answer(NamedTuple):
 
     seen: bool
     latency_s: float | None
-    on_s: float
-    lasted_s: float
+    looked_s: float
+    event_s: float
 
 
-class _Watch:
+class _EventObservation:
     """One event while it lasts."""
 
     def __init__(self) -> None:
@@ -101,22 +101,22 @@ class _Watch:
         if self._first_s is None:
             self._first_s = since_s
 
-    def answer(self, asks: Literal["look", "return"]) -> _Answer:
+    def outcome(self, response: Literal["look", "return"]) -> _EventOutcome:
         lasted_s = self._on_s + self._off_s
-        if asks == "return":
+        if response == "return":
             away_s = self._off_s if self._off_s > 0.0 else None
-            return _Answer(self._on, away_s, self._on_s, lasted_s)
-        return _Answer(self._first_s is not None, self._first_s, self._on_s, lasted_s)
+            return _EventOutcome(self._on, away_s, self._on_s, lasted_s)
+        return _EventOutcome(self._first_s is not None, self._first_s, self._on_s, lasted_s)
 
 
 class BehaviourScore:
     """Scores a run, tick by tick."""
 
-    def __init__(self, events: Iterable[Happening], round_s: float) -> None:
+    def __init__(self, events: Iterable[ExpectedResponse], round_s: float) -> None:
         self._events = tuple(events)
         self._round_s = round_s
-        self._watches: dict[int, _Watch] = {}
-        self._answers: dict[str, list[_Answer]] = {event.name: [] for event in self._events}
+        self._observations: dict[int, _EventObservation] = {}
+        self._outcomes: dict[str, list[_EventOutcome]] = {event.name: [] for event in self._events}
         self._first_s: float | None = None
         self._last_s = 0.0
         self._round = 0
@@ -129,21 +129,21 @@ class BehaviourScore:
         number, phase_s = divmod(tick.t_s - self._first_s, self._round_s)
         if number != self._round:
             self._round = int(number)
-            for i in tuple(self._watches):
-                self._over(i)
+            for i in tuple(self._observations):
+                self._close_event(i)
         for i, event in enumerate(self._events):
             if event.start_s <= phase_s < event.end_s:
-                watch, target = self._watches.setdefault(i, _Watch()), tick.target
+                watch, target = self._observations.setdefault(i, _EventObservation()), tick.target
                 away_m = dist(target.p_world_m, event.place_world_m)
                 on = target.kind == event.kind and away_m <= event.within_m
                 watch.update(on, phase_s - event.start_s, dt_s)
-            elif i in self._watches:
-                self._over(i)
+            elif i in self._observations:
+                self._close_event(i)
 
-    def _over(self, i: int) -> None:
+    def _close_event(self, i: int) -> None:
         """Write down how an event went."""
         event = self._events[i]
-        self._answers[event.name].append(self._watches.pop(i).answer(event.asks))
+        self._outcomes[event.name].append(self._observations.pop(i).outcome(event.response))
 
     def figures(self) -> dict[str, dict[str, float | int | None]]:
         """Return for each name: how many were seen, of how many, and how.
@@ -151,17 +151,17 @@ class BehaviourScore:
         latency_s: median over the events seen (away: over those that drew the gaze off)
         share: part of the events' time in which the expected target was looked at
         """
-        return {name: _figure(answers) for name, answers in self._answers.items()}
+        return {name: _outcome_figures(answers) for name, answers in self._outcomes.items()}
 
 
-def _figure(answers: list[_Answer]) -> dict[str, float | int | None]:
-    latencies = [answer.latency_s for answer in answers if answer.latency_s is not None]
-    lasted_s = sum(answer.lasted_s for answer in answers)
+def _outcome_figures(outcomes: list[_EventOutcome]) -> dict[str, float | int | None]:
+    latencies = [answer.latency_s for answer in outcomes if answer.latency_s is not None]
+    lasted_s = sum(answer.event_s for answer in outcomes)
     return {
-        "seen": sum(answer.seen for answer in answers),
-        "of": len(answers),
+        "seen": sum(answer.seen for answer in outcomes),
+        "of": len(outcomes),
         "latency_s": round(median(latencies), 4) if latencies else None,
-        "share": round(sum(a.on_s for a in answers) / lasted_s, 4) if lasted_s > 0.0 else None,
+        "share": round(sum(a.looked_s for a in outcomes) / lasted_s, 4) if lasted_s > 0.0 else None,
     }
 
 
@@ -171,7 +171,7 @@ _COUNTER_S = 0.6
 """An attack that begins so soon after the end of a punch answers it."""
 
 
-class Bout(Protocol):
+class BoxingEvent(Protocol):
     """An event of a boxing match; due_s: when the fist of a punch arrives."""
 
     @property
@@ -203,7 +203,7 @@ class _Attack(NamedTuple):
 class PlannerScore:
     """Scores a planner, tick by tick; the first tick is the beginning of a round."""
 
-    def __init__(self, events: Iterable[Bout], round_s: float) -> None:
+    def __init__(self, events: Iterable[BoxingEvent], round_s: float) -> None:
         events = tuple(events)
         self._punches = tuple(event for event in events if event.name == "punch")
         self._openings = tuple(event for event in events if event.name == "attack")
@@ -252,10 +252,12 @@ class PlannerScore:
                 in_force = [at_s for at_s, end_s in self._guards if at_s <= due_s <= end_s + 0.05]
                 if in_force:
                     leads.append(due_s - max(in_force))
-        false = sum(not self._during(at_s, self._punches, 0.0, _LATE_S) for at_s, _ in self._guards)
-        opens = sum(self._during(one.start_s, self._openings, 0.1, 0.0) for one in self._attacks)
+        false = sum(
+            not self._is_during(at_s, self._punches, 0.0, _LATE_S) for at_s, _ in self._guards
+        )
+        opens = sum(self._is_during(one.start_s, self._openings, 0.1, 0.0) for one in self._attacks)
         counters = sum(
-            self._during(one.start_s, self._punches, 0.0, _COUNTER_S) for one in self._attacks
+            self._is_during(one.start_s, self._punches, 0.0, _COUNTER_S) for one in self._attacks
         )
         return {
             "punches": punches,
@@ -268,8 +270,8 @@ class PlannerScore:
             "looked_at": sum(one.looked for one in self._attacks),
         }
 
-    def _during(
-        self, at_s: float, events: tuple[Bout, ...], before_s: float, after_s: float
+    def _is_during(
+        self, at_s: float, events: tuple[BoxingEvent, ...], before_s: float, after_s: float
     ) -> bool:
         """Return whether a time is within an event, or near one."""
         phase_s = at_s % self._round_s

@@ -78,22 +78,22 @@ class BlinkFinder:
             if opening < _DEEP_SHARE * self._usual and self._usual > _LEAST_OPEN:
                 self._shut_s = t_s
             return None
-        return self._wait(t_s, opening, self._shut_s)
+        return self._await_opening(t_s, opening, self._shut_s)
 
-    def _wait(self, t_s: float, opening: float, shut_s: float) -> BlinkEvent | None:
+    def _await_opening(self, t_s: float, opening: float, shut_s: float) -> BlinkEvent | None:
         """Wait for the lids to be open again, and for a little longer."""
         if self._back_s is None and opening >= _BACK_SHARE * self._usual:
             self._back_s = t_s
         if self._back_s is not None and t_s - self._back_s >= _AFTER_S:
             self._shut_s = self._back_s = None
-            return _shape(list(self._trace), self._usual)
+            return _measure_blink(list(self._trace), self._usual)
         if t_s - shut_s > _LONGEST_S:  # asleep, or looking down: that is the opening now
             self._shut_s = self._back_s = None
             self._usual = opening
         return None
 
 
-def _shape(trace: list[tuple[float, float]], usual: float) -> BlinkEvent | None:
+def _measure_blink(trace: list[tuple[float, float]], usual: float) -> BlinkEvent | None:
     """Measure one blink: (time, opening) rows from before it until after it."""
     t = [row[0] for row in trace]
     o = [row[1] for row in trace]
@@ -129,12 +129,12 @@ def _phase(t: list[float], speed: list[float], peak: int) -> tuple[float, float]
     while last < len(speed) - 1 and speed[last] > foot:
         last += 1
     return (
-        _between(t[first], t[first + 1], speed[first], speed[first + 1], foot),
-        _between(t[last], t[last - 1], speed[last], speed[last - 1], foot),
+        _interpolate_time(t[first], t[first + 1], speed[first], speed[first + 1], foot),
+        _interpolate_time(t[last], t[last - 1], speed[last], speed[last - 1], foot),
     )
 
 
-def _between(t_low: float, t_high: float, low: float, high: float, level: float) -> float:
+def _interpolate_time(t_low: float, t_high: float, low: float, high: float, level: float) -> float:
     share = (level - low) / (high - low) if high > low else 0.0
     return t_low + min(1.0, max(0.0, share)) * (t_high - t_low)
 
@@ -145,7 +145,7 @@ UPPER = ("left_upper_lid", "right_upper_lid")
 LOWER = ("left_lower_lid", "right_lower_lid")
 
 
-def openings(
+def lid_openings(
     left: float, right: float, names: Sequence[str], pair: tuple[str, str]
 ) -> tuple[float, float] | None:
     """Return the openings of two lids, None without any; a single lid counts for both.

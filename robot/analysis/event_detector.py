@@ -15,8 +15,8 @@ from typing import NamedTuple, TypeVar
 
 from gazerig.gaze.angles import add, angle_between, cross, dot, norm, scale, sub, unit
 from gazerig.gaze.types import PARTS, Vec3
-from gazerig.robot.analysis.blink_finder import UPPER, BlinkEvent, BlinkFinder, openings
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.blink_finder import UPPER, BlinkEvent, BlinkFinder, lid_openings
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.types import GAZE_JOINTS
 
@@ -50,10 +50,10 @@ _LONGEST_S = 0.4
 _KEPT = 160
 
 
-class Jump(NamedTuple):
+class MeasuredSaccade(NamedTuple):
     """One saccade in a trace.
 
-    peak_at: share of the duration at which it was fastest
+    peak_share: share of the duration at which it was fastest
     mean_deg_s: amplitude over duration; from_world, to_world: unit directions
     """
 
@@ -61,7 +61,7 @@ class Jump(NamedTuple):
     duration_s: float
     amplitude_deg: float
     peak_deg_s: float
-    peak_at: float
+    peak_share: float
     from_world: Vec3
     to_world: Vec3
 
@@ -71,12 +71,12 @@ class Jump(NamedTuple):
         return self.amplitude_deg / self.duration_s
 
 
-class _Sample(NamedTuple):
+class _DirectionSample(NamedTuple):
     t_s: float
-    way: Vec3
+    direction: Vec3
 
 
-class _Speed(NamedTuple):
+class _SpeedSample(NamedTuple):
     """One sample with its speed.
 
     velocity_1_s: of the unit vector, smoothed; relative_deg_s: what it is beyond the slow
@@ -84,32 +84,32 @@ class _Speed(NamedTuple):
     """
 
     t_s: float
-    way: Vec3
+    direction: Vec3
     velocity_1_s: Vec3
     relative_deg_s: float
-    sharp_deg_s: float
+    unsmoothed_deg_s: float
 
 
 class SaccadeFinder:
     """Finds saccades in a sequence of gaze directions; each is returned when it has ended."""
 
     def __init__(self) -> None:
-        self.under_way = False
+        self.is_in_flight = False
         self.clear()
 
     def clear(self) -> None:
         """Forget the trace: there was a gap."""
-        self._samples: deque[_Sample] = deque(maxlen=5)
-        self._speeds: deque[_Speed] = deque(maxlen=_KEPT)
+        self._samples: deque[_DirectionSample] = deque(maxlen=5)
+        self._speeds: deque[_SpeedSample] = deque(maxlen=_KEPT)
         self._slow: Vec3 = (0.0, 0.0, 0.0)
         self._peak_deg_s = 0.0
         self._before_deg_s = 0.0
         self._began_s = 0.0
         self._barrier_s = -inf
         self._settles_s: float | None = None
-        self.under_way = False
+        self.is_in_flight = False
 
-    def update(self, t_s: float, way: Vec3) -> Jump | None:
+    def update(self, t_s: float, direction: Vec3) -> MeasuredSaccade | None:
         """Add a unit direction in the world; return the saccade that has just ended, if any."""
         samples = self._samples
         if samples:
@@ -119,81 +119,81 @@ class SaccadeFinder:
                 samples = self._samples
             elif since_s < _NEAREST_S:
                 return None
-        samples.append(_Sample(t_s, way))
+        samples.append(_DirectionSample(t_s, direction))
         if len(samples) < 5:
             return None
         speed = self._speed()
         self._speeds.append(speed)
-        return self._judge(speed)
+        return self._advance_state(speed)
 
-    def _speed(self) -> _Speed:
+    def _speed(self) -> _SpeedSample:
         """Return the speed at the middle sample, and learn the slow motion from it."""
         a, b, c, d, e = self._samples
-        (bx, by, bz), (dx, dy, dz) = b.way, d.way
+        (bx, by, bz), (dx, dy, dz) = b.direction, d.direction
         sharp_s = d.t_s - b.t_s
         x, y, z = (dx - bx), (dy - by), (dz - bz)
         sharp = sqrt(x * x + y * y + z * z) / sharp_s
         over_s = sharp_s
         if e.t_s - a.t_s < 2.0 * _FARTHEST_S:
-            (ax, ay, az), (ex, ey, ez) = a.way, e.way
+            (ax, ay, az), (ex, ey, ez) = a.direction, e.direction
             x, y, z = x + ex - ax, y + ey - ay, z + ez - az
             over_s += e.t_s - a.t_s
         vx, vy, vz = x / over_s, y / over_s, z / over_s
         sx, sy, sz = self._slow
         rx, ry, rz = vx - sx, vy - sy, vz - sz
         relative = degrees(sqrt(rx * rx + ry * ry + rz * rz))
-        if not self.under_way and relative <= THRESHOLD_DEG_S:
+        if not self.is_in_flight and relative <= THRESHOLD_DEG_S:
             share = 1.0 - exp(-0.5 * sharp_s / _SLOW_S)
             self._slow = (sx + share * rx, sy + share * ry, sz + share * rz)
-        return _Speed(c.t_s, c.way, (vx, vy, vz), relative, degrees(sharp))
+        return _SpeedSample(c.t_s, c.direction, (vx, vy, vz), relative, degrees(sharp))
 
-    def _judge(self, speed: _Speed) -> Jump | None:
+    def _advance_state(self, speed: _SpeedSample) -> MeasuredSaccade | None:
         """Follow the three states: at rest, in flight, and settling after a landing."""
         now, before = speed.relative_deg_s, self._before_deg_s
         self._before_deg_s = now
         if self._settles_s is not None:
             long = speed.t_s - self._settles_s > _LANDING_S
             if now < THRESHOLD_DEG_S or long:
-                self._settles_s, self.under_way = None, False
+                self._settles_s, self.is_in_flight = None, False
                 if long:
-                    self._follow(speed)
+                    self._end_as_slow_motion(speed)
                 return None
             if now <= _AGAIN_SHARE * self._peak_deg_s:
                 return None
             self._settles_s = None
-        elif self.under_way:
-            return self._fly(speed, before)
+        elif self.is_in_flight:
+            return self._await_landing(speed, before)
         if now > THRESHOLD_DEG_S:
-            self.under_way = True
+            self.is_in_flight = True
             self._peak_deg_s, self._began_s = now, speed.t_s
         return None
 
-    def _fly(self, speed: _Speed, before_deg_s: float) -> Jump | None:
+    def _await_landing(self, speed: _SpeedSample, before_deg_s: float) -> MeasuredSaccade | None:
         """Wait for the landing: the speed is low, or has a minimum before the eye swings back."""
         now = speed.relative_deg_s
         # Relative to the peak until now: a saccade is slow at its beginning, too.
         swings = before_deg_s < _SWING_SHARE * self._peak_deg_s and now > before_deg_s
         self._peak_deg_s = max(self._peak_deg_s, now)
-        if now < self._foot() or swings:
-            jump = self._jump(len(self._speeds) - (1 if swings else 0))
+        if now < self._foot_deg_s() or swings:
+            jump = self._measure_saccade(len(self._speeds) - (1 if swings else 0))
             self._barrier_s = jump.onset_s + jump.duration_s
-            self.under_way = now > THRESHOLD_DEG_S
-            self._settles_s = speed.t_s if self.under_way else None
+            self.is_in_flight = now > THRESHOLD_DEG_S
+            self._settles_s = speed.t_s if self.is_in_flight else None
             return jump if jump.amplitude_deg >= LEAST_DEG else None
         if speed.t_s - self._began_s > _LONGEST_S:
-            self._follow(speed)
+            self._end_as_slow_motion(speed)
         return None
 
-    def _follow(self, speed: _Speed) -> None:
+    def _end_as_slow_motion(self, speed: _SpeedSample) -> None:
         """Treat motion that lasts too long for a saccade as slow motion."""
-        self.under_way, self._slow, self._barrier_s = False, speed.velocity_1_s, speed.t_s
+        self.is_in_flight, self._slow, self._barrier_s = False, speed.velocity_1_s, speed.t_s
 
-    def _foot(self) -> float:
+    def _foot_deg_s(self) -> float:
         return max(_FOOT_SHARE * self._peak_deg_s, _FOOT_DEG_S)
 
-    def _jump(self, end: int) -> Jump:
+    def _measure_saccade(self, end: int) -> MeasuredSaccade:
         """Measure the saccade that was over with the last of the first ``end`` speeds."""
-        foot, speeds = self._foot(), self._speeds
+        foot, speeds = self._foot_deg_s(), self._speeds
         first = end - 1
         while first > 0 and speeds[first - 1].t_s >= self._barrier_s:
             first -= 1
@@ -202,21 +202,21 @@ class SaccadeFinder:
         part = [speeds[i] for i in range(first, end)]
         onset_s, end_s = _crossing(part[0], part[1], foot), _crossing(part[-1], part[-2], foot)
         inner = part[1:-1] or part
-        peak = max(speed.sharp_deg_s for speed in inner)
-        top = [speed.t_s for speed in inner if speed.sharp_deg_s >= _TOP_SHARE * peak]
+        peak = max(speed.unsmoothed_deg_s for speed in inner)
+        top = [speed.t_s for speed in inner if speed.unsmoothed_deg_s >= _TOP_SHARE * peak]
         duration_s = end_s - onset_s
-        return Jump(
+        return MeasuredSaccade(
             onset_s,
             duration_s,
-            degrees(angle_between(part[0].way, part[-1].way)),
+            degrees(angle_between(part[0].direction, part[-1].direction)),
             peak,
             (0.5 * (top[0] + top[-1]) - onset_s) / duration_s,
-            part[0].way,
-            part[-1].way,
+            part[0].direction,
+            part[-1].direction,
         )
 
 
-def _crossing(below: _Speed, above: _Speed, level: float) -> float:
+def _crossing(below: _SpeedSample, above: _SpeedSample, level: float) -> float:
     """Return when the speed passed a level between two samples."""
     span = above.relative_deg_s - below.relative_deg_s
     share = (level - below.relative_deg_s) / span if span > 0.0 else 0.0
@@ -243,7 +243,7 @@ _COMMAND_BEFORE_S, _COMMAND_AFTER_S = 0.12, 0.03
 _EYE_JOINTS = frozenset(name for name in GAZE_JOINTS if "eye" in name)
 
 
-class Commanded(NamedTuple):
+class CommandedSaccade(NamedTuple):
     """A saccade as the models commanded it."""
 
     onset_s: float
@@ -255,7 +255,7 @@ class Commanded(NamedTuple):
 class SaccadeEvent(NamedTuple):
     """One saccade of the gaze in space.
 
-    peak_at: share of the duration at which it was fastest, .5 is symmetric
+    peak_share: share of the duration at which it was fastest, .5 is symmetric
     commanded: the commanded saccade, None if the eyes jumped without a command
     """
 
@@ -263,8 +263,8 @@ class SaccadeEvent(NamedTuple):
     duration_s: float
     amplitude_deg: float
     peak_deg_s: float
-    peak_at: float
-    commanded: Commanded | None
+    peak_share: float
+    commanded: CommandedSaccade | None
 
     @property
     def end_s(self) -> float:
@@ -277,16 +277,16 @@ class FixationEvent(NamedTuple):
 
     part: the face part that the lines of sight passed nearest to, None off the parts
     on_face: whether it was on a face at all; face: that face's id, -1 without one
-    kind, wanted: kind of the current target, and its face part
+    target_kind, target_part: kind of the current target, and its face part
     """
 
     start_s: float
     duration_s: float
     part: str | None
     on_face: bool
-    face: int
-    kind: str
-    wanted: str | None
+    face_id: int
+    target_kind: str
+    target_part: str | None
 
     @property
     def end_s(self) -> float:
@@ -304,9 +304,9 @@ class EventDetector:
     def __init__(self) -> None:
         self._saccades = SaccadeFinder()
         self._blinks = BlinkFinder()
-        self._commands: deque[Commanded] = deque(maxlen=4)
-        self._flight: _Flight | None = None
-        self._rest = _Rest(None)
+        self._commands: deque[CommandedSaccade] = deque(maxlen=4)
+        self._flight: _CommandedFlight | None = None
+        self._rest = _OpenFixation(None)
 
     def update(self, tick: Tick) -> tuple[Event, ...]:
         """Add a tick; return the events that have ended, in the order of their onset."""
@@ -318,42 +318,42 @@ class EventDetector:
                 self._blinks.clear()
             self._saccades.clear()
             self._flight = None
-            self._rest = _Rest(None)
+            self._rest = _OpenFixation(None)
             return ()
-        self._note_command(tick)
+        self._follow_command(tick)
         t_s = tick.t_s
-        way = cyclopean(tick)
-        jump = self._saccades.update(t_s, way)
+        direction = cyclopean_direction(tick)
+        jump = self._saccades.update(t_s, direction)
         names, pose = tick.guard_result.joints, tick.pose
-        lids = openings(pose.lid_left, pose.lid_right, names, UPPER)
+        lids = lid_openings(pose.lid_left, pose.lid_right, names, UPPER)
         blink = self._blinks.update(t_s, *lids) if lids is not None else None
         if jump is None:
-            if not self._saccades.under_way:
-                self._rest.update(tick, way)
+            if not self._saccades.is_in_flight:
+                self._rest.update(tick, direction)
             return () if blink is None else (blink,)
         events: list[Event] = [] if blink is None else [blink]
-        fixation = self._rest.over(jump.onset_s)
+        fixation = self._rest.close(jump.onset_s)
         if fixation is not None:
             events.append(fixation)
-        events.append(SaccadeEvent(*jump[:5], self._command_of(jump.onset_s)))
-        self._rest = _Rest(jump.onset_s + jump.duration_s)
+        events.append(SaccadeEvent(*jump[:5], self._find_command(jump.onset_s)))
+        self._rest = _OpenFixation(jump.onset_s + jump.duration_s)
         return tuple(events)
 
-    def _note_command(self, tick: Tick) -> None:
+    def _follow_command(self, tick: Tick) -> None:
         """Follow the current saccade of the models."""
         flying = tick.gaze.phase == "saccade"
         if not flying and self._flight is None:
             return
-        way = unit(sub(tick.gaze.gaze_point_world_m, tick.pose.p_world_head_m))
+        direction = unit(sub(tick.gaze.gaze_point_world_m, tick.pose.p_world_head_m))
         if self._flight is None:
-            self._flight = _Flight(tick.t_s, way)
+            self._flight = _CommandedFlight(tick.t_s, direction)
             return
-        self._flight.update(tick.t_s, way)
+        self._flight.update(tick.t_s, direction)
         if not flying:
             self._commands.append(self._flight.command)
             self._flight = None
 
-    def _command_of(self, onset_s: float) -> Commanded | None:
+    def _find_command(self, onset_s: float) -> CommandedSaccade | None:
         """Find the command of a saccade that was measured a servo's lag later."""
         known = list(self._commands)
         if self._flight is not None:
@@ -366,25 +366,25 @@ class EventDetector:
         return None
 
 
-class _Flight:
+class _CommandedFlight:
     """A commanded saccade, followed from its first tick."""
 
-    def __init__(self, t_s: float, way: Vec3) -> None:
+    def __init__(self, t_s: float, direction: Vec3) -> None:
         self._start_s = self._last_s = t_s
-        self._start = self._last = way
+        self._start = self._last = direction
         self._peak_rad_s = 0.0
 
-    def update(self, t_s: float, way: Vec3) -> None:
+    def update(self, t_s: float, direction: Vec3) -> None:
         """Add the commanded gaze direction at ``t_s``."""
         if t_s > self._last_s:
-            speed = angle_between(self._last, way) / (t_s - self._last_s)
+            speed = angle_between(self._last, direction) / (t_s - self._last_s)
             self._peak_rad_s = max(self._peak_rad_s, speed)
-        self._last_s, self._last = t_s, way
+        self._last_s, self._last = t_s, direction
 
     @property
-    def command(self) -> Commanded:
+    def command(self) -> CommandedSaccade:
         """Return it as far as it is known."""
-        return Commanded(
+        return CommandedSaccade(
             self._start_s,
             self._last_s - self._start_s,
             degrees(angle_between(self._start, self._last)),
@@ -392,7 +392,7 @@ class _Flight:
         )
 
 
-class _Rest:
+class _OpenFixation:
     """The time between two saccades, and what was looked at in it."""
 
     def __init__(self, start_s: float | None) -> None:
@@ -402,7 +402,7 @@ class _Rest:
         self._faces: Counter[int] = Counter()
         self._kinds: Counter[tuple[str, str | None]] = Counter()
 
-    def update(self, tick: Tick, way: Vec3) -> None:
+    def update(self, tick: Tick, direction: Vec3) -> None:
         """Determine at intervals what the gaze is on."""
         t_s = tick.t_s
         if self._start_s is None:
@@ -410,23 +410,23 @@ class _Rest:
         if t_s < self._next_s or t_s < self._start_s + _SETTLING_S:
             return
         self._next_s = t_s + _LOOK_EVERY_S
-        part, face = part_looked_at(tick, way)
+        part, face = part_looked_at(tick, direction)
         self._parts[part] += 1
         self._faces[face] += 1
         self._kinds[tick.target.kind, tick.target.part] += 1
 
-    def over(self, end_s: float) -> FixationEvent | None:
+    def close(self, end_s: float) -> FixationEvent | None:
         """Return the fixation, None if it was too short."""
         if self._start_s is None or end_s - self._start_s < SHORTEST_S:
             return None
-        part = _most(self._parts, None)
-        face = _most(self._faces, -1)
-        kind, wanted = _most(self._kinds, ("", None))
+        part = _most_frequent(self._parts, None)
+        face = _most_frequent(self._faces, -1)
+        kind, wanted = _most_frequent(self._kinds, ("", None))
         length_s = end_s - self._start_s
         return FixationEvent(self._start_s, length_s, part, face >= 0, face, kind, wanted)
 
 
-def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:
+def part_looked_at(tick: Tick, direction: Vec3) -> tuple[str | None, int]:
     """Return the face part that the measured gaze passes, and the face's id, -1 off all faces.
 
     direction: unit vector of the gaze in the world
@@ -437,20 +437,20 @@ def part_looked_at(tick: Tick, way: Vec3) -> tuple[str | None, int]:
     since_s = min(max(0.0, tick.t_s - tick.percept.captured_s), _LONGEST_FORESEEN_S)
     for face in tick.percept.faces:
         moved = scale(face.v_world_m_s, since_s)
-        if beside_m(way, sub(add(face.p_world_m, moved), head)) <= NEAR_FACE_M:
+        if miss_distance_m(direction, sub(add(face.p_world_m, moved), head)) <= NEAR_FACE_M:
             shift_m = sub(moved, head)
-            apart = [beside_m(way, add(p, shift_m)) for p in face.parts_world_m]
+            apart = [miss_distance_m(direction, add(p, shift_m)) for p in face.parts_world_m]
             least = min(apart)
             return (PARTS[apart.index(least)] if least <= NEAR_PART_M else None), face.id
     return None, -1
 
 
-def beside_m(way: Vec3, rel_m: Vec3) -> float:
+def miss_distance_m(direction: Vec3, rel_m: Vec3) -> float:
     """Return how far a line of sight passes from a place; both from the eye."""
-    if dot(way, rel_m) <= 0.0:
+    if dot(direction, rel_m) <= 0.0:
         return norm(rel_m)
-    return norm(cross(way, rel_m))
+    return norm(cross(direction, rel_m))
 
 
-def _most(counts: Counter[T], otherwise: T) -> T:
+def _most_frequent(counts: Counter[T], otherwise: T) -> T:
     return counts.most_common(1)[0][0] if counts else otherwise

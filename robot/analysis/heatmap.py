@@ -36,7 +36,7 @@ _FINE = 3
 _Colour = tuple[int, int, int]
 
 
-def on_canvas(points_face_m: Floats) -> Floats:
+def canvas_pixels(points_face_m: Floats) -> Floats:
     """Return the pixels (column, row) of (n, 2) points (y, z) of the face frame."""
     return np.asarray(points_face_m) * (PX_PER_M, -PX_PER_M) + _NOSE_PX
 
@@ -48,66 +48,76 @@ class _Pen:
         size = (HEIGHT_PX * _FINE, WIDTH_PX * _FINE, 3)
         self.canvas: NDArray[np.uint8] = np.full(size, _PAPER, np.uint8)
 
-    def shape(self, yz_mm: Sequence[tuple[float, float]], fill: _Colour) -> None:
+    def fill_outline(self, yz_mm: Sequence[tuple[float, float]], fill: _Colour) -> None:
         """Fill a closed, smooth outline through the points given."""
-        cv2.fillPoly(self.canvas, [self._pixels(_smooth(yz_mm, closed=True))], fill, cv2.LINE_AA)
+        cv2.fillPoly(self.canvas, [self._pixels(_spline(yz_mm, closed=True))], fill, cv2.LINE_AA)
 
-    def line(self, yz_mm: Sequence[tuple[float, float]], wide_mm: float, ink: _Colour) -> None:
+    def draw_line(
+        self, yz_mm: Sequence[tuple[float, float]], width_mm: float, ink: _Colour
+    ) -> None:
         """Draw a smooth line through the points given."""
-        wide = max(1, round(wide_mm * 1e-3 * PX_PER_M * _FINE))
-        path = self._pixels(_smooth(yz_mm, closed=False))
+        wide = max(1, round(width_mm * 1e-3 * PX_PER_M * _FINE))
+        path = self._pixels(_spline(yz_mm, closed=False))
         cv2.polylines(self.canvas, [path], False, ink, wide, cv2.LINE_AA)
 
-    def both_sides(
-        self, yz_mm: Sequence[tuple[float, float]], wide_mm: float, ink: _Colour
+    def draw_both_sides(
+        self, yz_mm: Sequence[tuple[float, float]], width_mm: float, ink: _Colour
     ) -> None:
         """Draw a line and its mirror image."""
-        self.line(yz_mm, wide_mm, ink)
-        self.line([(-y, z) for y, z in yz_mm], wide_mm, ink)
+        self.draw_line(yz_mm, width_mm, ink)
+        self.draw_line([(-y, z) for y, z in yz_mm], width_mm, ink)
 
-    def disc(self, y_mm: float, z_mm: float, radius_mm: float, fill: _Colour) -> None:
+    def fill_disc(self, y_mm: float, z_mm: float, radius_mm: float, fill: _Colour) -> None:
         """Fill a circle."""
         (centre,) = self._pixels(np.array([(y_mm, z_mm)]))
         radius = round(radius_mm * 1e-3 * PX_PER_M * _FINE)
         cv2.circle(self.canvas, (int(centre[0]), int(centre[1])), radius, fill, -1, cv2.LINE_AA)
 
     def _pixels(self, yz_mm: Floats) -> NDArray[np.int32]:
-        fine = on_canvas(yz_mm * 1e-3) * _FINE
+        fine = canvas_pixels(yz_mm * 1e-3) * _FINE
         return np.rint(fine).astype(np.int32)
 
 
 def draw_face() -> NDArray[np.uint8]:
     """Draw the face on a canvas of HEIGHT_PX by WIDTH_PX."""
     pen = _Pen()
-    _head(pen)
+    _draw_head(pen)
     for side in (-1.0, 1.0):
-        _eye(pen, side)
-    _nose_and_mouth(pen)
+        _draw_eye(pen, side)
+    _draw_nose_and_mouth(pen)
     small = cv2.resize(pen.canvas, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.uint8)
 
 
-def _head(pen: _Pen) -> None:
+def _draw_head(pen: _Pen) -> None:
     """Shoulders, neck, hair, ears, and the oval of the face."""
-    pen.shape(
-        _mirrored([(0, -112), (34, -112), (58, -122), (100, -132), (124, -170), (0, -200)]), _SHADE
+    pen.fill_outline(
+        _close_with_mirror_image(
+            [(0, -112), (34, -112), (58, -122), (100, -132), (124, -170), (0, -200)]
+        ),
+        _SHADE,
     )
-    pen.shape(_mirrored([(0, -60), (33, -60), (35, -100), (42, -118), (0, -128)]), _SKIN)
-    pen.line([(-34, -84), (-18, -98), (0, -102), (18, -98), (34, -84)], 1.2, _SHADE)
-    pen.shape(
-        _mirrored([(0, 141), (45, 134), (72, 108), (80, 70), (77, 30), (70, 18), (0, 20)]), _HAIR
+    pen.fill_outline(
+        _close_with_mirror_image([(0, -60), (33, -60), (35, -100), (42, -118), (0, -128)]), _SKIN
+    )
+    pen.draw_line([(-34, -84), (-18, -98), (0, -102), (18, -98), (34, -84)], 1.2, _SHADE)
+    pen.fill_outline(
+        _close_with_mirror_image(
+            [(0, 141), (45, 134), (72, 108), (80, 70), (77, 30), (70, 18), (0, 20)]
+        ),
+        _HAIR,
     )
     for side in (-1.0, 1.0):
         ear = [(70, 30), (79, 36), (84, 22), (80, -2), (74, -16), (68, -14)]
-        pen.shape([(side * y, z) for y, z in ear], _SKIN)
+        pen.fill_outline([(side * y, z) for y, z in ear], _SKIN)
     oval = [(0, 114), (36, 109), (60, 88), (70, 55), (72, 20), (70, -12), (62, -50)]
     oval += [(44, -84), (20, -104), (0, -107)]
-    pen.shape(_mirrored(oval), _SKIN)
+    pen.fill_outline(_close_with_mirror_image(oval), _SKIN)
     fringe = [(0, 141), (45, 134), (72, 108), (79, 60), (71, 44), (64, 76), (46, 98), (0, 106)]
-    pen.shape(_mirrored(fringe), _HAIR)
+    pen.fill_outline(_close_with_mirror_image(fringe), _HAIR)
 
 
-def _eye(pen: _Pen, side: float) -> None:
+def _draw_eye(pen: _Pen, side: float) -> None:
     """An eye with its brow, at the pupil's measured place."""
     _, y0, z0 = (1e3 * metres for metres in PARTS_FACE_M["LE"])
 
@@ -115,33 +125,33 @@ def _eye(pen: _Pen, side: float) -> None:
         return side * (y0 + y), z0 + z
 
     white = [at(*p) for p in ((-15, -1.5), (-8, 4.5), (0, 6.5), (8, 5), (15, 0), (7, -5), (-6, -5))]
-    pen.shape(white, (250, 250, 251))
-    pen.disc(side * y0, z0, 5.8, _IRIS)
-    pen.disc(side * y0, z0, 2.6, (70, 72, 76))
-    pen.disc(side * y0 + 1.8, z0 + 2.2, 1.1, (250, 250, 251))
-    pen.line([at(-16, -2.5), at(-8, 4.8), at(0, 6.8), at(8, 5.3), at(16, 0.5)], 1.5, _INK)
-    pen.line([at(-13, -3), at(-6, -5.2), at(7, -5.2), at(14, -1)], 0.6, _INK)
-    pen.line([at(-16, 13), at(-4, 18.5), at(8, 19), at(20, 13)], 3.2, _HAIR)
+    pen.fill_outline(white, (250, 250, 251))
+    pen.fill_disc(side * y0, z0, 5.8, _IRIS)
+    pen.fill_disc(side * y0, z0, 2.6, (70, 72, 76))
+    pen.fill_disc(side * y0 + 1.8, z0 + 2.2, 1.1, (250, 250, 251))
+    pen.draw_line([at(-16, -2.5), at(-8, 4.8), at(0, 6.8), at(8, 5.3), at(16, 0.5)], 1.5, _INK)
+    pen.draw_line([at(-13, -3), at(-6, -5.2), at(7, -5.2), at(14, -1)], 0.6, _INK)
+    pen.draw_line([at(-16, 13), at(-4, 18.5), at(8, 19), at(20, 13)], 3.2, _HAIR)
 
 
-def _nose_and_mouth(pen: _Pen) -> None:
-    pen.both_sides([(8, 30), (7, 12), (9, 2)], 0.6, _SHADE)
-    pen.both_sides([(15, 1), (18, -5), (14, -9), (9, -8)], 1.0, _INK)
-    pen.line([(-7, -9), (0, -11.5), (7, -9)], 1.0, _INK)
-    pen.shape(
+def _draw_nose_and_mouth(pen: _Pen) -> None:
+    pen.draw_both_sides([(8, 30), (7, 12), (9, 2)], 0.6, _SHADE)
+    pen.draw_both_sides([(15, 1), (18, -5), (14, -9), (9, -8)], 1.0, _INK)
+    pen.draw_line([(-7, -9), (0, -11.5), (7, -9)], 1.0, _INK)
+    pen.fill_outline(
         [(-25, -36), (-10, -31), (0, -33), (10, -31), (25, -36), (12, -44), (0, -46), (-12, -44)],
         (196, 200, 212),
     )
-    pen.line([(-26, -36), (-10, -37), (0, -38), (10, -37), (26, -36)], 1.2, _INK)
-    pen.line([(-9, -60), (0, -62), (9, -60)], 0.7, _SHADE)
+    pen.draw_line([(-26, -36), (-10, -37), (0, -38), (10, -37), (26, -36)], 1.2, _INK)
+    pen.draw_line([(-9, -60), (0, -62), (9, -60)], 0.7, _SHADE)
 
 
-def _mirrored(half: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+def _close_with_mirror_image(half: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Close the left half of an outline with its mirror image."""
     return [*half, *((-y, z) for y, z in reversed(half) if y != 0.0)]
 
 
-def _smooth(points: Sequence[tuple[float, float]], closed: bool) -> Floats:
+def _spline(points: Sequence[tuple[float, float]], closed: bool) -> Floats:
     """Run a Catmull-Rom curve through the points, (m, 2)."""
     p = np.asarray(points, dtype=float)
     first, last = (p[-1:], p[:2]) if closed else (p[:1], p[-1:])
@@ -175,38 +185,38 @@ def with_legend(
     shares: of the time, per part code and "elsewhere"
     """
     panel: Image = np.full((image.shape[0], _PANEL_PX, 3), _LEGEND_PAPER, np.uint8)
-    _scale(panel, most_s_cm2, total_s)
-    _write(panel, "share of the time", (28, _ROWS_TOP - 22), 0.55, _LEGEND_INK)
+    _draw_scale(panel, most_s_cm2, total_s)
+    _draw_text(panel, "share of the time", (28, _ROWS_TOP - 22), 0.55, _LEGEND_INK)
     ordered = sorted(shares.items(), key=lambda item: (item[0] == "elsewhere", -item[1]))
     largest = max(shares.values())
     for row, (part, share) in enumerate(ordered):
         top = _ROWS_TOP + row * _ROW_PX
-        _write(panel, PART_NAMES.get(part, part), (28, top + 12), 0.48, _LEGEND_INK)
+        _draw_text(panel, PART_NAMES.get(part, part), (28, top + 12), 0.48, _LEGEND_INK)
         figure = f"{100.0 * share:.1f} %"
         (wide, _), _ = cv2.getTextSize(figure, cv2.FONT_HERSHEY_SIMPLEX, 0.48, 1)
-        _write(panel, figure, (264 - wide, top + 12), 0.48, _LEGEND_INK)
+        _draw_text(panel, figure, (264 - wide, top + 12), 0.48, _LEGEND_INK)
         wide = round(236 * share / largest) if largest > 0.0 else 0
         cv2.rectangle(panel, (28, top + 18), (264, top + 24), (238, 238, 240), -1)
         if wide > 0:
             cv2.rectangle(panel, (28, top + 18), (28 + wide, top + 24), _BAR, -1)
     note = (28, _ROWS_TOP + len(ordered) * _ROW_PX + 20)
-    _write(panel, "left and right: the face's own", note, 0.42, _SOFT)
+    _draw_text(panel, "left and right: the face's own", note, 0.42, _SOFT)
     return np.hstack([image, panel])
 
 
-def _scale(panel: Image, most_s_cm2: float, total_s: float) -> None:
-    _write(panel, f"{total_s:.0f} s of gaze", (28, 40), 0.6, _LEGEND_INK)
-    _write(panel, "seconds per square cm", (28, 70), 0.5, _SOFT)
+def _draw_scale(panel: Image, most_s_cm2: float, total_s: float) -> None:
+    _draw_text(panel, f"{total_s:.0f} s of gaze", (28, 40), 0.6, _LEGEND_INK)
+    _draw_text(panel, "seconds per square cm", (28, 70), 0.5, _SOFT)
     ramp = np.linspace(255, 0, _SCALE_HIGH).astype(np.uint8)[:, None].repeat(34, axis=1)
     bottom = _SCALE_TOP + _SCALE_HIGH
     panel[_SCALE_TOP:bottom, 28:62] = cv2.applyColorMap(ramp, cv2.COLORMAP_PLASMA)
     for share in (0.0, 0.25, 0.5, 0.75, 1.0):
         row = round(bottom - share * _SCALE_HIGH)
         cv2.line(panel, (62, row), (70, row), _SOFT, 1)
-        _write(panel, f"{share * most_s_cm2:.2g}", (78, row + 5), 0.48, _LEGEND_INK)
+        _draw_text(panel, f"{share * most_s_cm2:.2g}", (78, row + 5), 0.48, _LEGEND_INK)
 
 
-def _write(
+def _draw_text(
     panel: Image, text: str, at: tuple[int, int], size: float, ink: tuple[int, int, int]
 ) -> None:
     cv2.putText(panel, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, ink, 1, cv2.LINE_AA)
@@ -230,7 +240,7 @@ def share_per_part(points_face_m: ArrayLike, seconds: ArrayLike) -> dict[str, fl
     Raises:
         ValueError: there is no time at all, or shapes or numbers are not as they should be.
     """
-    points, times = _checked(points_face_m, seconds)
+    points, times = _check_points(points_face_m, seconds)
     centres = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
     apart = np.linalg.norm(points[:, None] - centres[None], axis=2)
     nearest = np.where(apart.min(axis=1) <= _NEAR_M, apart.argmin(axis=1), len(PARTS))
@@ -238,7 +248,7 @@ def share_per_part(points_face_m: ArrayLike, seconds: ArrayLike) -> dict[str, fl
     return dict(zip((*PARTS, "elsewhere"), total.tolist(), strict=True))
 
 
-def heatmap(
+def write_heatmap(
     points_face_m: ArrayLike,
     seconds: ArrayLike,
     out: Path,
@@ -254,9 +264,9 @@ def heatmap(
         SetupError: no face in the image, or a file cannot be read or written.
         ValueError: as of ``share_per_part``.
     """
-    points, times = _checked(points_face_m, seconds)
+    points, times = _check_points(points_face_m, seconds)
     shares = share_per_part(points, times)
-    canvas = draw_face() if image is None else face_from(image)
+    canvas = draw_face() if image is None else align_face(image)
     per_m2 = density_s_m2(points, times)
     # Laid over the canvas: from nothing over purple and orange to yellow.
     top = float(per_m2.max())
@@ -275,7 +285,7 @@ def heatmap(
 
 def density_s_m2(points_face_m: Floats, seconds: Floats) -> Floats:
     """Return seconds per square metre for every pixel of the canvas, (HEIGHT_PX, WIDTH_PX)."""
-    columns, rows = np.rint(on_canvas(points_face_m)).astype(int).T
+    columns, rows = np.rint(canvas_pixels(points_face_m)).astype(int).T
     inside = (columns >= 0) & (columns < WIDTH_PX) & (rows >= 0) & (rows < HEIGHT_PX)
     time = np.zeros((HEIGHT_PX, WIDTH_PX))
     np.add.at(time, (rows[inside], columns[inside]), seconds[inside])
@@ -284,7 +294,7 @@ def density_s_m2(points_face_m: Floats, seconds: Floats) -> Floats:
     return np.asarray(spread, dtype=np.float64) * PX_PER_M**2
 
 
-def face_from(photo: Path) -> Image:
+def align_face(photo: Path) -> Image:
     """Bring the largest face of a photograph to the canvas, by its eyes and mouth.
 
     Raises:
@@ -307,7 +317,7 @@ def face_from(photo: Path) -> Image:
         raise SetupError(f"{photo}: no face found; give an image of one face from its front")
     flat = [0, 1, 3, 4]  # without the nose, which is in front of the plane
     there = faces[0].landmarks_px[flat]
-    here = on_canvas(LANDMARKS_FACE_M[flat, 1:])
+    here = canvas_pixels(LANDMARKS_FACE_M[flat, 1:])
     ones = np.ones((len(flat), 1))
     affine = np.linalg.lstsq(np.hstack([there, ones]), here, rcond=None)[0].T
     size = (WIDTH_PX, HEIGHT_PX)
@@ -319,7 +329,7 @@ def face_from(photo: Path) -> Image:
     return np.asarray(cv2.addWeighted(grey, 0.8, grey, 0.0, 40.0), dtype=np.uint8)
 
 
-def _checked(points_face_m: ArrayLike, seconds: ArrayLike) -> tuple[Floats, Floats]:
+def _check_points(points_face_m: ArrayLike, seconds: ArrayLike) -> tuple[Floats, Floats]:
     points, times = np.asarray(points_face_m, float), np.asarray(seconds, float)
     if points.ndim != 2 or points.shape[1:] != (2,) or times.shape != (len(points),):
         raise ValueError(f"wanted (n, 2) points and (n,) times, not {points.shape}, {times.shape}")

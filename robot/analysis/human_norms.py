@@ -42,7 +42,7 @@ DWELL_MEAN_S = (0.19, 0.24, 0.11, 0.19, 0.16, 0.20, 0.20, 0.11)
 DWELL_SD_S = (0.35, 0.25, 0.14, 0.22, 0.30, 0.30, 0.38, 0.15)
 
 
-def matrix() -> Floats:
+def transition_matrix() -> Floats:
     """Return Nakamoto & Tsuruno's eq 1 with every row summing to 1, (8, 8), rows from."""
     printed = np.array(_PRINTED)
     out: Floats = printed / printed.sum(axis=1, keepdims=True)
@@ -57,7 +57,7 @@ def visit_matrix(steps: Floats) -> Floats:
     return out
 
 
-def stationary(steps: Floats) -> Floats:
+def stationary_shares(steps: Floats) -> Floats:
     """Return the share of steps that a chain spends in each of its states, (n,)."""
     values, vectors = np.linalg.eig(steps.T)
     share = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
@@ -67,25 +67,25 @@ def stationary(steps: Floats) -> Floats:
 
 def time_share(steps: Floats, dwell_s: ArrayLike) -> Floats:
     """Return the share of time in each state when a step in it lasts for ``dwell_s``, (n,)."""
-    time = stationary(steps) * np.asarray(dwell_s)
+    time = stationary_shares(steps) * np.asarray(dwell_s)
     out: Floats = time / time.sum()
     return out
 
 
-def visit_s(steps: Floats, dwell_s: ArrayLike) -> Floats:
+def mean_visit_s(steps: Floats, dwell_s: ArrayLike) -> Floats:
     """Return the mean length of a visit, its refixations merged, (n,)."""
     out: Floats = np.asarray(dwell_s) / (1.0 - np.diag(steps))
     return out
 
 
-def slowest_peak(amplitude_deg: ArrayLike) -> Floats:
+def lowest_peak_deg_s(amplitude_deg: ArrayLike) -> Floats:
     """Return the lower edge of human peak speeds: Baloh's curve less 15 % between people."""
     a = np.asarray(amplitude_deg, dtype=float)
     out: Floats = 0.85 * BALOH_DEG_S * (1.0 - np.exp(-a / ROUND_DEG))
     return out
 
 
-def fastest_peak(amplitude_deg: ArrayLike) -> Floats:
+def highest_peak_deg_s(amplitude_deg: ArrayLike) -> Floats:
     """Return the upper edge: the higher of Bahill's and Collewijn's curves and 15 %."""
     a = np.asarray(amplitude_deg, dtype=float)
     bahill = BAHILL_DEG_S * (1.0 - np.exp(-a / ROUND_DEG))
@@ -94,13 +94,13 @@ def fastest_peak(amplitude_deg: ArrayLike) -> Floats:
     return out
 
 
-def shortest_ms(amplitude_deg: ArrayLike) -> Floats:
+def shortest_duration_ms(amplitude_deg: ArrayLike) -> Floats:
     """Return the lower edge of human durations, 21 ms + 2.2 ms a degree less a quarter."""
     out: Floats = 0.75 * (21.0 + 2.2 * np.asarray(amplitude_deg, dtype=float))
     return out
 
 
-def longest_ms(amplitude_deg: ArrayLike) -> Floats:
+def longest_duration_ms(amplitude_deg: ArrayLike) -> Floats:
     """Return the upper edge of human durations.
 
     The higher of 25 ms + 2.4 ms a degree (Lee, Badler & Badler 2002) and a quarter, and the mean of
@@ -111,21 +111,21 @@ def longest_ms(amplitude_deg: ArrayLike) -> Floats:
     return out
 
 
-def peak_at(amplitude_deg: ArrayLike) -> Floats:
+def acceleration_share(amplitude_deg: ArrayLike) -> Floats:
     """Return the share of acceleration: .45 up to 10 deg, .20 from 50 (Collewijn et al. 1988)."""
     over = (np.asarray(amplitude_deg, dtype=float) - 10.0) / 40.0
     out: Floats = 0.45 - 0.25 * np.clip(over, 0.0, 1.0)
     return out
 
 
-def head_deg(eccentricity_deg: ArrayLike) -> Floats:
+def mean_head_deg(eccentricity_deg: ArrayLike) -> Floats:
     """Return the mean head movement for a gaze shift (Stahl 1999)."""
     beyond = np.abs(np.asarray(eccentricity_deg, dtype=float)) - STAHL_FREE_DEG
     out: Floats = STAHL_SLOPE * np.maximum(0.0, beyond)
     return out
 
 
-def evoked_blink(amplitude_deg: ArrayLike) -> Floats:
+def evoked_blink_probability(amplitude_deg: ArrayLike) -> Floats:
     """Return the chance of a blink with a gaze shift: .5 at 17, .97 at 33 deg (Evinger 1994)."""
     a = np.asarray(amplitude_deg, dtype=float)
     out: Floats = 1.0 / (1.0 + np.exp(-0.217 * (a - 17.0)))
@@ -148,7 +148,7 @@ class NormBand(NamedTuple):
     unit: str
     low: float
     high: float
-    least: int
+    min_events: int
     source: str
     mode: str = ""
     notes: tuple[tuple[str, str], ...] = ()

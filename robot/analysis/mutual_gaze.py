@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, compose, rotate, scale
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.gaze_on_face import gaze_point_on_face
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.description.head_shape import measures_of
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
@@ -37,13 +37,13 @@ class HeadPlace(NamedTuple):
     p_m: Vec3
 
     @classmethod
-    def of(cls, numbers: Sequence[float]) -> "HeadPlace":
-        """Return the place that ``numbers`` gave."""
+    def from_numbers(cls, numbers: Sequence[float]) -> "HeadPlace":
+        """Return the place that ``as_numbers`` gave."""
         a, b, c, d, e, f, g, h, i, j, k, m = numbers
         return cls(((d, e, f), (g, h, i), (j, k, m)), (a, b, c))
 
     @property
-    def numbers(self) -> tuple[float, ...]:
+    def as_numbers(self) -> tuple[float, ...]:
         """Return it as a recording holds it: the place, then the rows of the rotation."""
         return (*self.p_m, *(number for row in self.R for number in row))
 
@@ -52,18 +52,18 @@ class MutualLooks(NamedTuple):
     """When each of two heads looked at the other: times (n,) in seconds, and whether (n,)."""
 
     t_s: Floats
-    first: Mask
-    second: Mask
+    first_looks: Mask
+    second_looks: Mask
 
 
-class _SeenHead(NamedTuple):
+class _LookingHead(NamedTuple):
     """A head at an instant, in the common world; size: of its face, an adult's being 1."""
 
     eyes_m: Vec3
     gaze: Vec3
     R: Mat3
     nose_m: Vec3
-    size: float
+    face_size: float
 
 
 class MutualGazeTrace:
@@ -76,25 +76,25 @@ class MutualGazeTrace:
 
     def __init__(self, first: HeadPlace, second: HeadPlace) -> None:
         self._places = first, second
-        self._newest: list[_SeenHead | None] = [None, None]
+        self._newest: list[_LookingHead | None] = [None, None]
         self._rows: list[tuple[float, bool, bool]] = []
 
-    def update(self, number: int, tick: Tick) -> None:
+    def update(self, head_number: int, tick: Tick) -> None:
         """Add a tick of the first head (0) or of the other (1)."""
-        place = self._places[number]
+        place = self._places[head_number]
         pose = tick.pose
         middle = scale(add(pose.p_world_eye_left_m, pose.p_world_eye_right_m), 0.5)
         measures = measures_of(pose.p_world_eye_left_m, pose.p_world_eye_right_m)
         nose = add(pose.p_world_head_m, rotate(pose.R_world_head, measures.nose_m))
-        self._newest[number] = _SeenHead(
+        self._newest[head_number] = _LookingHead(
             add(place.p_m, rotate(place.R, middle)),
-            rotate(place.R, cyclopean(tick)),
+            rotate(place.R, cyclopean_direction(tick)),
             compose(place.R, pose.R_world_head),
             add(place.p_m, rotate(place.R, nose)),
             measures.interocular_m / PUPIL_DISTANCE_M,
         )
         first, second = self._newest
-        if number == 0 and first is not None and second is not None:
+        if head_number == 0 and first is not None and second is not None:
             looks = _looks_at(first, second), _looks_at(second, first)
             self._rows.append((tick.t_s, *looks))
 
@@ -127,15 +127,15 @@ def mutual_gaze(t_s: Floats, first: Mask, second: Mask) -> dict[str, object]:
     """
     if len(t_s) < 2:
         return {"seconds": 0.0}
-    first, second = bridged(t_s, first), bridged(t_s, second)
+    first, second = bridge_gaps(t_s, first), bridge_gaps(t_s, second)
     both = first & second
-    episodes = list(zip(*edges(both), strict=True))
+    episodes = list(zip(*interval_edges(both), strict=True))
     whole = [(b, e) for b, e in episodes if b > 0 and e < len(t_s)]
     lengths = np.array([t_s[e] - t_s[b] for b, e in whole])
     by_first = sum(not first[e] for _, e in whole)
     found = []
     for one, other in ((first, second), (second, first)):
-        for begin, end in zip(*edges(one), strict=True):
+        for begin, end in zip(*interval_edges(one), strict=True):
             if begin == 0 or other[begin]:
                 continue
             back = np.flatnonzero(other[begin:end])
@@ -147,39 +147,41 @@ def mutual_gaze(t_s: Floats, first: Mask, second: Mask) -> dict[str, object]:
         "first_looks": _share(first),
         "second_looks": _share(second),
         "both": _share(both),
-        "both_by_chance": _by_chance(first, second),
+        "both_by_chance": _chance_share(first, second),
         "mutual_gazes": len(episodes),
-        "mean_s": _rounded(lengths.mean()) if len(lengths) else None,
-        "median_s": _rounded(np.median(lengths)) if len(lengths) else None,
-        "longest_s": _rounded(max(t_s[e - 1] - t_s[b] for b, e in episodes)) if episodes else None,
+        "mean_s": _round_figure(lengths.mean()) if len(lengths) else None,
+        "median_s": _round_figure(np.median(lengths)) if len(lengths) else None,
+        "longest_s": _round_figure(max(t_s[e - 1] - t_s[b] for b, e in episodes))
+        if episodes
+        else None,
         "ended_by_first": by_first,
         "ended": len(whole),
-        "answered_after_s": _rounded(np.median(answers)) if len(answers) else None,
+        "answered_after_s": _round_figure(np.median(answers)) if len(answers) else None,
         "answers": len(answers),
     }
 
 
-def _looks_at(one: _SeenHead, other: _SeenHead) -> bool:
+def _looks_at(one: _LookingHead, other: _LookingHead) -> bool:
     """Return whether a gaze passes through the oval of a face that it sees from before."""
-    point = on_face(one.eyes_m, one.gaze, other.nose_m, other.R)
+    point = gaze_point_on_face(one.eyes_m, one.gaze, other.nose_m, other.R)
     if point is None:
         return False
     y, z = point
-    size = other.size
+    size = other.face_size
     return (y / (size * HALF_WIDE_M)) ** 2 + (z / (size * HALF_HIGH_M)) ** 2 <= 1.0
 
 
-def edges(mask: Mask) -> tuple[list[int], list[int]]:
+def interval_edges(mask: Mask) -> tuple[list[int], list[int]]:
     """Return the first index of each time it holds, and the one after its last."""
     found = np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
     return found[:, 0].tolist(), found[:, 1].tolist()
 
 
-def bridged(t_s: Floats, mask: Mask) -> Mask:
+def bridge_gaps(t_s: Floats, mask: Mask) -> Mask:
     """Return looks without short gaps, and then without short looks."""
     out = mask.copy()
     for fill in (True, False):
-        begins, ends = edges(~out if fill else out)
+        begins, ends = interval_edges(~out if fill else out)
         for begin, end in zip(begins, ends, strict=True):
             inner = begin > 0 and end < len(out)
             if inner and t_s[end] - t_s[begin] < BRIDGED_S:
@@ -187,15 +189,15 @@ def bridged(t_s: Floats, mask: Mask) -> Mask:
     return out
 
 
-def _by_chance(first: Mask, second: Mask, shifts: int = 50) -> float:
+def _chance_share(first: Mask, second: Mask, shifts: int = 50) -> float:
     """Return the mean share of both when the second's looks are moved around in time."""
     steps = np.linspace(0, len(first), shifts + 2)[1:-1].astype(int)
-    return _rounded(np.mean([np.mean(first & np.roll(second, step)) for step in steps]))
+    return _round_figure(np.mean([np.mean(first & np.roll(second, step)) for step in steps]))
 
 
 def _share(mask: Mask) -> float:
-    return _rounded(np.mean(mask))
+    return _round_figure(np.mean(mask))
 
 
-def _rounded(value: object) -> float:
+def _round_figure(value: object) -> float:
     return round(float(np.asarray(value)), 4)

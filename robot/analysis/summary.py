@@ -52,9 +52,9 @@ class Summary:
             (tick.t_s, tick.pose, tick.target, tick.gaze.phase, tick.guard_result.reasons)
         )
         if len(self._waiting) >= _TOGETHER:
-            self._count()
+            self._count_waiting_ticks()
 
-    def _count(self) -> None:
+    def _count_waiting_ticks(self) -> None:
         """Count the ticks that wait."""
         for t_s, pose, target, phase, reasons in self._waiting:
             dt_s = t_s - self._counted_s if self._counted_s is not None else 0.0
@@ -82,7 +82,7 @@ class Summary:
 
     def figures(self) -> dict[str, object]:
         """Return the figures of the ticks; the caller adds bus, loop and frames."""
-        self._count()
+        self._count_waiting_ticks()
         last = self._last
         return {
             "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
@@ -102,7 +102,7 @@ class Summary:
         }
 
 
-def cyclopean(tick: Tick) -> Vec3:
+def cyclopean_direction(tick: Tick) -> Vec3:
     """Return the mean of both measured lines of sight: a unit vector in the world."""
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
 

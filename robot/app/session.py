@@ -308,11 +308,11 @@ class Session:
         if not face_gaze.points_face_m:
             self._say(f"no heat map in {out}: no face was looked at")
             return None
-        from gazerig.robot.analysis.heatmap import heatmap  # with a face detector
+        from gazerig.robot.analysis.heatmap import write_heatmap  # with a face detector
 
         points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
         try:
-            heatmap(points, seconds, out, options.heatmap_face, options.force)
+            write_heatmap(points, seconds, out, options.heatmap_face, options.force)
         except SetupError as error:  # the figures of the run are still available
             self._say(str(error))
             return out

@@ -49,14 +49,14 @@ class Thing(NamedTuple):
 class Event(NamedTuple):
     """An event in a round, and the gaze that a person would show.
 
-    asks: "look": be on the target between start and end; "return": be on it again by the end
+    response: "look": be on the target between start and end; "return": be on it again by the end
     kind: kind of the target, within ``within_m`` of ``place_world_m``
     start_s, end_s: from the start of the round
     due_s: arrival of a punch; None for all other events
     """
 
     name: str
-    asks: Literal["look", "return"]
+    response: Literal["look", "return"]
     kind: str
     start_s: float
     end_s: float

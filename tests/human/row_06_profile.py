@@ -32,8 +32,8 @@ WANTED = {
 def inside(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return for (n, 3) amplitudes, durations, peaks whether peak and duration are people's."""
     size, ms, peak = rows.T[:3]
-    fast = (people.slowest_peak(size) <= peak) & (peak <= people.fastest_peak(size))
-    long = (people.shortest_ms(size) <= ms) & (ms <= people.longest_ms(size))
+    fast = (people.lowest_peak_deg_s(size) <= peak) & (peak <= people.highest_peak_deg_s(size))
+    long = (people.shortest_duration_ms(size) <= ms) & (ms <= people.longest_duration_ms(size))
     return fast, long
 
 
@@ -61,7 +61,7 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         "scenes, peak inside its band, share": float(np.mean(scene_fast)),
         "scenes, duration inside its band, share": float(np.mean(scene_long)),
         "time of the peak less people's, up to 10 deg, median": float(
-            np.median(small[:, 3] - people.peak_at(small[:, 0]))
+            np.median(small[:, 3] - people.acceleration_share(small[:, 0]))
         ),
         "time of the peak, 18-30 deg": float(np.median(large[:, 3])),
         **{f"time of the peak, {size:g} deg": peak_time(size) for size in (10.0, 20.0)},

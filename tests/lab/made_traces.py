@@ -6,7 +6,7 @@ from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
 from gazerig.features.lab.report.report import findings_of
 from gazerig.features.lab.report.statistics import MeasureResult
 from gazerig.robot.analysis.blink_finder import BlinkEvent
-from gazerig.robot.analysis.event_detector import Commanded, SaccadeEvent
+from gazerig.robot.analysis.event_detector import CommandedSaccade, SaccadeEvent
 
 EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
 
@@ -18,7 +18,7 @@ def verdicts(run: GazeTrace) -> dict[str, MeasureResult]:
 def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -> GazeTrace:
     """Make a run of saccades: amplitude, duration in ms, peak, time of the peak."""
     every = tuple(
-        SaccadeEvent(0.4 * n, d / 1e3, a, v, at, Commanded(0.4 * n, d / 1e3, a, v))
+        SaccadeEvent(0.4 * n, d / 1e3, a, v, at, CommandedSaccade(0.4 * n, d / 1e3, a, v))
         for n, (a, d, v, at) in enumerate(saccades)
     )
     shuts = tuple(BlinkEvent(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))

@@ -58,7 +58,7 @@ def test_another_spread_is_found_where_the_middle_is_the_same() -> None:
 
 
 def test_too_few_events_tell_nothing() -> None:
-    few = MeasuredValue("visit", np.full(BY_KEY["visit"].least - 1, 9.0), mean)
+    few = MeasuredValue("visit", np.full(BY_KEY["visit"].min_events - 1, 9.0), mean)
     (found,) = differences_of([few], [rates(0.3, 200, 1)])
     assert found.word == "too few events" and np.isnan(found.difference)
     assert differences_of([few], [MeasuredValue("rate", np.ones(40), mean)]) == ()

@@ -62,10 +62,10 @@ from gazerig.robot.analysis import human_norms as bands
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 from gazerig.robot.analysis.event_detector import (
-    Commanded,
+    CommandedSaccade,
     EventDetector,
     FixationEvent,
-    Jump,
+    MeasuredSaccade,
     SaccadeEvent,
     SaccadeFinder,
 )
@@ -102,7 +102,7 @@ def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: GazeTrace)
                 "below_15", "peak_small", "rest_error", "left_mm", "right_mm", "in_cone",
                 "vergence", "vergence_ok"):  # fmt: skip
         assert seen[key].verdict == "pass", seen[key]
-        assert seen[key].measured.events >= seen[key].band.least
+        assert seen[key].measured.events >= seen[key].band.min_events
         assert seen[key].low95 <= seen[key].value <= seen[key].high95
 
 
@@ -139,9 +139,9 @@ def human_saccades(faster: float = 1.0, longer: float = 1.0) -> list[tuple[float
     """Return saccades as people make them, or faster or longer ones."""
     dice = np.random.default_rng(3)
     sizes = np.concatenate([dice.uniform(1.5, 7.9, 40), dice.uniform(13.0, 40.0, 40)])
-    peak = faster * 0.5 * (human.slowest_peak(sizes) + human.fastest_peak(sizes))
-    duration = longer * 0.5 * (human.shortest_ms(sizes) + human.longest_ms(sizes))
-    return list(zip(sizes, duration, peak, human.peak_at(sizes), strict=True))
+    peak = faster * 0.5 * (human.lowest_peak_deg_s(sizes) + human.highest_peak_deg_s(sizes))
+    duration = longer * 0.5 * (human.shortest_duration_ms(sizes) + human.longest_duration_ms(sizes))
+    return list(zip(sizes, duration, peak, human.acceleration_share(sizes), strict=True))
 
 
 def test_the_bands_of_the_main_sequence_cut_on_both_sides() -> None:
@@ -164,7 +164,7 @@ def test_blinks_of_a_human_shape_pass_and_are_counted_by_the_minute() -> None:
 
 def test_too_few_events_are_no_pass_and_nothing_is_too_few() -> None:
     band = bands.BY_KEY["rate"]
-    ones = np.full(band.least - 1, 0.4)
+    ones = np.full(band.min_events - 1, 0.4)
     few = judge(MeasuredValue("rate", ones, mean), band)
     assert few.verdict == "too few events" and np.isnan(few.low95)
     assert {finding.verdict for finding in findings_of(EMPTY)} == {"too few events"}
@@ -195,7 +195,7 @@ def test_every_measure_has_its_band_and_every_band_its_source(walking: GazeTrace
     for mode in ("talk", "listen", "think", "none"):
         assert any(bands.applies(band, mode) for band in bands.BANDS if band.mode)
     for band in bands.BANDS:
-        assert band.low < band.high and band.least >= 1 and band.group in bands.GROUPS
+        assert band.low < band.high and band.min_events >= 1 and band.group in bands.GROUPS
         assert re.search(r"\d{4}|Nakamoto|Mitake|the same|healthy|log-normal|stare|fixations",
                          band.source), band.key  # fmt: skip
 
@@ -205,13 +205,15 @@ def test_people_are_as_published() -> None:
     assert walk.order == PARTS
     assert walk.dwell_mean_s == human.DWELL_MEAN_S and walk.dwell_sd_s == human.DWELL_SD_S
     rows = np.array(walk.matrix)
-    assert human.matrix() == pytest.approx(rows / rows.sum(axis=1, keepdims=True))
+    assert human.transition_matrix() == pytest.approx(rows / rows.sum(axis=1, keepdims=True))
     share = [0.0654, 0.1146, 0.0580, 0.1077, 0.2012, 0.1073, 0.2892, 0.0566]
     assert face.human_share() == pytest.approx(share, abs=2e-4)
     visits = [0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165]
-    assert human.visit_s(human.matrix(), human.DWELL_MEAN_S) == pytest.approx(visits, abs=1e-3)
-    assert human.head_deg([20.0, 40.0, 80.0]) == pytest.approx([1.6, 17.0, 47.8], abs=0.1)
-    assert human.evoked_blink([17.0, 33.0]) == pytest.approx([0.5, 0.97], abs=0.01)
+    assert human.mean_visit_s(human.transition_matrix(), human.DWELL_MEAN_S) == pytest.approx(
+        visits, abs=1e-3
+    )
+    assert human.mean_head_deg([20.0, 40.0, 80.0]) == pytest.approx([1.6, 17.0, 47.8], abs=0.1)
+    assert human.evoked_blink_probability([17.0, 33.0]) == pytest.approx([0.5, 0.97], abs=0.01)
     assert published_walk().share(np.random.default_rng(0)) == pytest.approx(share, abs=0.02)
 
 
@@ -232,7 +234,7 @@ def fixed(parts: list[int], seconds: float = 0.3) -> GazeTrace:
 
 
 def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
-    dice, steps = np.random.default_rng(5), human.visit_matrix(human.matrix())
+    dice, steps = np.random.default_rng(5), human.visit_matrix(human.transition_matrix())
     parts = [0]
     for _ in range(600):
         parts.append(int(dice.choice(8, p=steps[parts[-1]])))
@@ -463,7 +465,7 @@ def at(yaw_deg: float) -> Vec3:
     return cos(radians(yaw_deg)), sin(radians(yaw_deg)), 0.0
 
 
-def jumps(yaw_deg: np.ndarray, rate_hz: float) -> list[Jump]:
+def jumps(yaw_deg: np.ndarray, rate_hz: float) -> list[MeasuredSaccade]:
     finder = SaccadeFinder()
     found = (finder.update(k / rate_hz, at(float(yaw))) for k, yaw in enumerate(yaw_deg))
     return [jump for jump in found if jump is not None]
@@ -499,7 +501,7 @@ def test_every_jump_is_found_with_its_size_time_and_speed(rate_hz: float) -> Non
         low = 0.8 if rate_hz == 100.0 else 0.92
         peak = np.degrees(law.peak_speed_rad_s(size))
         assert low * peak - 5.0 < jump.peak_deg_s < 1.1 * peak + 12.0
-        assert jump.peak_at == pytest.approx(0.5, abs=0.12)
+        assert jump.peak_share == pytest.approx(0.5, abs=0.12)
 
 
 @pytest.mark.parametrize("slow_deg_s", [10.0, 25.0, 45.0])
@@ -516,7 +518,7 @@ def test_an_early_peak_is_told_from_a_symmetric_one() -> None:
     t = np.arange(0.0, 0.6, 0.005)
     yaw = np.degrees([law.displacement_rad(radians(40.0), s - 0.25) for s in t])
     (jump,) = jumps(yaw, 200.0)
-    assert jump.peak_at < 0.46
+    assert jump.peak_share < 0.46
 
 
 def test_noise_and_a_gap_make_no_saccade() -> None:
@@ -582,7 +584,7 @@ def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: Gaze
     assert 0.0 < np.median(late_s) < 0.03  # the servos' lag
     ratio = [s.amplitude_deg / s.commanded.amplitude_deg for s in found if s.commanded]
     assert np.median(ratio) == pytest.approx(1.0, abs=0.08)
-    parts = [f.part == f.wanted for f in gathered.fixations if f.wanted is not None]
+    parts = [f.part == f.target_part for f in gathered.fixations if f.target_part is not None]
     assert np.mean(parts) > 0.95
     assert all(f.duration_s > 0.03 for f in gathered.fixations)
 
@@ -651,7 +653,7 @@ def flown(
         rows[(t >= onset) & (t < onset + 0.05), column["phase"]] = 1.0
         size = abs(end - start)
         events.append(
-            SaccadeEvent(onset, 0.05, size, 300.0, 0.4, Commanded(onset, 0.05, size, 300.0))
+            SaccadeEvent(onset, 0.05, size, 300.0, 0.4, CommandedSaccade(onset, 0.05, size, 300.0))
         )
     rows[:, column["gaze_yaw"]] = gaze
     return GazeTrace(rows, tuple(events), (), ())

@@ -541,7 +541,7 @@ CLAIMS = (
     Mutant("drivers/serial/port.py", "        if now not in (None, lasting):", "        if False:",
            "another adaptor under its name is opened",
            ("host_lateness::test_an_adaptor_is_found_again_under_another_name_and_no_other_is_taken_for_it",), ("A17",)),
-    Mutant("robot/analysis/behaviour_score.py", '"seen": sum(answer.seen for answer in answers)', '"seen": 0',
+    Mutant("robot/analysis/behaviour_score.py", '"seen": sum(answer.seen for answer in outcomes)', '"seen": 0',
            "no event counts as seen",
            ("behaviours::test_e46_a_the_fist_of_a_punch_is_looked_at_and_guarded_against",), ("M 1, 3.1: five required behaviours",)),
     Mutant("robot/control/loop.py",

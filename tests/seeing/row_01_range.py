@@ -16,7 +16,7 @@ from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import Camera, Detections, MovingBlob
 from gazerig.gaze.angles import add, angle_between, norm, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
@@ -218,7 +218,9 @@ def _believed(made: Assembly, ticks: list[Tick], size: tuple[int, int]) -> Belie
         rel[:, 2] > 0.0,
         np.array([degrees(t.pose.eye_right_rad[0] - t.pose.eye_left_rad[0]) for t in ticks]),
         ahead & (pixels >= 0.0).all(axis=1) & (pixels <= np.array(size) - 1.0).all(axis=1),
-        np.degrees([angle_between(sub(t.target.p_world_m, _eye(t)), cyclopean(t)) for t in ticks]),
+        np.degrees(
+            [angle_between(sub(t.target.p_world_m, _eye(t)), cyclopean_direction(t)) for t in ticks]
+        ),
     )
 
 
@@ -229,7 +231,7 @@ def _eye(tick: Tick) -> Vec3:
 def _gaze_point(tick: Tick) -> Vec3:
     """Return where the measured eyes look, as far away as what they look at."""
     eye = _eye(tick)
-    return add(eye, scale(cyclopean(tick), norm(sub(tick.target.p_world_m, eye))))
+    return add(eye, scale(cyclopean_direction(tick), norm(sub(tick.target.p_world_m, eye))))
 
 
 def measure(full: bool) -> dict[str, float]:

@@ -19,7 +19,7 @@ from seeing.material import at_hand, carphone, in_package
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Face, Vec3
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
@@ -76,7 +76,7 @@ class Share(NamedTuple):
 def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
     """Return how far beside the outline of a face the measured gaze is."""
     way = sub(face.p_world_m, eye)
-    off = acos(max(-1.0, min(1.0, dot(cyclopean(tick), unit(way)))))
+    off = acos(max(-1.0, min(1.0, dot(cyclopean_direction(tick), unit(way)))))
     return degrees(off - atan(FACE_M / norm(way)))
 
 

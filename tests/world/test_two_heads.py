@@ -169,10 +169,10 @@ def test_two_recordings_report_the_figures_of_the_run(tmp_path: Path) -> None:
 def test_the_report_refuses_a_head_that_was_alone_and_one_head_twice() -> None:
     report = pytest.importorskip("gazerig.features.lab.report.heads").mutual_gaze_report
     here, there = HeadPlace(IDENTITY, (0.0, 0.0, 0.0)), HeadPlace(IDENTITY, (1.0, 0.0, 0.0))
-    assert HeadPlace.of(there.numbers) == there
+    assert HeadPlace.from_numbers(there.as_numbers) == there
     with pytest.raises(SetupError, match="^b is from a run with one head"):
-        report(((), ()), (here.numbers, ()), ("a", "b"))
+        report(((), ()), (here.as_numbers, ()), ("a", "b"))
     with pytest.raises(SetupError, match="are from the same head"):
-        report(((), ()), (here.numbers, here.numbers), ("a", "b"))
+        report(((), ()), (here.as_numbers, here.as_numbers), ("a", "b"))
     with pytest.raises(SetupError, match="no time in common"):
-        report(((), ()), (here.numbers, there.numbers), ("a", "b"))
+        report(((), ()), (here.as_numbers, there.as_numbers), ("a", "b"))

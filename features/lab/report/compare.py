@@ -118,7 +118,7 @@ def differences_of(
     """Compare the measures that both runs have."""
     theirs = {measure.key: measure for measure in b}
     pairs = [(m, theirs[m.key]) for m in a if m.key in theirs]
-    enough = {m.key for m, n in pairs if min(m.events, n.events) >= BY_KEY[m.key].least}
+    enough = {m.key for m, n in pairs if min(m.events, n.events) >= BY_KEY[m.key].min_events}
     rng = np.random.default_rng(_SEED)
     chances = {m.key: chance(m, n, rng) for m, n in pairs if m.key in enough}
     shapes = {m.key: chance_of_shape(m, n) for m, n in pairs if m.key in enough}

@@ -145,7 +145,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     usual = (4.0 / 3.0 * turns[:, 0] / 50.0 + 0.4) * 60.0
     return [
         MeasuredValue("head_slope", beyond, _slope),
-        MeasuredValue("head_share", large[:, 1] - human.head_deg(large[:, 0]), median),
+        MeasuredValue("head_share", large[:, 1] - human.mean_head_deg(large[:, 0]), median),
         MeasuredValue("head_after", after[np.isfinite(after)], median),
         MeasuredValue("head_peak", turns[:, 1] / usual, median),
         MeasuredValue("head_roll", rolls(run), median),

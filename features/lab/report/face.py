@@ -92,7 +92,7 @@ def human_share() -> Floats:
 
     Figures of bootstrap samples need it thousands of times, so it is computed once.
     """
-    out = human.time_share(human.matrix(), human.DWELL_MEAN_S)
+    out = human.time_share(human.transition_matrix(), human.DWELL_MEAN_S)
     out.setflags(write=False)
     return out
 
@@ -106,7 +106,7 @@ def points(run: GazeTrace) -> Floats:
     rows = []
     for f in run.fixations:
         rested = run.between(f.start_s + _SETTLED_S, f.end_s)
-        if f.kind != "face" or not np.isfinite(y[rested]).any():
+        if f.target_kind != "face" or not np.isfinite(y[rested]).any():
             continue
         rows.append((np.nanmedian(y[rested]), np.nanmedian(z[rested]), f.duration_s))
     return np.array(rows).reshape(-1, 3)
@@ -134,10 +134,12 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return the measures of the gaze on faces."""
     parts, moves, seen = on_parts(run), shifts(run), visits(run)
     on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
-    never = human.matrix() == 0.0
+    never = human.transition_matrix() == 0.0
     forbidden = never[moves[:, 0].astype(int), moves[:, 1].astype(int)].astype(float)
     lengths = np.array([visit.end_s - visit.start_s for visit in seen])
-    meant = [(float(f.part is not None), f.duration_s) for f in run.fixations if f.kind == "face"]
+    meant = [
+        (float(f.part is not None), f.duration_s) for f in run.fixations if f.target_kind == "face"
+    ]
     rows = axes(run)
     vergence = rows[:, 6]
     good = (vergence >= -2.5) & (vergence <= 4.5)
@@ -168,7 +170,7 @@ def axes(run: GazeTrace) -> Floats:
     due = run.column("vergence") - run.column("vergence_due")
     table = np.column_stack([run.columns(*names), due])
     parts = [table[run.between(f.start_s + _SETTLED_S, f.end_s)] for f in run.fixations
-             if f.kind == "face"]  # fmt: skip
+             if f.target_kind == "face"]  # fmt: skip
     rows = [np.median(part, axis=0) for part in parts if len(part)]
     found = np.array(rows).reshape(-1, 7)
     return np.asarray(found[np.isfinite(found).all(axis=1)])
@@ -185,7 +187,7 @@ def _transition_difference(rows: Floats) -> float:
     total = counts.sum(axis=1)
     here = total > 0.0
     ours = counts[here] / total[here, None]
-    apart = 0.5 * np.abs(ours - human.visit_matrix(human.matrix())[here]).sum(axis=1)
+    apart = 0.5 * np.abs(ours - human.visit_matrix(human.transition_matrix())[here]).sum(axis=1)
     return float(np.average(apart, weights=total[here]))
 
 
@@ -247,7 +249,7 @@ def published_walk() -> ReferenceWalk:
     """Return the walk of Nakamoto & Tsuruno, eq 1 and table 1."""
     table = zip(human.DWELL_MEAN_S, human.DWELL_SD_S, strict=True)
     return ReferenceWalk(
-        human.matrix(), [dwell_distribution("lognormal", mean, sd) for mean, sd in table]
+        human.transition_matrix(), [dwell_distribution("lognormal", mean, sd) for mean, sd in table]
     )
 
 

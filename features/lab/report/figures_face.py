@@ -22,7 +22,7 @@ from gazerig.features.lab.report.plotting import (
 )
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.heatmap import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.analysis.heatmap import HEIGHT_PX, WIDTH_PX, canvas_pixels, draw_face
 from gazerig.robot.analysis.human_norms import FACE
 
 _NAMES = [PART_NAMES[part] for part in PARTS]
@@ -33,9 +33,9 @@ def _time_share(figure: Figure, runs: Sequence[Shown]) -> None:
     shares, lengths = figure.subplots(1, 2)
     places = np.arange(len(PARTS))
     wide = 0.8 / (len(runs) + 1)
-    steps = human.matrix()
+    steps = human.transition_matrix()
     shares.bar(places, face.human_share(), wide, color=HUMAN, label="Nakamoto & Tsuruno")
-    lengths.bar(places, human.visit_s(steps, human.DWELL_MEAN_S), wide, color=HUMAN)
+    lengths.bar(places, human.mean_visit_s(steps, human.DWELL_MEAN_S), wide, color=HUMAN)
     for n, shown in enumerate(runs, start=1):
         at = places + n * wide
         parts = face.on_parts(shown.run)
@@ -97,7 +97,7 @@ def _below(values: Floats, grid: Floats) -> Floats:
 
 def _transitions(figure: Figure, runs: Sequence[Shown]) -> None:
     panels = figure.subplots(1, 1 + len(runs))
-    theirs = human.visit_matrix(human.matrix())
+    theirs = human.visit_matrix(human.transition_matrix())
     _matrix(panels[0], theirs, "Nakamoto & Tsuruno")
     for axes, shown in zip(panels[1:], runs, strict=True):
         moves = face.shifts(shown.run)
@@ -138,8 +138,8 @@ def _heat(figure: Figure, runs: Sequence[Shown]) -> None:
 
 def _map(axes: Axes, density: Floats, title: str) -> None:
     y, z = face.GRID_M
-    left, top = on_canvas(np.array([[y[0], z[-1]]]))[0]
-    right, bottom = on_canvas(np.array([[y[-1], z[0]]]))[0]
+    left, top = canvas_pixels(np.array([[y[0], z[-1]]]))[0]
+    right, bottom = canvas_pixels(np.array([[y[-1], z[0]]]))[0]
     axes.imshow(draw_face()[..., ::-1])
     shade = density / density.max()
     axes.imshow(shade[::-1], extent=(left, right, bottom, top), cmap="plasma",

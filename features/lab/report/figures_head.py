@@ -29,7 +29,7 @@ def _contribution(figure: Figure, runs: Sequence[Shown]) -> None:
     least = slow * np.maximum(0.0, aside - free - human.STAHL_FREE_SD_DEG)
     most = fast * np.maximum(0.0, aside - free + human.STAHL_FREE_SD_DEG)
     amount.fill_between(aside, least, most, color=HUMAN_FILL, lw=0, zorder=0)
-    amount.plot(aside, human.head_deg(aside), color=HUMAN, lw=1.6, label="people (Stahl 1999)")
+    amount.plot(aside, human.mean_head_deg(aside), color=HUMAN, lw=1.6, label="people (Stahl 1999)")
     amount.plot(aside, aside, color="#b0b7bb", lw=0.8, ls=":")
     latency.axhspan(-100.0, 140.0, color=HUMAN_FILL, lw=0, zorder=0)
     for shown in runs:

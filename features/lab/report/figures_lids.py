@@ -99,7 +99,9 @@ def _when(figure: Figure, runs: Sequence[Shown]) -> None:
                 evoked.annotate(f"{len(here)}", (here[:, 0].mean(), here[:, 1].mean()), (4, 4),
                                 textcoords="offset points", fontsize=8, color=HUMAN)  # fmt: skip
     a = np.linspace(0.0, 60.0, 80)
-    evoked.plot(a, human.evoked_blink(a), color=HUMAN, lw=1.5, label="Evinger et al. 1994")
+    evoked.plot(
+        a, human.evoked_blink_probability(a), color=HUMAN, lw=1.5, label="Evinger et al. 1994"
+    )
     evoked.set_ylim(-0.03, 1.06)
     label(gaps, "time between blinks, s (15 and more at the end)", "share", "intervals")
     label(evoked, "gaze shift, deg (number: saccades)", "share with a blink", "with gaze shifts")

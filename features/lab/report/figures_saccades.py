@@ -48,8 +48,8 @@ def _main_sequence(figure: Figure, runs: Sequence[Shown]) -> None:
     tables = [saccades.table(shown.run) for shown in runs]
     most = max((float(table[:, 0].max()) for table in tables if len(table)), default=10.0)
     a = np.linspace(0.3, max(8.0, 1.08 * most), 120)
-    _human(peaks, a, human.slowest_peak(a), human.fastest_peak(a))
-    _human(durations, a, human.shortest_ms(a), human.longest_ms(a))
+    _human(peaks, a, human.lowest_peak_deg_s(a), human.highest_peak_deg_s(a))
+    _human(durations, a, human.shortest_duration_ms(a), human.longest_duration_ms(a))
     for shown, table in zip(runs, tables, strict=True):
         asked = saccades.commanded_table(shown.run)
         style = {"s": 9, "alpha": 0.45, "lw": 0}
@@ -86,7 +86,7 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
         sizes.hist(np.minimum(size, 40.0), bins, weights=weights, histtype="step", lw=1.6,
                    color=shown.colour, label=f"{shown.name} ({len(size)})")  # fmt: skip
     a = np.linspace(0.0, 1.05 * most, 60)
-    expected = human.peak_at(a)
+    expected = human.acceleration_share(a)
     skew.fill_between(a, expected - 0.08, expected + 0.08, color=HUMAN_FILL, lw=0, zorder=0)
     skew.plot(a, expected, color=HUMAN, lw=1.4, label="people (Collewijn 1988)")
     skew.axhline(0.5, color="#b0b7bb", lw=0.8, ls=":")

@@ -14,16 +14,16 @@ from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
-from gazerig.robot.analysis.blink_finder import LOWER, UPPER, BlinkEvent, openings
+from gazerig.robot.analysis.blink_finder import LOWER, UPPER, BlinkEvent, lid_openings
 from gazerig.robot.analysis.event_detector import (
     NEAR_FACE_M,
     EventDetector,
     FixationEvent,
     SaccadeEvent,
-    beside_m,
+    miss_distance_m,
 )
-from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.gaze_on_face import gaze_point_on_face
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Ask
@@ -235,7 +235,7 @@ class GazeTraceBuilder:
         if not tick.stopped:
             self._flat.extend(row_of(tick, self._mode))
             gaze = tick.gaze
-            lids = openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
+            lids = lid_openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
             pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
             self._asked_lids.extend((max(lids or (nan,)), degrees(pitch)))
 
@@ -262,7 +262,7 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
     pose, target, names = tick.pose, tick.target, tick.guard_result.joints
     head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m
     sight_left, sight_right = line_of_sight(pose, True), line_of_sight(pose, False)
-    way = cyclopean(tick)
+    way = cyclopean_direction(tick)
     moved = scale(target.v_world_m_s, min(max(0.0, tick.t_s - target.at_s), _LONGEST_FORESEEN_S))
     point = add(target.p_world_m, moved)
     rel = sub(point, head)
@@ -283,10 +283,10 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
         moved = scale(face[0].v_world_m_s, since_s)
         centre = add(add(face[0].p_world_m, moved), scale(ahead, PLANE_M))
         if dot(way, sub(centre, head)) > 0.0:
-            gaze_at = on_face(head, way, centre, R) or gaze_at
+            gaze_at = gaze_point_on_face(head, way, centre, R) or gaze_at
         if target.kind == "face":
-            on_left = on_face(left, sight_left, point, R) or on_left
-            on_right = on_face(right, sight_right, point, R) or on_right
+            on_left = gaze_point_on_face(left, sight_left, point, R) or on_left
+            on_right = gaze_point_on_face(right, sight_right, point, R) or on_right
     eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
     turned = head_in_space(pose)
     return TraceRow(
@@ -299,8 +299,8 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
         degrees(angle_between(sight_right, sub(point, right))),
         1e3 * on_left[0], 1e3 * on_left[1], 1e3 * on_right[0], 1e3 * on_right[1],
         gaze_at[0], gaze_at[1], off_deg, float(seen),
-        max(openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
-        max(openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
+        max(lid_openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
+        max(lid_openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
         PHASES.index(tick.gaze.phase),
         float(target.kind == "face"), float(target.kind in _IDLE),
         float(any("eye" in limited.axis for limited in tick.gaze.limited)), target.shift, mode,
@@ -331,5 +331,5 @@ def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
         return None, False
     since_s = min(max(0.0, tick.t_s - captured_s), _LONGEST_FORESEEN_S)
     centre = add(found.p_world_m, scale(found.v_world_m_s, since_s))
-    seen = beside_m(way, sub(centre, tick.pose.p_world_head_m)) <= NEAR_FACE_M
+    seen = miss_distance_m(way, sub(centre, tick.pose.p_world_head_m)) <= NEAR_FACE_M
     return (found, captured_s), seen

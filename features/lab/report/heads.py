@@ -12,8 +12,8 @@ from gazerig.robot.analysis.mutual_gaze import (
     HeadPlace,
     MutualGazeTrace,
     MutualLooks,
-    bridged,
-    edges,
+    bridge_gaps,
+    interval_edges,
     mutual_gaze,
 )
 from gazerig.robot.control.tick import Tick
@@ -126,7 +126,7 @@ def mutual_gaze_report(
         raise SetupError(
             f"{names[0]} and {names[1]} are from the same head: --with takes the other's"
         )
-    trace = MutualGazeTrace(HeadPlace.of(stands[0]), HeadPlace.of(stands[1]))
+    trace = MutualGazeTrace(HeadPlace.from_numbers(stands[0]), HeadPlace.from_numbers(stands[1]))
     both = merge(
         ((tick.t_s, 0, tick) for tick in ticks[0]),
         ((tick.t_s, 1, tick) for tick in ticks[1]),
@@ -144,14 +144,17 @@ def mutual_gaze_report(
 def _timeline(figure: Figure, looks: MutualLooks, names: tuple[str, str]) -> None:
     """Draw the looks of both heads over time."""
     axes = figure.subplots()
-    first, second = bridged(looks.t_s, looks.first), bridged(looks.t_s, looks.second)
+    first, second = (
+        bridge_gaps(looks.t_s, looks.first_looks),
+        bridge_gaps(looks.t_s, looks.second_looks),
+    )
     rows = ((first, COLOURS[0]), (first & second, _BOTH_GREEN), (second, COLOURS[1]))
     for row, (mask, colour) in enumerate(rows):
         t_s = looks.t_s
         axes.broken_barh(
             [
                 (float(t_s[begin] - t_s[0]), float(t_s[min(end, len(t_s) - 1)] - t_s[begin]))
-                for begin, end in zip(*edges(mask), strict=True)
+                for begin, end in zip(*interval_edges(mask), strict=True)
             ],
             (row - 0.36, 0.72),
             facecolors=colour,

@@ -192,7 +192,7 @@ def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
         interval,
         number(asked) if isfinite(asked) else "",
         band_text(band),
-        f"{finding.measured.events} of {band.least}"
+        f"{finding.measured.events} of {band.min_events}"
         if finding.verdict == "too few events"
         else f"{finding.measured.events}",
         finding.verdict,

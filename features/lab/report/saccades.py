@@ -31,7 +31,7 @@ def table(run: GazeTrace) -> Floats:
     Only commanded saccades count: a servo that swings back makes none.
     """
     rows = [
-        (s.amplitude_deg, 1e3 * s.duration_s, s.peak_deg_s, s.peak_at)
+        (s.amplitude_deg, 1e3 * s.duration_s, s.peak_deg_s, s.peak_share)
         for s in run.saccades
         if s.commanded is not None and s.amplitude_deg >= LEAST_DEG
     ]
@@ -55,7 +55,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     ends = np.array([s.end_s for s in run.saccades if s.commanded is not None])
     pauses = onsets[1:] - ends[:-1]
     pauses = pauses[pauses < _PAUSE_S]
-    skew = seen[:, 3] - human.peak_at(seen[:, 0])
+    skew = seen[:, 3] - human.acceleration_share(seen[:, 0])
     return [
         *(_share_inside(seen, asked, *curves) for curves in _CURVES),
         MeasuredValue("skew", skew, median),
@@ -68,10 +68,31 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
 
 
 _CURVES = (
-    ("peak_small", LEAST_DEG, _SMALL_PEAK_DEG, 2, human.slowest_peak, human.fastest_peak),
-    ("peak_large", _SMALL_PEAK_DEG, 999.0, 2, human.slowest_peak, human.fastest_peak),
-    ("duration_small", LEAST_DEG, _SMALL_DURATION_DEG, 1, human.shortest_ms, human.longest_ms),
-    ("duration_large", _SMALL_DURATION_DEG, 999.0, 1, human.shortest_ms, human.longest_ms),
+    (
+        "peak_small",
+        LEAST_DEG,
+        _SMALL_PEAK_DEG,
+        2,
+        human.lowest_peak_deg_s,
+        human.highest_peak_deg_s,
+    ),
+    ("peak_large", _SMALL_PEAK_DEG, 999.0, 2, human.lowest_peak_deg_s, human.highest_peak_deg_s),
+    (
+        "duration_small",
+        LEAST_DEG,
+        _SMALL_DURATION_DEG,
+        1,
+        human.shortest_duration_ms,
+        human.longest_duration_ms,
+    ),
+    (
+        "duration_large",
+        _SMALL_DURATION_DEG,
+        999.0,
+        1,
+        human.shortest_duration_ms,
+        human.longest_duration_ms,
+    ),
 )
 """Measures by human curves: key, smallest and largest amplitude in deg, column, lower and upper
 curve over amplitudes."""

@@ -109,7 +109,7 @@ def judge_without_interval(measured: MeasuredValue, band: NormBand) -> MeasureRe
     """Compare a figure with its pass band, without an interval; too few events do not pass."""
     value = figure(measured.of, measured.rows)
     verdict: VerdictWord = "outside"
-    if measured.events < band.least or not isfinite(value):
+    if measured.events < band.min_events or not isfinite(value):
         verdict = "too few events"
     elif band.low <= value <= band.high:
         verdict = "pass"

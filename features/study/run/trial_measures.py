@@ -24,10 +24,10 @@ from gazerig.features.study.journal import (
 from gazerig.features.study.run.study_file import LoadedStudy
 from gazerig.features.study.scores import GAZE_MEASURES
 from gazerig.gaze.angles import add, norm, scale, sub
-from gazerig.robot.analysis.gaze_on_face import on_face
+from gazerig.robot.analysis.gaze_on_face import gaze_point_on_face
 from gazerig.robot.analysis.human_norms import BY_KEY
 from gazerig.robot.analysis.mutual_gaze import HALF_HIGH_M, HALF_WIDE_M
-from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.analysis.summary import cyclopean_direction
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording.read import RunRecording, used
 
@@ -124,7 +124,7 @@ def participant_gaze_measures(ticks: Sequence[Tick], from_s: float) -> dict[str,
             looks += 1
             elapsed_s = max(0.0, tick.t_s - tick.percept.captured_s)
             p_m = add(face.p_world_m, scale(face.v_world_m_s, elapsed_s))
-            point = on_face(head_m, cyclopean(tick), p_m, face.R_world_face)
+            point = gaze_point_on_face(head_m, cyclopean_direction(tick), p_m, face.R_world_face)
             if point is not None:  # inside the oval of the face
                 both += (point[0] / HALF_WIDE_M) ** 2 + (point[1] / HALF_HIGH_M) ** 2 <= 1.0
             first_s = first_s if isfinite(first_s) else tick.t_s - from_s

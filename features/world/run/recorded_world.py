@@ -46,7 +46,7 @@ def recorded_shapes(info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
         hint = extra_hint("mujoco", "world", ModuleNotFoundError(name="mujoco"))
         raise SetupError(f"the room is not shown: {hint}")
     shapes = script_shapes(Figures(_script(info), info.seed))
-    return ShapesFrom(shapes, RigFrame(*HeadPlace.of(stands))) if stands else shapes
+    return ShapesFrom(shapes, RigFrame(*HeadPlace.from_numbers(stands))) if stands else shapes
 
 
 def _script(info: WorldInfo) -> SceneScript:

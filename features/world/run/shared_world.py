@@ -143,7 +143,7 @@ class SimulatedWorld:
     def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
         """Return the world from the view of one of the heads."""
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands = HeadPlace(*self.frames[number]).numbers
+        stands = HeadPlace(*self.frames[number]).as_numbers
         return simulated_room(
             rig, options, self._lockstep.clock(number), world, self._world, stands
         )
@@ -192,7 +192,7 @@ class RealTimeWorld:
         # Other heads use the world until ``close`` ends it.
         served = ServedRig(self._buses, self._paths[number], lambda: None)
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands = HeadPlace(*self.frames[number]).numbers
+        stands = HeadPlace(*self.frames[number]).as_numbers
         return served_room(rig, options, RealClock(), world, served, stands)
 
     def enter(self, number: int) -> None:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, rotate, scale, unit
 from gazerig.gaze.types import Floats
-from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.analysis.heatmap import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.analysis.gaze_on_face import gaze_point_on_face
+from gazerig.robot.analysis.heatmap import HEIGHT_PX, PX_PER_M, WIDTH_PX, canvas_pixels, draw_face
 from gazerig.robot.model.types import Snapshot
 
 SHRINK = 3
@@ -48,7 +48,7 @@ class GazeMap:
         point = gaze_on_face(snapshot)
         if point is None:
             return
-        column, row = (on_canvas(np.array([point]))[0] / SHRINK).astype(int).tolist()
+        column, row = (canvas_pixels(np.array([point]))[0] / SHRINK).astype(int).tolist()
         if 0 <= column < WIDE_PX and 0 <= row < HIGH_PX:
             self._time[row, column] += snapshot.t_s - last_s
             self.seconds += snapshot.t_s - last_s
@@ -78,7 +78,7 @@ def gaze_on_face(snapshot: Snapshot) -> tuple[float, float] | None:
     centre = add(face.p_world_m, scale(face.v_world_m_s, since_s))
     plane = add(centre, rotate(face.R_world_face, (_PLANE_M, 0.0, 0.0)))
     way = unit(add(*snapshot.gaze_world))
-    return on_face(snapshot.p_world_head_m, way, plane, face.R_world_face)
+    return gaze_point_on_face(snapshot.p_world_head_m, way, plane, face.R_world_face)
 
 
 @cache

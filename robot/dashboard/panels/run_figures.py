@@ -19,10 +19,10 @@ from gazerig.robot.analysis.human_norms import (
     BY_KEY,
     DWELL_MEAN_S,
     NormBand,
-    fastest_peak,
-    longest_ms,
-    shortest_ms,
-    slowest_peak,
+    highest_peak_deg_s,
+    longest_duration_ms,
+    lowest_peak_deg_s,
+    shortest_duration_ms,
 )
 from gazerig.robot.dashboard.widgets.html import (
     LINE_PX,
@@ -69,9 +69,11 @@ class MainSequenceChart:
         fastest, longest = _room(_FASTEST_DEG_S, speeds), _room(_LONGEST_MS, lengths)
         return (
             heading(speed, count_text(self.count, "saccade"))
-            + _image(speed, sizes, speeds, widest, fastest, slowest_peak, fastest_peak)
+            + _image(speed, sizes, speeds, widest, fastest, lowest_peak_deg_s, highest_peak_deg_s)
             + heading(length)
-            + _image(length, sizes, lengths, widest, longest, shortest_ms, longest_ms)
+            + _image(
+                length, sizes, lengths, widest, longest, shortest_duration_ms, longest_duration_ms
+            )
             + note(
                 "grey: people, from Baloh et al. 1975 less 15 % to Bahill et al. 1975 and "
                 "Collewijn et al. 1988 and 15 % (speed); 21 ms + 2.2 ms/deg less a quarter to "
@@ -273,10 +275,10 @@ class RunFigures:
         size = saccade.amplitude_deg
         if size < LEAST_DEG:
             return
-        low, high = float(human.slowest_peak(size)), float(human.fastest_peak(size))
+        low, high = float(human.lowest_peak_deg_s(size)), float(human.highest_peak_deg_s(size))
         key = "peak_small" if size < _SMALL_PEAK_DEG else "peak_large"
         self._count(key, low <= saccade.peak_deg_s <= high)
-        low, high = float(human.shortest_ms(size)), float(human.longest_ms(size))
+        low, high = float(human.shortest_duration_ms(size)), float(human.longest_duration_ms(size))
         key = "duration_small" if size < _SMALL_DURATION_DEG else "duration_large"
         self._count(key, low <= 1e3 * saccade.duration_s <= high)
         self._count("below_15", size < _LARGE_DEG)
@@ -318,8 +320,8 @@ def compare_with_band(figure: RunFigure, band: NormBand) -> str:
 
     As in the report, a measure is not called outside if its distance may be chance.
     """
-    if figure.events < band.least:
-        return f"too few: {figure.events} of {band.least}"
+    if figure.events < band.min_events:
+        return f"too few: {figure.events} of {band.min_events}"
     if band.low <= figure.value <= band.high:
         return "inside"
     if band.unit == "share":
