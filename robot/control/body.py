@@ -9,9 +9,7 @@ from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
-from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.transmission import Line
+from gazerig.robot.model.joint import JointLimit, JointParams, Line
 from gazerig.robot.model.types import JointAngles, JointState, in_order
 
 

@@ -10,7 +10,7 @@ from gazerig.gaze.gesture.expression import Expressions
 from gazerig.gaze.lids.lids import Lids
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import NO_GESTURE, Ask, Command, Express, Jog, Play, SetLevel
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 
 _NEAR_END_RAD = radians(0.05)
 """A slider at the end of a joint's range is rounded to a tenth of a degree."""

@@ -15,7 +15,7 @@ from gazerig.robot.model.gesture_fit import (
     GestureRefused,
     motions,
 )
-from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.leader import NO_GESTURE, GestureState
 from gazerig.robot.model.reply import CommandReply, GestureReply
 from gazerig.robot.model.types import JointAngles

@@ -2,9 +2,8 @@
 
 from gazerig.drivers.errors import BusLost, DriverError, ServoFault, SetupError
 from gazerig.robot.control.body import Body
-from gazerig.robot.model.commands import Resume, Stop
+from gazerig.robot.model.commands import Resume, Stop, StopLatch
 from gazerig.robot.model.reply import CommandReply
-from gazerig.robot.model.stop_latch import StopLatch
 from gazerig.robot.model.types import JointAngles, JointState
 
 _RELEASE_AGAIN_S = 0.5
