@@ -9,12 +9,16 @@ import pytest
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis.heatmap import (
+    HEIGHT_PX,
+    PX_PER_M,
+    WIDTH_PX,
     align_face,
+    canvas_pixels,
     density_s_m2,
+    draw_face,
     share_per_part,
     write_heatmap,
 )
-from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
 MEDIA = Path(__file__).parents[2] / "shared" / "media"
@@ -28,7 +32,7 @@ def shown(out: Path) -> np.ndarray:
 
 
 def colour_at(picture: np.ndarray, part: str) -> tuple[int, int, int]:
-    column, row = np.rint(on_canvas(np.array([PARTS_FACE_M[part][1:]]))[0]).astype(int)
+    column, row = np.rint(canvas_pixels(np.array([PARTS_FACE_M[part][1:]]))[0]).astype(int)
     blue, green, red = picture[row, column].tolist()
     return red, green, blue
 
@@ -51,7 +55,7 @@ def test_density_keeps_the_time_and_lies_where_it_was_looked() -> None:
     assert density.shape == (HEIGHT_PX, WIDTH_PX)
     assert density.sum() / PX_PER_M**2 == pytest.approx(3.5, rel=1e-6)
     row, column = np.unravel_index(density.argmax(), density.shape)
-    assert (column, row) == pytest.approx(tuple(on_canvas(eye)[0]), abs=1.0)
+    assert (column, row) == pytest.approx(tuple(canvas_pixels(eye)[0]), abs=1.0)
     assert column < WIDTH_PX / 2  # the owner's right is at the left of who faces them
 
 
@@ -65,7 +69,7 @@ def test_yellow_is_where_the_gaze_was_longest(tmp_path: Path) -> None:
     assert red > 200 and green > 190 and blue < 90
     red, green, blue = colour_at(picture, "M")
     assert blue > green + 30  # purple
-    plain, column_row = draw_face(), np.rint(on_canvas(CENTRES)).astype(int)
+    plain, column_row = draw_face(), np.rint(canvas_pixels(CENTRES)).astype(int)
     column, row = column_row[PARTS.index("UP")]
     assert (picture[row, column] == plain[row, column]).all()  # as good as never looked at
     assert picture.shape[0] == HEIGHT_PX and picture.shape[1] > WIDTH_PX
@@ -75,7 +79,7 @@ def test_yellow_is_where_the_gaze_was_longest(tmp_path: Path) -> None:
 def test_the_drawn_face_has_its_pupils_where_they_are_looked_for() -> None:
     face = draw_face().astype(int).sum(axis=2)
     for part in ("LE", "RE"):
-        column, row = np.rint(on_canvas(CENTRES[[PARTS.index(part)]])[0]).astype(int)
+        column, row = np.rint(canvas_pixels(CENTRES[[PARTS.index(part)]])[0]).astype(int)
         around = face[row - 60 : row + 61, column - 60 : column + 61]
         dark_rows, dark_columns = np.nonzero(around < 260)
         assert dark_rows.mean() == pytest.approx(60.0, abs=4.0), part
@@ -89,7 +93,7 @@ def test_a_photograph_is_brought_to_the_same_measures(tmp_path: Path) -> None:
     canvas = align_face(photograph)
     assert canvas.shape == (HEIGHT_PX, WIDTH_PX, 3)
     for part in ("LE", "RE"):  # pupils are darker than the cheek below them
-        column, row = np.rint(on_canvas(CENTRES[[PARTS.index(part)]])[0]).astype(int)
+        column, row = np.rint(canvas_pixels(CENTRES[[PARTS.index(part)]])[0]).astype(int)
         eye = canvas[row - 20 : row + 21, column - 20 : column + 21, 0]
         cheek = canvas[row + 90 : row + 130, column - 20 : column + 21, 0]
         assert int(eye.min()) + 60 < float(np.median(cheek)), part

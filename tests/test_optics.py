@@ -10,11 +10,12 @@ from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
+    Sensor,
+    SensorParams,
     expose,
     ideal_size_px,
     through_lens,
 )
-from gazerig.sim_mock.cameras.sensor import Sensor, SensorParams
 
 LEVEL: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 HERE: Vec3 = (0.0, 0.0, 0.0)

@@ -20,11 +20,16 @@ from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
-from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.drivers.vision.face.auto import AutoDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS, PEOPLE, YUNET
+from gazerig.drivers.vision.model_files import (
+    FOLDER_VARIABLE,
+    PALMS,
+    PEOPLE,
+    YUNET,
+    detector_status,
+)
 from gazerig.drivers.vision.people import PeopleDetector, anchors
 from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Target, Vec3
@@ -191,7 +196,7 @@ def test_the_status_names_what_runs_and_what_brings_the_rest(
 ) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(folder))
     monkeypatch.setattr(type(PEOPLE), "is_content", lambda self, content: content == b"right")
-    monkeypatch.setattr("gazerig.drivers.vision.detector_status.find_spec", lambda name: None)
+    monkeypatch.setattr("gazerig.drivers.vision.model_files.find_spec", lambda name: None)
     status = detector_status(FaceDetectorParams(mesh_faces=1))
     assert status.text == "faces by auto (MTCNN alone), people by their faces alone"
     assert status.cure == "gazerig models fetch; pip install 'gazerig[people]'"
@@ -201,7 +206,7 @@ def test_the_status_names_what_runs_and_what_brings_the_rest(
         file.path.write_bytes(b"right")
     lacking = detector_status(FaceDetectorParams())
     assert lacking.cure == "pip install 'gazerig[people]'" and "(YuNet and MTCNN)" in lacking.text
-    monkeypatch.setattr("gazerig.drivers.vision.detector_status.find_spec", lambda name: object())
+    monkeypatch.setattr("gazerig.drivers.vision.model_files.find_spec", lambda name: object())
     assert str(detector_status(FaceDetectorParams())) == (
         "faces by auto (YuNet and MTCNN), people also turned away, palms"
     )

@@ -29,9 +29,9 @@ from gazerig.sim_mock.cameras.draw_person import (
     draw_body,
     draw_head,
     draw_person,
+    draw_room,
     draw_thing,
 )
-from gazerig.sim_mock.cameras.draw_room import draw_room
 from gazerig.sim_mock.cameras.optics import blur_along
 from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams, draw_scene
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing

@@ -27,7 +27,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.loop import run as run_loop
-from gazerig.robot.model import stop_latch
+from gazerig.robot.model import commands
 from gazerig.robot.remote import socket_server
 from gazerig.robot.remote.live_server import LiveServer
 from gazerig.robot.remote.socket_server import RequestRate
@@ -42,7 +42,7 @@ def here(work: Callable[..., Any], *words: Any, **named: Any) -> Any:
 
 def serve(path: Path) -> None:
     """Run until SIGTERM; says what the rig says on standard error."""
-    stop_latch.MIN_HOLD_S = stop_latch.MIN_RESUME_GAP_S = 0.0  # time is slow here
+    commands.MIN_HOLD_S = commands.MIN_RESUME_GAP_S = 0.0  # time is slow here
     # What takes time for the loop's sake is tested where it is done: shares of the processor,
     # files that are read in another process, and a file that is looked at twice a second.
     socket_server.EACH = socket_server.ALL = RequestRate(1.0, 60.0)
