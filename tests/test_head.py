@@ -101,7 +101,7 @@ def test_an_eye_held_aside_is_relieved_slowly() -> None:
         trace.append(now[0])
     moved = np.degrees(np.array(trace))
     assert np.abs(moved[:150]).max() == 0.0
-    assert moved[-1] == pytest.approx(21.0 - 6.0, abs=0.5)
+    assert moved[-1] == pytest.approx(21.0 - 5.0, abs=0.5)
     assert np.abs(np.diff(moved)).max() / 0.005 <= 12.0 + 1e-6
 
 

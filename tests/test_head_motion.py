@@ -83,7 +83,7 @@ def test_recentring_is_late_random_and_slow() -> None:
     assert len(starts) > 20 and min(starts) >= 3.0
     assert 5.0 < np.mean(starts) < 11.0 and np.std(starts) > 1.5
     assert max(peaks) <= 12.1
-    assert min(ends) >= 0.25 * 12.0 - 0.1 and max(ends) <= 12.0
+    assert min(ends) >= 0.25 * 10.0 - 0.1 and max(ends) <= 10.0
 
 
 def shifts(seed: int | None) -> Floats:

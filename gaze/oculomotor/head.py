@@ -21,7 +21,16 @@ from math import degrees, exp, hypot, radians
 
 import numpy as np
 
-from gazerig.gaze.angles import angle_between, direction, shortened, yaw_pitch
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    direction,
+    norm,
+    scale,
+    shortened,
+    sub,
+    yaw_pitch,
+)
 from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.params import HeadParams as HeadParams
 from gazerig.gaze.types import Angles2, Angles3, Target, Vec3
@@ -106,10 +115,12 @@ _MOST_SD, _MOST_DURATION_SD = 2.0, 1.5
 """Bounds of the scatter, in standard deviations."""
 _PURSUES_S, _FORESEES_S = 0.6, 0.2
 """Duration of a planned movement of pursuit, and how far ahead of now its goal is."""
-_MEAN_S = 1.0
-_FASTEST = 4.0
-"""Speeds above this multiple of the threshold count as that: it is not reached within .28 s."""
-_GOES_ON = 0.5
+_NO_DRIFT: Vec3 = (0.0, 0.0, 0.0)
+_MEAN_S = 0.8
+"""Time constant of the mean velocity: a wave of the hand has none, a walk has."""
+_FASTEST = 3.0
+"""Speeds above this multiple of the threshold count as that: it is not reached within .32 s."""
+_GOES_ON = 0.3
 """Share of the threshold at which a pursuit ends."""
 _RELIEF = (0.25, 0.75)
 """Eccentricity to which an eye is brought back, as a share of comfort_deg."""
@@ -174,8 +185,8 @@ class HeadModel:
         self._follows = False
         self._relieves = False
         self._aside_since_s = self._stepped_s = t_s
-        self._lead_s = self._speed_rad_s = 0.0
-        self._pursues = False
+        self._lead_s = 0.0
+        self._drift, self._pursues = _NO_DRIFT, False
         self._draw()
         self._level = head_rad[2] == 0.0
         self._start = self._goal_direction
@@ -279,7 +290,7 @@ class HeadModel:
         moving = t_s < self._ends_s
         if (target.kind, target.id) != self._target:
             if self._target is None or target.id != self._target[1]:  # not a look past a face
-                self._speed_rad_s, self._pursues = 0.0, False
+                self._drift, self._pursues = _NO_DRIFT, False
             self._target = target.kind, target.id
             self._aside_since_s = t_s
             self._draw()
@@ -338,14 +349,15 @@ class HeadModel:
         least = self._pursue_rad_s
         if least <= 0.0:
             return False
-        speed = 0.0
+        v = _NO_DRIFT
         if soon is not facing:
-            speed = angle_between(direction(facing), direction(soon)) / _FORESEES_S
-        kept = exp(-max(0.0, dt_s) / _MEAN_S)
-        self._speed_rad_s += (1.0 - kept) * (min(speed, _FASTEST * least) - self._speed_rad_s)
-        if since_onset < 0.0:
+            v = scale(sub(direction(soon), direction(facing)), 1.0 / _FORESEES_S)
+            v = scale(v, min(1.0, _FASTEST * least / max(norm(v), 1e-9)))
+        new = 1.0 - exp(-max(0.0, dt_s) / _MEAN_S)
+        self._drift = add(self._drift, scale(sub(v, self._drift), new))
+        if since_onset < 0.0 and not self._pursues:
             return False
-        self._pursues = self._speed_rad_s > (_GOES_ON * least if self._pursues else least)
+        self._pursues = norm(self._drift) > (_GOES_ON * least if self._pursues else least)
         return self._pursues
 
     def _pursue(self, target: Target, facing: Angles2, soon: Angles2, t_s: float) -> None:

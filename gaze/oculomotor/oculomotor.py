@@ -50,7 +50,7 @@ _AT_END = "at the end of its range"
 _Seen = tuple[Vec3, Vec3, Vec3, Vec3, bool]
 """The target at this tick: its point and velocity, the goal point of the head, the vector from
 midway between the eyes to the first, and whether that goal point moves with it."""
-_SWING_RAD = radians(10.0)
+_SWING_RAD = radians(12.0)
 """The head stays in the middle of smaller swings, and pursues larger ones."""
 
 

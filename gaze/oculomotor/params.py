@@ -134,12 +134,12 @@ class HeadParams:
     recentre_after_ms: Annotated[float, Bounds(0, 60000),
         "after an eye has been eccentric for this long at least, the head turns slowly to bring it back"] = 3000.0
     recentre_spread_ms: Annotated[float, Bounds(0, 60000), "mean of a random time by which that is later (exponential)"] = 5000.0
-    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 12.0
+    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 10.0
     recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it brings the eyes back"] = 12.0
     search_deg: Annotated[float, Bounds(0, 90),
         "eccentricity at which the head leaves the eyes when they search for a lost person; 90: as in any shift"] = 6.0
     pursue_above_deg_s: Annotated[float, Bounds(0, 100),
-        "the head pursues a target whose mean speed over the last second is above this; 0: never"] = 3.0
+        "the head pursues a target whose mean velocity over the last second is above this; 0: never"] = 3.0
     # fmt: on
 
     def __post_init__(self) -> None:
