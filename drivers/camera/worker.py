@@ -15,6 +15,7 @@ from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.process.priority import lower_priority
 from gazerig.drivers.types import Detections, FaceDetector
 
 NICE = 10  # lower priority than the loop
@@ -72,8 +73,7 @@ def run(
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    if hasattr(os, "nice"):  # Windows has other priorities
-        os.nice(NICE)
+    lower_priority(NICE)
     # One core is left to the loop: if OpenCV uses all cores, the loop is later and no more frames
     # are analysed.
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))

@@ -1,8 +1,10 @@
-"""Garbage collection and thread switch interval of control loops in real time."""
+"""Garbage collection, switch interval and time slice of control loops in real time."""
 
 import gc
 import sys
 import threading
+
+from gazerig.drivers.process.priority import SHORT_S, request_slice
 
 _SHORT_S = 0.0003
 """Another thread releases the interpreter after this time instead of the usual 5 ms, which is a
@@ -22,9 +24,9 @@ def freeze_objects() -> None:
 
 
 class SwitchInterval:
-    """A short thread switch interval while at least one loop runs.
+    """A short thread switch interval while at least one loop runs, and a short time slice for it.
 
-    Enter it once for each loop, from any thread.
+    Enter and leave it once for each loop, in the loop's thread.
     """
 
     def __init__(self) -> None:
@@ -33,6 +35,7 @@ class SwitchInterval:
         self._before_s = 0.0
 
     def __enter__(self) -> None:
+        request_slice(SHORT_S)
         with self._lock:
             if not self._running:
                 self._before_s = sys.getswitchinterval()
@@ -40,6 +43,7 @@ class SwitchInterval:
             self._running += 1
 
     def __exit__(self, *raised: object) -> None:
+        request_slice(0.0)
         with self._lock:
             self._running -= 1
             if not self._running:

@@ -27,6 +27,7 @@ import viser
 
 from gazerig.drivers.process import message_link
 from gazerig.drivers.process.message_link import MessageLink
+from gazerig.drivers.process.priority import lower_priority
 from gazerig.robot.dashboard.door.admission import page_url
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.door.browsers import Browsers
@@ -34,6 +35,7 @@ from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, ope
 from gazerig.robot.dashboard.feed.live_feed import LiveFeed, drain
 from gazerig.robot.dashboard.feed.page_process import (
     CANNOT_OPEN,
+    COMMANDS_VARIABLE,
     FOLDER_VARIABLE,
     NOTICE,
     ONCE_VARIABLE,
@@ -95,8 +97,9 @@ class Served(NamedTuple):
 
 
 def serve(
-    host: str, port: int, token: str, folder: Path, feed: MessageLink, stop: StopSender
-) -> Served:
+    host: str, port: int, token: str, folder: Path, feed: MessageLink, stop: StopSender,
+    rig: Path | None = None,
+) -> Served:  # fmt: skip
     """Open the page's server, and its door on the first free port.
 
     Raises:
@@ -124,7 +127,7 @@ def serve(
     )
     door = AuthProxy(
         host, open_port, inside, outbox.hand_on, stop, token, browsers, widgets, pointer.take,
-        outbox.picture,
+        outbox.picture, rig,
     )  # fmt: skip
     door.open()
     text = []
@@ -172,8 +175,7 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
 def main(arguments: list[str]) -> int:
     """Run the page; return the exit code of the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(os, "nice"):  # Windows has other priorities
-        os.nice(_NICENESS)
+    lower_priority(_NICENESS)
     with contextlib.suppress(ImportError):  # nor a limit on open files
         import resource
 
@@ -189,9 +191,11 @@ def main(arguments: list[str]) -> int:
     feed = message_link.open_link(fd, shown)
     stop = StopSender(message_link.open_link(stop_fd, shown))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
+    commands = os.environ.pop(COMMANDS_VARIABLE, "")
     try:
         try:
-            served = serve(host, int(port), token, folder, feed, stop)
+            rig = Path(commands) if commands else None
+            served = serve(host, int(port), token, folder, feed, stop, rig)
         except OSError as error:
             sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
             return CANNOT_OPEN

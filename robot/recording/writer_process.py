@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from gazerig.drivers.process.passed_image import PassedImage, receive, taken
+from gazerig.drivers.process.priority import lower_priority
 from gazerig.drivers.types import BusHealth, ImageArray
 from gazerig.gaze.types import GazeCommand, GazeState, Vec3
 from gazerig.robot.control.tick_stream import TickRow, all_finite, decode_plain
@@ -132,7 +133,7 @@ class _Message(NamedTuple):
 
 def main(socket_fd: int, file_fd: int) -> None:
     """Write until the client is gone or ends the recording."""
-    os.nice(_NICE)
+    lower_priority(_NICE)
     with socket.socket(fileno=socket_fd) as rig:
         messages = _messages(rig, os.getppid())
         first = next((one for one in messages if one is not None), None)

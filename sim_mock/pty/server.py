@@ -27,6 +27,7 @@ from types import FrameType
 from typing import Any, Protocol
 
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.process.priority import SHORT_S, request_slice
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import unpacked
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
@@ -278,6 +279,7 @@ def settings_of(settings: Mapping[str, Any]) -> ServerSettings:
 
 def main() -> None:
     """Serve the buses of the settings on the command line."""
+    request_slice(SHORT_S)  # servos do not wait for a browser
     run(settings_of(json.loads(sys.argv[1])), say, heed_ctrl_c=False)
 
 

@@ -1,0 +1,69 @@
+"""The loop goes before the processes that a run starts, on Linux also across sessions."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import time_slices
+
+from gazerig.drivers.process.priority import SHORT_S
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux groups sessions")
+LOWER = (
+    "import os; from pathlib import Path; "
+    "from gazerig.drivers.process.priority import lower_priority; "
+    "before = os.getsid(0); lower_priority(4, Path({group!r})); "
+    "print(os.getpriority(os.PRIO_PROCESS, 0), os.getsid(0) == os.getpid())"
+)
+
+
+def _lowered(group: Path, leads: bool) -> list[str]:
+    words = [sys.executable, "-c", LOWER.format(group=str(group))]
+    done = subprocess.run(
+        words, capture_output=True, text=True, check=True, start_new_session=leads
+    )
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize("leads", [True, False])
+def test_a_process_is_lowered_within_its_session_and_with_it(tmp_path: Path, leads: bool) -> None:
+    group = tmp_path / "autogroup"
+    group.touch()
+    nice = str(os.getpriority(os.PRIO_PROCESS, 0) + 4)
+    assert _lowered(group, leads) == [nice, "True"]
+    assert group.read_text() == "4"
+
+
+def test_a_system_without_groups_of_sessions_is_no_fault(tmp_path: Path) -> None:
+    nice = str(os.getpriority(os.PRIO_PROCESS, 0) + 4)
+    assert _lowered(tmp_path / "missing" / "autogroup", True) == [nice, "True"]
+
+
+@pytest.mark.skipif(time_slices.granted_s() is None, reason="this system reports no time slices")
+def test_only_the_loop_has_a_short_slice_and_only_while_it_runs() -> None:
+    code = (
+        "import sys, os; sys.path.insert(0, sys.argv[1]); import time_slices; "
+        "from gazerig.robot.control.real_time import SWITCH_INTERVAL as interval\n"
+        "print(time_slices.granted_s())\n"
+        "with interval:\n"
+        "    print(time_slices.granted_s(), flush=True)\n"
+        "    if os.fork() == 0: print(time_slices.granted_s(), flush=True); os._exit(0)\n"
+        "    os.wait()\n"
+        "print(time_slices.granted_s())"
+    )
+    words = [sys.executable, "-c", code, str(Path(__file__).parent)]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    before, short, child, after = map(float, said)
+    assert before == child == after
+    assert short in (SHORT_S, before)  # an older kernel ignores it
+
+
+def test_real_time_priority_stays() -> None:
+    code = (
+        "import os; from gazerig.drivers.process.priority import request_slice; "
+        "os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0)); print(request_slice(1e-4))"
+    )
+    words = [sys.executable, "-c", code]
+    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout == "False\n"
