@@ -154,7 +154,7 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
         if joint.bus and joint.bus not in rig.buses:
             there = ", ".join(rig.buses) or "none"
             yield f"joints.{name}.bus", f"no bus {joint.bus!r} under buses; there is {there}"
-        elif joint.model in SERVOS and not SERVOS[joint.model].fits(rig.bus_of(name).kind):
+        elif joint.model in SERVOS and not SERVOS[joint.model].fits_bus(rig.bus_of(name).kind):
             kind = rig.bus_of(name).kind
             yield (
                 f"joints.{name}.model",

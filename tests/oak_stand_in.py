@@ -8,7 +8,7 @@ from oak_packets import calibrated
 
 from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import Outputs
+from gazerig.drivers.camera.oak.pipeline import PipelineOutputs
 from gazerig.drivers.camera.oak.source import OakSource
 
 
@@ -191,8 +191,8 @@ class Rig:
     def source(self, **wanted) -> OakSource:
         colour = SimpleNamespace(link=lambda where: None)
 
-        def nodes(dai, pipeline, params) -> Outputs:
+        def nodes(dai, pipeline, params) -> PipelineOutputs:
             self.asked = params
-            return Outputs(colour)
+            return PipelineOutputs(colour)
 
         return OakSource(OakParams(**wanted), nodes, True, lambda: self.dai)

@@ -23,13 +23,13 @@ def filled(count: int, rate_deg_s: float = 100.0) -> PoseBuffer:
 
 
 def test_nothing_is_known_at_first():
-    assert PoseBuffer().at(1.0) is None
-    assert PoseBuffer().turned(1.0, 0.9) is None
+    assert PoseBuffer().rotation_at(1.0) is None
+    assert PoseBuffer().rotation_between(1.0, 0.9) is None
 
 
 @pytest.mark.parametrize("t_s", [10.0, 10.005, 10.0125, 10.1, 10.195])
 def test_orientation_between_ticks(t_s):
-    found = filled(40).at(t_s)
+    found = filled(40).rotation_at(t_s)
     assert found == pytest.approx(turn(100.0 * (t_s - 10.0)), abs=1e-6)
     assert np.linalg.det(found) == pytest.approx(1.0)
 
@@ -37,18 +37,18 @@ def test_orientation_between_ticks(t_s):
 def test_only_times_that_are_remembered_have_an_answer():
     ring = filled(3000)
     newest_s = 10.0 + 2999 * 0.005
-    assert ring.at(newest_s + 0.03) == pytest.approx(turn(100.0 * 2999 * 0.005))
-    assert ring.at(newest_s + 0.1) is None
-    assert ring.at(newest_s - 2.4) is not None
-    assert ring.at(newest_s - 2.6) is None
-    assert ring.at(10.0) is None
+    assert ring.rotation_at(newest_s + 0.03) == pytest.approx(turn(100.0 * 2999 * 0.005))
+    assert ring.rotation_at(newest_s + 0.1) is None
+    assert ring.rotation_at(newest_s - 2.4) is not None
+    assert ring.rotation_at(newest_s - 2.6) is None
+    assert ring.rotation_at(10.0) is None
 
 
 def test_turn_between_two_pictures():
     ring = filled(100)
     # What was straight ahead in the earlier picture, in the axes of the later one.
-    assert ring.turned(10.2, 10.1) == pytest.approx(turn(-10.0), abs=1e-6)
-    assert ring.turned(10.2, 9.0) is None
+    assert ring.rotation_between(10.2, 10.1) == pytest.approx(turn(-10.0), abs=1e-6)
+    assert ring.rotation_between(10.2, 9.0) is None
 
 
 def test_another_process_shares_it():
@@ -57,5 +57,5 @@ def test_another_process_shares_it():
     other = context.Process(target=ring.record, args=(10.3, turn(42.0)))
     other.start()
     other.join()
-    assert ring.at(10.3) == pytest.approx(turn(42.0), abs=1e-6)
-    assert ring.at(10.05) == pytest.approx(turn(5.0), abs=1e-6)
+    assert ring.rotation_at(10.3) == pytest.approx(turn(42.0), abs=1e-6)
+    assert ring.rotation_at(10.05) == pytest.approx(turn(5.0), abs=1e-6)

@@ -282,7 +282,7 @@ def test_a_frame_is_copied_when_it_is_asked_for_and_then_stays():
 def test_memory_of_a_writer_that_died_is_freed_though_nothing_was_read():
     writer, reader = SlotWriter(), SlotReader()
     where = writer.put(np.zeros((2, 3), np.uint8))
-    reader.see(where)
+    reader.record_memory(where)
     reader.forget()
     assert SlotReader().take(where) is None
     reader.forget()

@@ -358,12 +358,12 @@ def test_recorder_hands_pictures_through_and_into_the_file(tmp_path):
     recorder.finish()
     recorder.finish()
     recording = Recording(tmp_path / "r.mcap")
-    assert recording.note == "" and len(recording.times_s) == recorder.written == 6
+    assert recording.note == "" and len(recording.times_s) == recorder.written_frames == 6
     for k, one in enumerate(seen):
         assert_same(present(one), shot(k))
         assert_same(recording.shot(k), present(one))
     assert recorder.events() == ("something of the source",)
-    assert (recorder.failure, recorder.left_out) == ("", 0)
+    assert (recorder.failure, recorder.dropped_frames) == ("", 0)
 
 
 def test_recorder_that_cannot_write_its_file_frees_the_source(tmp_path):
@@ -398,7 +398,7 @@ def test_slow_disk_leaves_pictures_out_and_says_so(tmp_path, monkeypatch):
         assert recorder.take(time.monotonic, GO_ON) is not None
     go.set()
     recorder.finish()
-    assert 25 <= recorder.left_out <= 30
+    assert 25 <= recorder.dropped_frames <= 30
     (reported,) = [line for line in recorder.events() if "is slower than the camera" in line]
     assert "--jpeg" in reported
 

@@ -94,5 +94,5 @@ def test_frames_come_with_clothes_and_the_same_ones_again() -> None:
             return (one,)
 
     image = Crowd(1, np.random.default_rng(0)).image({0: np.array([0.0, -0.2, 1.6])}, 1)
-    first, again = (FrameAnalyzer(Found()).look(Shot(0.0, 1, image)).faces for _ in "ab")
+    first, again = (FrameAnalyzer(Found()).analyze(Shot(0.0, 1, image)).faces for _ in "ab")
     assert first[0].clothing is not None and first[0].clothing == again[0].clothing

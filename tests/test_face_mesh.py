@@ -311,7 +311,7 @@ def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none() -> None:
     assert first.landmarks_px is face.landmarks_px
     # Those that a camera itself has found get theirs too.
     analyzer = FrameAnalyzer(MeshedDetector(Two(), 1))
-    found = analyzer.look(Shot(0.1, 1, shown.image, faces=(face,))).faces
+    found = analyzer.analyze(Shot(0.1, 1, shown.image, faces=(face,))).faces
     assert len(found) == 1 and found[0].mesh is not None
     assert MeshNetworks().mesh(wall, shown.landmarks_px) is None
     tiny = shown.landmarks_px.mean(axis=0) + 0.1 * (

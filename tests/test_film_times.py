@@ -13,8 +13,8 @@ from gazerig.drivers.camera.video_file import (
     VideoFile,
     VideoTimestamps,
     ascending_times,
-    from_frame_times,
-    from_rate,
+    timestamps_from_rate,
+    timestamps_from_times,
 )
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.vision.face.detector import face_detector
@@ -88,14 +88,16 @@ def times_s(rate_hz, count=40):
 
 
 def test_stated_rate_is_judged_by_the_times():
-    assert from_rate(25.0, "", times_s(25.0)) == VideoTimestamps(25.0)
-    assert present(from_rate(25.0, "", times_s(25.1))).rate_hz == 25.0  # rounding
-    lie = from_rate(25.0, "", times_s(12.5))
+    assert timestamps_from_rate(25.0, "", times_s(25.0)) == VideoTimestamps(25.0)
+    assert present(timestamps_from_rate(25.0, "", times_s(25.1))).rate_hz == 25.0  # rounding
+    lie = timestamps_from_rate(25.0, "", times_s(12.5))
     assert present(lie).rate_hz == pytest.approx(12.5)
     assert "states 25 frames a second and shows 12.5" in present(lie).note
-    assert from_rate(25.0, "", [tick / 25.0 for tick in UNEVEN]) is None
-    assert present(from_rate(25.0, "25 assumed", times_s(10.0))).rate_hz == pytest.approx(10.0)
-    assert present(from_rate(25.0, "25 assumed", [])).note == "25 assumed"
+    assert timestamps_from_rate(25.0, "", [tick / 25.0 for tick in UNEVEN]) is None
+    assert present(
+        timestamps_from_rate(25.0, "25 assumed", times_s(10.0))
+    ).rate_hz == pytest.approx(10.0)
+    assert present(timestamps_from_rate(25.0, "25 assumed", [])).note == "25 assumed"
 
 
 def test_times_that_are_missing_are_put_right():
@@ -106,7 +108,7 @@ def test_times_that_are_missing_are_put_right():
 
 @given(st.lists(st.floats(0.001, 2.0), min_size=2, max_size=30), st.integers(1, 200))
 def test_every_due_time_belongs_to_its_own_picture(steps, number):
-    times = from_frame_times(np.cumsum([5.0, *steps]).tolist())
+    times = timestamps_from_times(np.cumsum([5.0, *steps]).tolist())
     assert times.number_at(times.due_s(number)) == number
     assert times.due_s(number + 1) > times.due_s(number)
     assert times.number_at(-0.001) <= 0
@@ -134,7 +136,7 @@ def test_odd_stills_become_plain_pictures(tmp_path, pixels):
     cv2.imwrite(str(file), pixels)
     for detector in (NoFaces(), face_detector(FaceDetectorParams())):
         film = opened(file)
-        found = FrameAnalyzer(detector).look(film.shot(1))
+        found = FrameAnalyzer(detector).analyze(film.shot(1))
         assert found.faces == ()
         assert (found.height_px, found.width_px) == pixels.shape[:2]
         assert (

@@ -107,19 +107,19 @@ def test_the_lens_that_a_camera_reports_is_a_calibration_of_its_own() -> None:
 
 def test_a_frame_comes_with_what_it_shows_located() -> None:
     frames = FrameAnalyzer(OneFace(), lambda shot: (BALL,), LOCATOR)
-    found = frames.look(shot(1))
+    found = frames.analyze(shot(1))
     assert found.located == LOCATOR(found)
     assert [len(of) for of in present(found.located)[1:3]] == [1, 1]
     other = FrameLocator(LENS, 1.0)
     frames.retune(None, None, other)
-    assert frames.look(shot(2)).located == other(found)
-    assert FrameAnalyzer(OneFace()).look(shot(3)).located is None
+    assert frames.analyze(shot(2)).located == other(found)
+    assert FrameAnalyzer(OneFace()).analyze(shot(3)).located is None
 
 
 def test_faces_of_a_recording_that_holds_no_poses_are_located_as_it_is_played() -> None:
     """A camera recording keeps images and the faces that the camera found, and nothing of this."""
     recorded = shot(1)._replace(faces=(FACE,))
-    played = FrameAnalyzer(OneFace(), None, LOCATOR).look(recorded)
+    played = FrameAnalyzer(OneFace(), None, LOCATOR).analyze(recorded)
     wanted = percept_of(perception(), picture(1, faces=(FACE,)))
     assert played.located is not None
     assert percept_of(perception(), played).faces == wanted.faces

@@ -11,7 +11,7 @@ from fakes.scenes import EmptyScene
 from stand_in import StandIn
 from test_face_pose import CAMERA, image_of, turned
 
-from gazerig.drivers.camera.guarded_camera import fault_of_face
+from gazerig.drivers.camera.guarded_camera import face_fault
 from gazerig.drivers.camera.recording_format import _face, decode_faces
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
@@ -157,9 +157,9 @@ def test_a_gaze_of_the_eyes_is_kept_by_camera_recordings_and_checked() -> None:
         (face,) = detection(gaze).faces
         (back,) = decode_faces(orjson.dumps({"faces": [_face(face)]}))
         assert back.gaze_camera == gaze
-        assert fault_of_face(face) == ""
+        assert face_fault(face) == ""
     for wrong in ((0.0, 1.0), (0.0, float("nan"), 1.0), (0.0, 0.0, 0.0)):
-        assert "gaze" in fault_of_face(replace(face, gaze_camera=wrong))  # type: ignore[arg-type]
+        assert "gaze" in face_fault(replace(face, gaze_camera=wrong))  # type: ignore[arg-type]
 
 
 def face_at(id: int, p: Vec3, looks: bool | None) -> Face:

@@ -14,7 +14,7 @@ from seeing.row_02_camera_motion import judged
 
 import gazerig
 from gazerig.drivers.camera import recording_format as fmt
-from gazerig.drivers.camera.guarded_camera import fault_of
+from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
@@ -64,7 +64,7 @@ class Base:
     def turn(self, t_s) -> CameraTurn:
         while self._waiting and self._waiting[0][0] <= t_s + self.rest_s + 0.01:
             self.gyro.add(*self._waiting.pop(0))
-        found = self.gyro.at(t_s + self.rest_s)
+        found = self.gyro.orientation_at(t_s + self.rest_s)
         assert found is not None
         return found
 
@@ -240,7 +240,7 @@ def gyro_of(motion, seconds):
     def turn(t_s: float) -> CameraTurn | None:
         while waiting and waiting[0][0] <= t_s + 2.015:
             gyro.add(*waiting.pop(0))
-        return gyro.at(t_s + 2.0)
+        return gyro.orientation_at(t_s + 2.0)
 
     return turn
 
@@ -268,7 +268,7 @@ def test_turn_of_the_gyro_goes_before_that_of_the_joints():
     class Joints:
         """Say that the camera turned though it stood."""
 
-        def turned(self, now_s, before_s):
+        def rotation_between(self, now_s, before_s):
             raise AssertionError("the joints were asked")
 
     source = MotionSource(MotionParams(), None, radians(69.0), Joints())  # type: ignore[arg-type]
@@ -298,8 +298,8 @@ def test_wrong_gyro_is_told_once_in_a_run_which_goes_on():
 
 def test_turn_that_is_no_rotation_ends_the_camera_of_a_program_alone():
     wrong = Detections(0.0, 1, WIDTH, HEIGHT, turn=CameraTurn(1, rows(np.full((3, 3), np.nan))))
-    assert "no rotation" in fault_of(wrong)
-    assert fault_of(replace(wrong, turn=CameraTurn(1, rows(np.eye(3))))) == ""
+    assert "no rotation" in detections_fault(wrong)
+    assert detections_fault(replace(wrong, turn=CameraTurn(1, rows(np.eye(3))))) == ""
 
 
 def test_recording_keeps_the_turn():

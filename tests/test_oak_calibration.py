@@ -69,7 +69,7 @@ def test_fisheye_is_refused_where_frames_are_not_straightened():
     )
     wide = [[900.0, 0.0, 1915.0], [0.0, 900.0, 1072.0], [0.0, 0.0, 1.0]]
     stored.setCameraIntrinsics(dai.CameraBoardSocket.CAM_A, wide, 3840, 2160)
-    assert not read_calibration(dai, stored, OakParams()).lens.distorts
+    assert not read_calibration(dai, stored, OakParams()).lens.has_distortion
     with pytest.raises(CameraError, match=r"set oak\.undistort: true"):
         read_calibration(dai, stored, OakParams(undistort=False))
 
@@ -99,7 +99,7 @@ def test_frames_that_are_not_straightened_carry_the_distortion():
         rig.queue.fed.append(Message(5.0, 100.0, K))
         shot = source.take(lambda: 100.0, threading.Event())
         assert shot is not None and shot.lens is not None
-        assert shot.lens.distorts is not undistort
+        assert shot.lens.has_distortion is not undistort
         assert shot.lens.fx_px == 570.0
         source.close()
 

@@ -23,7 +23,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import (
-    Outputs,
+    PipelineOutputs,
     device_nodes,
     imu_queue,
     read_archive,
@@ -117,14 +117,14 @@ def host_nodes(film, loop=True, depth=True, faces=False, lens=None, device_clock
             frame.setTimestampDevice(device_clock(frame.getTimestampDevice()))
         return frame
 
-    def nodes(dai, pipeline, params) -> Outputs:
+    def nodes(dai, pipeline, params) -> PipelineOutputs:
         replay = pipeline.create(dai.node.ReplayVideo)
         replay.setReplayVideoFile(film)
         replay.setOutFrameType(dai.ImgFrame.Type.NV12)
         replay.setFps(params.rate_hz)
         replay.setLoop(loop)
         colour = answering(dai, pipeline, looked_through, replay.out)
-        return Outputs(
+        return PipelineOutputs(
             colour,
             answering(dai, pipeline, partial(depth_mm, dai), colour) if depth else None,
             answering(dai, pipeline, partial(found_faces, dai), colour) if faces else None,
@@ -208,7 +208,7 @@ def test_stream_that_ends_is_a_lost_camera(film):
 
 
 def test_camera_without_pictures_counts_as_lost(film):
-    def silent(dai, pipeline, params) -> Outputs:
+    def silent(dai, pipeline, params) -> PipelineOutputs:
         class Nothing(dai.node.ThreadedHostNode):
             def __init__(self) -> None:
                 super().__init__()
@@ -218,7 +218,7 @@ def test_camera_without_pictures_counts_as_lost(film):
             def run(self) -> None:
                 return None
 
-        return Outputs(pipeline.create(Nothing).out)
+        return PipelineOutputs(pipeline.create(Nothing).out)
 
     source = opened(silent, OakParams(silence_ms=150.0))
     with pytest.raises(CameraError, match="no frame for 0.15 s"):

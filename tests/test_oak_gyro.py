@@ -11,11 +11,11 @@ import pytest
 from fakes.films import write_film
 from oak_packets import R_CAMERA_IMU, at_rest, calibrated, imu_message, packet, readings
 
-from gazerig.drivers.camera.oak.calibration import imu_to_camera, rotation_of
+from gazerig.drivers.camera.oak.calibration import imu_to_camera, rotation_matrix
 from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import Outputs
+from gazerig.drivers.camera.oak.pipeline import PipelineOutputs
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.types import CameraTurn
 
@@ -63,7 +63,7 @@ def test_turn_is_measured_between_any_two_frames():
         gyro, yaw = swaying(3.0, seed)
         for a, b in ((210.3, 300.7), (400.5, 407.1), (420.0, 598.9)):
             times = 2.0 + np.array((a, b)) / 200.0
-            before, now = (gyro.at(t) for t in times)
+            before, now = (gyro.orientation_at(t) for t in times)
             true = np.interp((times - 2.0) * 200.0, np.arange(len(yaw)), yaw)
             off = moved(now, before) - (0.0, true[1] - true[0], 0.0)
             assert np.abs(off).max() < 0.04
@@ -72,13 +72,13 @@ def test_turn_is_measured_between_any_two_frames():
 def test_bias_is_that_of_the_rest_and_follows_the_temperature():
     rng = np.random.default_rng(1)
     gyro = Gyro(np.eye(3))
-    assert not gyro.settled
+    assert not gyro.is_settled
     for hundredth in range(60):  # a minute at rest; half a degree a second warmer at its end
         warmer = 0.3 + hundredth / 120.0
         for t_s, rates in readings(rng, np.zeros((200, 3)), (warmer, 0, 0), float(hundredth)):
             gyro.add(t_s, rates)
-    assert gyro.settled
-    before, now = gyro.at(58.5), gyro.at(59.9)
+    assert gyro.is_settled
+    before, now = gyro.orientation_at(58.5), gyro.orientation_at(59.9)
     assert np.abs(moved(now, before)).max() < 0.1
     assert gyro.events() == ()
 
@@ -89,7 +89,7 @@ def test_slow_breathing_is_no_rest(hz):
     rates = np.zeros((len(t), 3))
     rates[:, 0] = radians(0.5) * 2 * np.pi * hz * np.cos(2 * np.pi * hz * t)  # half a degree
     gyro = fed(readings(np.random.default_rng(2), rates))
-    assert not gyro.settled and gyro.at(29.9) is None
+    assert not gyro.is_settled and gyro.orientation_at(29.9) is None
     (told,) = gyro.events()
     assert "has not been at rest for 20 s" in told
 
@@ -98,29 +98,31 @@ def test_axes_are_those_of_the_calibration(dai):
     found = imu_to_camera(dai, calibrated(dai))
     assert found is not None
     np.testing.assert_allclose(found, R_IMU, atol=1e-6)
-    np.testing.assert_allclose(rotation_of((0.0, 0.0, 90.0)), R_IMU, atol=1e-9)
+    np.testing.assert_allclose(rotation_matrix((0.0, 0.0, 90.0)), R_IMU, atol=1e-9)
     vector = (12.0, -30.0, 140.0)
-    np.testing.assert_allclose(rotation_of(vector), cv2.Rodrigues(np.radians(vector))[0], atol=1e-9)
-    np.testing.assert_allclose(rotation_of((0.0, 0.0, 0.0)), np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(
+        rotation_matrix(vector), cv2.Rodrigues(np.radians(vector))[0], atol=1e-9
+    )
+    np.testing.assert_allclose(rotation_matrix((0.0, 0.0, 0.0)), np.eye(3), atol=1e-12)
     assert imu_to_camera(dai, calibrated(dai, imu=False)) is None
 
 
 def test_gap_begins_another_epoch():
     rng = np.random.default_rng(3)
     gyro = fed(at_rest(rng, 2.0))
-    first = gyro.at(1.99)
+    first = gyro.orientation_at(1.99)
     fed([(t + 2.5, rates) for t, rates in at_rest(rng, 1.0)], gyro)
-    second = gyro.at(3.4)
+    second = gyro.orientation_at(3.4)
     assert first is not None and second is not None
     assert second.epoch == first.epoch + 1 and second.since(first) is None
-    assert gyro.at(2.2) is None and gyro.events() == ()
+    assert gyro.orientation_at(2.2) is None and gyro.events() == ()
 
 
 def test_frame_a_little_younger_than_the_readings_is_known_an_older_one_not():
     gyro, _ = swaying(1.0)
-    assert gyro.at(3.01) is not None
-    assert gyro.at(3.06) is None
-    assert gyro.at(0.1) is None  # more than two seconds before
+    assert gyro.orientation_at(3.01) is not None
+    assert gyro.orientation_at(3.06) is None
+    assert gyro.orientation_at(0.1) is None  # more than two seconds before
     assert gyro.events() == ()
 
 
@@ -128,9 +130,9 @@ def test_readings_that_come_twice_or_late_count_once():
     rng = np.random.default_rng(4)
     found = at_rest(rng, 2.0)
     once, twice = fed(found), fed([one for pair in zip(found, found, strict=True) for one in pair])
-    assert once.at(1.9) == twice.at(1.9)
+    assert once.orientation_at(1.9) == twice.orientation_at(1.9)
     fed(found[:100], twice)
-    assert once.at(1.9) == twice.at(1.9)
+    assert once.orientation_at(1.9) == twice.orientation_at(1.9)
 
 
 @pytest.mark.parametrize("value", [0.0, 0.02])
@@ -139,9 +141,9 @@ def test_e95_stuck_gyro_is_told_once(value):
     fed([(2.0 + k / 200.0, (value, 0.0, 0.0)) for k in range(400)], gyro)
     (told,) = gyro.events()
     assert "gyro is stuck: always the same reading" in told and "oak.gyro: false" in told
-    assert gyro.at(3.9) is None and gyro.settled
+    assert gyro.orientation_at(3.9) is None and gyro.is_settled
     fed([(t + 4.0, rates) for t, rates in at_rest(np.random.default_rng(5), 2.0)], gyro)
-    assert gyro.events() == () and gyro.at(5.9) is None
+    assert gyro.events() == () and gyro.orientation_at(5.9) is None
 
 
 @pytest.mark.parametrize("rates", [(nan, 0.0, 0.0), (0.0, 70.0, 0.0), (float("inf"), 0.0, 0.0)])
@@ -150,26 +152,26 @@ def test_absurd_gyro_is_told_once(rates):
     fed([(2.0 + k / 200.0, rates) for k in range(400)], gyro)
     (told,) = gyro.events()
     assert "gyro returns impossible readings" in told
-    assert gyro.at(3.9) is None
+    assert gyro.orientation_at(3.9) is None
 
 
 def test_one_absurd_reading_is_left_out():
     found = at_rest(np.random.default_rng(7), 3.0)
     found[500] = found[500][0], (nan, 1e6, 0.0)
     gyro = fed(found)
-    assert gyro.events() == () and gyro.at(2.9) is not None
-    assert np.abs(moved(gyro.at(2.9), gyro.at(2.3))).max() < 0.1
+    assert gyro.events() == () and gyro.orientation_at(2.9) is not None
+    assert np.abs(moved(gyro.orientation_at(2.9), gyro.orientation_at(2.3))).max() < 0.1
 
 
 def test_gyro_that_falls_silent_or_never_speaks_is_told_once():
     gyro = fed(at_rest(np.random.default_rng(8), 2.0))
     for k in range(90):
-        gyro.at(1.9 + k / 30.0)
+        gyro.orientation_at(1.9 + k / 30.0)
     (told,) = gyro.events()
-    assert "gives no readings" in told and gyro.at(2.0) is None
+    assert "gives no readings" in told and gyro.orientation_at(2.0) is None
     mute = Gyro(R_IMU)
     for k in range(60):
-        assert mute.at(100.0 + k / 30.0) is None
+        assert mute.orientation_at(100.0 + k / 30.0) is None
     assert len(mute.events()) == 1
 
 
@@ -177,7 +179,7 @@ def frames_and_readings(film, rates_of, bias_deg_s=BIAS_DEG_S, imu=True, made=re
     """Make what stands for device_nodes: a film, and readings about its frames' device times."""
     rng = np.random.default_rng(9)
 
-    def nodes(dai, pipeline, params) -> Outputs:
+    def nodes(dai, pipeline, params) -> PipelineOutputs:
         replay = pipeline.create(dai.node.ReplayVideo)
         replay.setReplayVideoFile(film)
         replay.setOutFrameType(dai.ImgFrame.Type.NV12)
@@ -217,7 +219,7 @@ def frames_and_readings(film, rates_of, bias_deg_s=BIAS_DEG_S, imu=True, made=re
 
         node = pipeline.create(Stamped)
         replay.out.link(node.input)
-        return Outputs(node.out, imu=node.imu)
+        return PipelineOutputs(node.out, imu=node.imu)
 
     return nodes
 
@@ -282,10 +284,10 @@ def test_sine_of_a_shake_of_the_table_is_seen_in_full():
     rates[:, 0] = radians(0.6) * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * t)
     rates[t < 2.0] = 0.0
     gyro = fed(readings(np.random.default_rng(10), rates, BIAS_DEG_S))
-    start = gyro.at(2.0)
+    start = gyro.orientation_at(2.0)
     errors = []
     for k in range(50):
         at = 2.0 + k / 30.0
         true = np.interp(at, t, angle)
-        errors.append(moved(gyro.at(at), start)[0] - true)
+        errors.append(moved(gyro.orientation_at(at), start)[0] - true)
     assert np.abs(errors).max() < 0.06

@@ -12,7 +12,7 @@ from present import present
 
 from gazerig.drivers.camera.oak.discovery import load_depthai
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import Outputs
+from gazerig.drivers.camera.oak.pipeline import PipelineOutputs
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.oak.yunet_decoder import STRIDES, UnreadableOutputs, decode, yunet_faces
 
@@ -148,7 +148,7 @@ def film(tmp_path_factory):
 def nodes_of(film, outputs):
     """Make what stands for device_nodes: a film, and a network that gives the same for each."""
 
-    def nodes(dai, pipeline, params) -> Outputs:
+    def nodes(dai, pipeline, params) -> PipelineOutputs:
         replay = pipeline.create(dai.node.ReplayVideo)
         replay.setReplayVideoFile(film)
         replay.setOutFrameType(dai.ImgFrame.Type.NV12)
@@ -180,7 +180,7 @@ def nodes_of(film, outputs):
         network = pipeline.create(Network)
         replay.out.link(network.input)
         found = yunet_faces(dai, pipeline, network.out, (WIDTH, HEIGHT), params.min_confidence)
-        return Outputs(replay.out, faces=found.out, face_fault=found.fault)
+        return PipelineOutputs(replay.out, faces=found.output, face_fault=found.fault)
 
     return nodes
 

@@ -54,11 +54,11 @@ def test_it_is_said_once_by_the_process_of_the_camera() -> None:
     analyzer = FrameAnalyzer(Detector())
     image = np.zeros((480, 640, 3), np.uint8)
     for number in (1, 2, 3):
-        (seen,) = analyzer.look(Shot(number / 30, number, image)).faces
+        (seen,) = analyzer.analyze(Shot(number / 30, number, image)).faces
         assert np.array_equal(seen.landmarks_px, PIXELS)
     (line,) = analyzer.events()
     assert "outside the frame of 640 x 480" in line and "\n" not in line
-    analyzer.look(Shot(0.2, 4, image))
+    analyzer.analyze(Shot(0.2, 4, image))
     assert analyzer.events() == ()
 
 
@@ -68,7 +68,7 @@ def test_a_face_whose_middle_the_edge_cuts_off_is_not_there_and_nothing_is_said(
             return (replace(FACE, landmarks_px=PIXELS + (0.0, 241.0 - PIXELS[:, 1].mean())),)
 
     analyzer = FrameAnalyzer(Detector())
-    assert analyzer.look(Shot(0.0, 1, np.zeros((240, 640, 3), np.uint8))).faces == ()
+    assert analyzer.analyze(Shot(0.0, 1, np.zeros((240, 640, 3), np.uint8))).faces == ()
     assert analyzer.events() == ()
 
 

@@ -47,16 +47,16 @@ def test_pixels_depth_and_lens_go_where_the_image_goes(orientation: FrameOrienta
     rng = np.random.default_rng(3)
     image = rng.integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)
     depth = rng.random((HEIGHT, WIDTH)).astype(np.float32)
-    shot = orientation.upright(Shot(1.0, 7, image, depth, LENS))
+    shot = orientation.turn_shot(Shot(1.0, 7, image, depth, LENS))
     assert (shot.captured_s, shot.number) == (1.0, 7)
     assert shot.depth_m is not None and shot.lens is not None
     for x, y in ((0, 0), (639, 0), (0, 399), (200, 31)):
-        (u, v), *_ = orientation.points(np.array([[x, y]]), WIDTH, HEIGHT).round().astype(int)
+        (u, v), *_ = orientation.turn_points(np.array([[x, y]]), WIDTH, HEIGHT).round().astype(int)
         assert np.array_equal(shot.image[v, u], image[y, x])
         assert shot.depth_m[v, u] == depth[y, x]
     # The same direction, seen through either lens, distortion and all.
     pixels = np.array([(10.0, 20.0), (600.0, 30.0), (320.5, 390.0)])
-    there = orientation.points(pixels, WIDTH, HEIGHT)
+    there = orientation.turn_points(pixels, WIDTH, HEIGHT)
     assert rays(there, shot.lens) == pytest.approx(rays(pixels, LENS) @ axes(orientation).T)
 
 
@@ -65,7 +65,7 @@ def test_faces_and_gyro_of_the_camera_are_turned_along(orientation: FrameOrienta
     upright_marks = np.array([(300.0, 100.0), (340.0, 100.0), (320, 120), (305, 140), (335, 140)])
     size = (HEIGHT, WIDTH) if orientation.rotation in (90, 270) else (WIDTH, HEIGHT)
     # Where the upright face is in the frame as it comes: found by trying every pixel's inverse.
-    zero, right, down = orientation.points(
+    zero, right, down = orientation.turn_points(
         np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), WIDTH, HEIGHT
     )
     inverse = np.linalg.inv(np.column_stack((right - zero, down - zero)))
@@ -78,7 +78,7 @@ def test_faces_and_gyro_of_the_camera_are_turned_along(orientation: FrameOrienta
     turned = np.array([(0.96, -0.28, 0.0), (0.28, 0.96, 0.0), (0.0, 0.0, 1.0)])
     delivered = axes(orientation).T @ turned @ axes(orientation)
     first, second, third = (tuple(row) for row in delivered.tolist())
-    shot = orientation.upright(
+    shot = orientation.turn_shot(
         Shot(
             0.0,
             1,
@@ -98,7 +98,7 @@ def test_faces_and_gyro_of_the_camera_are_turned_along(orientation: FrameOrienta
 
 def test_frames_that_are_upright_stay_the_very_same() -> None:
     shot = Shot(0.0, 1, np.zeros((4, 6, 3), np.uint8))
-    assert AS_DELIVERED.upright(shot) is shot
+    assert AS_DELIVERED.turn_shot(shot) is shot
 
     def make() -> FrameSource:
         raise AssertionError
@@ -160,7 +160,7 @@ def test_e100_a_person_is_at_one_place_however_the_camera_is_mounted_and_whateve
     for width, height in sizes:
         shot = source.take(lambda: 0.0, threading.Event())
         assert shot is not None and shot.image.shape == (height, width, 3)
-        found = analyzer.look(shot)
+        found = analyzer.analyze(shot)
         assert found.located is not None and (found.width_px, found.height_px) == (width, height)
         x, y, z = found.located.faces[0].p_camera_m
         assert (x / z, y / z) == pytest.approx((0.2, -0.12), abs=4.0 / width)
@@ -173,7 +173,9 @@ def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None
     analyzer = FrameAnalyzer(Spot(), None, FrameLocator(lens, radians(69.0)))
 
     def look(width: int, height: int) -> None:
-        found = analyzer.look(Shot(0.0, 1, spot_at(np.array([0.1, 0.0, 1.0]), width, height, 1.2)))
+        found = analyzer.analyze(
+            Shot(0.0, 1, spot_at(np.array([0.1, 0.0, 1.0]), width, height, 1.2))
+        )
         assert found.located is not None and len(found.located.faces) == 1
 
     look(1280, 960)  # the same field, finer

@@ -16,7 +16,7 @@ from test_perception import seen as percept_at
 from test_scanpath import walker
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.guarded_camera import fault_of
+from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
@@ -146,15 +146,15 @@ def test_frames_carry_people_between_processes_and_the_page_draws_them() -> None
     detector = BodyDetector(Faceless(), PeopleDetector(FaceDetectorParams(), network))
     frames = FrameAnalyzer(detector, None, FrameLocator(None, radians(69.0)))
     shown = np.full((480, 640, 3), 90, np.uint8)
-    found = frames.look(Shot(0.0, 1, shown))
+    found = frames.analyze(Shot(0.0, 1, shown))
     assert pickle.loads(pickle.dumps(found.people)) == found.people and len(found.people) == 1
     (head,) = present(found.located).faces
     assert head.kind == "face" and head.R_camera_face is None
-    assert frames.look(Shot(0.03, 2, shown)).people == () and fault_of(found) == ""
+    assert frames.analyze(Shot(0.03, 2, shown)).people == () and detections_fault(found) == ""
     drawn = draw_detections(shown, found, None, present(found.located).intrinsics)
     assert (drawn != shown).any()
     bad = replace(found, people=(replace(found.people[0], trunk_px=0.0),))
-    assert "a person at" in fault_of(bad)
+    assert "a person at" in detections_fault(bad)
 
 
 def test_without_the_file_the_detector_is_the_plain_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from gazerig.drivers.camera.guarded_camera import fault_of
+from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
@@ -120,7 +120,7 @@ class CameraSuite:
 
     def test_what_it_returns_is_sound(self, bench, camera):
         frame = self.next_frame(bench, camera, 0)
-        assert fault_of(frame) == ""
+        assert detections_fault(frame) == ""
         if frame.image is not None:
             assert frame.image.shape == (frame.height_px, frame.width_px, 3)
             assert frame.image.dtype == np.uint8 and not frame.image.flags.writeable

@@ -18,7 +18,7 @@ from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.types import ServoBus, ServoConfig
 
 
-def _smart(port: BusPort, own: Sequence[ServoConfig], params: BusParams) -> ServoBus:
+def _create_smart_bus(port: BusPort, own: Sequence[ServoConfig], params: BusParams) -> ServoBus:
     """Return the bus of smart servos of one family."""
     return SmartServoBus(FAMILY_OF[own[0].model], port, own, params)
 
@@ -32,12 +32,12 @@ _BRINGUP = ("scan", "setup", "doctor", "reboot", "monitor", "calibrate")
 
 # fmt: off
 DYNAMIXEL = _plugin(
-    "dynamixel", make=_smart, params=DynamixelParams,
+    "dynamixel", make=_create_smart_bus, params=DynamixelParams,
     abilities=(*_BRINGUP, "feedback", "torque off", "watchdog", "emulated"),
     evidence=Evidence(emulated=True, judge="rustypot, ROBOTIS' SDK in two versions"),
 )
 FEETECH = _plugin(
-    "feetech", make=_smart, params=FeetechParams,
+    "feetech", make=_create_smart_bus, params=FeetechParams,
     abilities=(*_BRINGUP, "feedback", "torque off", "guardian", "emulated"),
     evidence=Evidence(emulated=True, judge="rustypot (STS)"),
 )

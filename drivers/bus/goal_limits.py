@@ -19,12 +19,12 @@ def clip_goals(
     if as_many and all(map(le, lowest, steps)) and all(map(le, steps, highest)):
         return steps
     return [
-        goal if low <= goal <= high else _inside(goal, low, high)
+        goal if low <= goal <= high else _nearest_limit(goal, low, high)
         for goal, low, high in zip(steps, lowest, highest, strict=True)
     ]
 
 
-def _inside(goal: float, low: int, high: int) -> int:
+def _nearest_limit(goal: float, low: int, high: int) -> int:
     if goal != goal:
         raise ValueError("a goal is not a number: every goal must be a whole number of steps")
     return low if goal < low else high
@@ -74,18 +74,18 @@ class LimitRecovery:
         """Move these servos inside, and no others."""
         self.places = dict.fromkeys(ids)
 
-    def add_outside(self, servo_id: int, steps: int) -> None:
+    def add_if_outside(self, servo_id: int, steps: int) -> None:
         """Move a servo inside if it is outside."""
-        if self._outside(servo_id, steps):
+        if self._is_outside(servo_id, steps):
             self.places[servo_id] = None
 
     def clear(self) -> None:
         """Remove all servos."""
         self.places.clear()
 
-    def arrived(self, servo_id: int, steps: float, now_s: float) -> bool:
+    def has_arrived(self, servo_id: int, steps: float, now_s: float) -> bool:
         """Return whether such a servo, now at ``steps``, has reached its limits."""
-        if not self._outside(servo_id, steps, NEAR_STEPS):
+        if not self._is_outside(servo_id, steps, NEAR_STEPS):
             return True
         before = self.places[servo_id]
         if before is None or abs(steps - before.steps) > STILL_STEPS:
@@ -97,7 +97,7 @@ class LimitRecovery:
         """Remove a servo, which then moves at full speed again."""
         self.places.pop(servo_id, None)
 
-    def _outside(self, servo_id: int, steps: float, room_steps: int = 0) -> bool:
+    def _is_outside(self, servo_id: int, steps: float, room_steps: int = 0) -> bool:
         setup = self._setups[servo_id]
         return not setup.min_steps - room_steps <= steps <= setup.max_steps + room_steps
 

@@ -22,12 +22,12 @@ ms, and the servos of the other buses wait for their goals meanwhile."""
 class BusShare(NamedTuple):
     """One of the buses: its name and its servos.
 
-    places: index of each of its servos in the whole rig
+    servo_indices: index of each of its servos in the whole rig
     """
 
     name: str
     bus: ServoBus
-    places: tuple[int, ...]
+    servo_indices: tuple[int, ...]
 
 
 class _PollTimer:
@@ -36,7 +36,7 @@ class _PollTimer:
     def __init__(self) -> None:
         self._in_vain, self._due_s = 0, -inf
 
-    def due(self, now_s: float) -> bool:
+    def is_due(self, now_s: float) -> bool:
         """Return whether it must be read now."""
         return now_s >= self._due_s
 
@@ -67,15 +67,15 @@ class MultiBus:
     def __init__(self, shares: Sequence[BusShare]) -> None:
         self._shares = tuple(shares)
         self._timers = [_PollTimer() for _ in self._shares]
-        places = sorted(place for share in shares for place in share.places)
+        places = sorted(place for share in shares for place in share.servo_indices)
         if places != list(range(len(places))):
             raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
         self._count = len(places)
-        given = [place for share in shares for place in share.places]
+        given = [place for share in shares for place in share.servo_indices]
         order = sorted(range(len(given)), key=given.__getitem__)
         # None if the buses' servos are already in the order of the rig.
         self._pick: Any = itemgetter(*order) if order != sorted(order) else None
-        self._nothing = [Feedback.of_none(len(share.places)) for share in shares]
+        self._nothing = [Feedback.of_none(len(share.servo_indices)) for share in shares]
 
     def open(self) -> None:
         """Open every bus; if one cannot be opened, close those opened before it.
@@ -107,7 +107,7 @@ class MultiBus:
         feedbacks = list(self._nothing)
         lost: list[BusLost] = []
         for i, (share, timer) in enumerate(zip(self._shares, self._timers, strict=True)):
-            if not timer.due(now_s):
+            if not timer.is_due(now_s):
                 continue
             try:
                 feedbacks[i] = share.bus.read(now_s)
@@ -121,7 +121,7 @@ class MultiBus:
         missing = list[int]()
         if columns.pop():
             for share, feedback in zip(self._shares, feedbacks, strict=True):
-                missing += [share.places[i] for i in feedback.missing]
+                missing += [share.servo_indices[i] for i in feedback.missing]
         ordered = columns if self._pick is None else map(self._pick, columns)
         return Feedback._make((*ordered, tuple(sorted(missing))))
 

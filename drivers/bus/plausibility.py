@@ -85,8 +85,8 @@ class Plausibility:
         """Return whether one servo's position is plausible; call it once for every answer."""
         last, odd = self._last[slot], self._odd[slot]
         last_s = self._at_s[slot] if isnan(self._whole_s) else self._whole_s
-        if last is not None and not self._near(slot, last, last_s, position, at_s):
-            if odd and not self._near(slot, *odd[-1], position, at_s):
+        if last is not None and not self._is_near(slot, last, last_s, position, at_s):
+            if odd and not self._is_near(slot, *odd[-1], position, at_s):
                 odd.clear()
             odd.append((position, at_s))
             if len(odd) < AGREEING:
@@ -96,7 +96,7 @@ class Plausibility:
             self._whole_s = at_s
         return True
 
-    def _near(self, slot: int, before: int, before_s: float, now: int, now_s: float) -> bool:
+    def _is_near(self, slot: int, before: int, before_s: float, now: int, now_s: float) -> bool:
         since_s = max(0.0, now_s - before_s)
         if self.is_disturbed(now_s):  # two servos with one id report the same wrong position twice
             reach = PAIR_STEPS + self._fastest[slot] * (LATE_S + since_s)

@@ -43,11 +43,12 @@ class PortBus(ABC):
 
     A bus creates its parts before any of these methods is called, and may replace them.
 
-    holding, unconfirmed: messages for a servo whose torque is not off, or that does not confirm it
+    holding_text, unconfirmed_text: messages for a servo whose torque is not off, or that does not
+        confirm it
     """
 
-    holding: ClassVar[str] = "torque still on"
-    unconfirmed: ClassVar[str] = "torque-off not confirmed"
+    holding_text: ClassVar[str] = "torque still on"
+    unconfirmed_text: ClassVar[str] = "torque-off not confirmed"
 
     _port: BusPort
     _line: Exchange
@@ -55,7 +56,7 @@ class PortBus(ABC):
     _log: EventLog
     _supervisor: BusSupervisor
     _setups: tuple[ServoConfig, ...]
-    _wanted: tuple[ServoConfig, ...]
+    _target_setups: tuple[ServoConfig, ...]
     _opened = False
     _now_s = 0.0
 
@@ -95,7 +96,7 @@ class PortBus(ABC):
         if not same:
             raise ValueError("other servos need another bus: ids and models must stay")
         self._check_setups(setups)
-        self._wanted = tuple(setups)
+        self._target_setups = tuple(setups)
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
@@ -127,7 +128,7 @@ class PortBus(ABC):
         self._supervisor.stop_supervision()
         self._port.closePort()
 
-    def _reachable(self, now_s: float) -> bool:
+    def _reopen_if_needed(self, now_s: float) -> bool:
         """Reopen the port if needed; return whether it is open and no torque release is pending."""
         self._now_s = now_s
         if self._link.down and not self._link.try_reopen(now_s):
@@ -144,17 +145,17 @@ class PortBus(ABC):
         try:
             released = self._switch_off()
         except BusLost as lost:
-            self._lose(lost)
+            self._record_loss(lost)
             self._link.record_failed_release()
             raise BusLost(self._cannot_release()) from lost
         self._link.released()
-        self._line.errors["refused"] += len(released.holding)
+        self._line.errors["refused"] += len(released.holding_ids)
         for ids, what in (
-            (released.holding, self.holding),
-            (released.unconfirmed, self.unconfirmed),
+            (released.holding_ids, self.holding_text),
+            (released.unconfirmed_ids, self.unconfirmed_text),
         ):
             for servo_id in ids:
                 self._log.add(f"{self._servo_label(servo_id)}: {what}: {CUT}")
 
-    def _lose(self, lost: BusLost) -> None:
+    def _record_loss(self, lost: BusLost) -> None:
         self._link.record_loss(lost, self._now_s)

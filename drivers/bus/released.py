@@ -6,5 +6,5 @@ from typing import NamedTuple
 class ReleaseResult(NamedTuple):
     """Ids of servos that still report torque or pulses, and of those that did not answer."""
 
-    holding: tuple[int, ...]
-    unconfirmed: tuple[int, ...]
+    holding_ids: tuple[int, ...]
+    unconfirmed_ids: tuple[int, ...]

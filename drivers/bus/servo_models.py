@@ -33,7 +33,7 @@ class ServoModelInfo(NamedTuple):
     unit, unit_steps: unit in which its position is shown, "steps" or "us", and its size in steps
     middle: centre of its travel, in that unit
     family: family name of our smart servos; "" for hobby servos and those of packages
-    measured: whether it measures its position; if not, it has no other feedback either
+    measures_position: whether it measures its position; if not, it has no other feedback either
     hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it has any
     stall_torque_nm: stall torque at its rated voltage; 0.2 for a small hobby servo with metal gears
     """
@@ -45,21 +45,21 @@ class ServoModelInfo(NamedTuple):
     unit: str = "steps"
     unit_steps: float = 1.0
     middle: int = STEPS_PER_TURN // 2
-    measured: bool = True
+    measures_position: bool = True
     hottest_c: float = 70.0
     lowest_v: float = 0.0
     highest_v: float = inf
     family: str = ""
     stall_torque_nm: float = 0.2
 
-    def fits(self, kind: str) -> bool:
+    def fits_bus(self, kind: str) -> bool:
         """Return whether it can be on a bus of this kind; any board moves a hobby servo."""
         if kind == self.bus or self.bus in _ALSO_MOVED.get(kind, ()):
             return True
         return self.bus in HOBBY_KINDS and kind in HOBBY_KINDS
 
 
-def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoModelInfo:
+def _smart_servo(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoModelInfo:
     """Return the model information of a smart servo."""
     return ServoModelInfo(
         bus,
@@ -76,9 +76,9 @@ def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoMod
 
 
 SERVOS: dict[str, ServoModelInfo] = {
-    **{n: _smart("dynamixel", "dynamixel", m, STEPS_PER_TURN) for n, m in DYNAMIXEL.items()},
-    **{n: _smart("feetech", "feetech", m, m.steps_per_turn) for n, m in FEETECH.items()},
-    **{n: _smart("feetech", "feetech scs", m, SCS_STEPS) for n, m in SCS_MODELS.items()},
+    **{n: _smart_servo("dynamixel", "dynamixel", m, STEPS_PER_TURN) for n, m in DYNAMIXEL.items()},
+    **{n: _smart_servo("feetech", "feetech", m, m.steps_per_turn) for n, m in FEETECH.items()},
+    **{n: _smart_servo("feetech", "feetech scs", m, SCS_STEPS) for n, m in SCS_MODELS.items()},
     **{
         name: ServoModelInfo(
             "maestro",

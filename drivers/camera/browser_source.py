@@ -24,7 +24,7 @@ class BrowserSource:
     def __init__(self, pictures: JpegSlot) -> None:
         self._pictures = pictures
         self._number = 0
-        self._told = False
+        self._reported = False
         self._events: list[str] = []
 
     def open(self) -> None:
@@ -43,8 +43,8 @@ class BrowserSource:
             found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
             image = to_bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
             if image is None:
-                if not self._told:
-                    self._told = True
+                if not self._reported:
+                    self._reported = True
                     self._events.append(
                         "a browser sends pictures that cannot be read: they are skipped"
                     )

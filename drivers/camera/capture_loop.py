@@ -24,11 +24,11 @@ def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
     x, y = sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
     if isnan(x) or isnan(y):
         return False  # not numbers: likewise
-    outside = _outside_px(x, y, width_px, height_px)
+    outside = _distance_outside_px(x, y, width_px, height_px)
     return outside > 0.0 or _is_misplaced(points, width_px, height_px)
 
 
-def _outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
+def _distance_outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
     """Return the distance of a point outside the frame; negative inside."""
     return max(-0.5 - x, x - width_px + 0.5, -0.5 - y, y - height_px + 0.5)
 
@@ -36,7 +36,7 @@ def _outside_px(x: float, y: float, width_px: int, height_px: int) -> float:
 def _is_misplaced(points: list[tuple[float, float]], width_px: int, height_px: int) -> bool:
     """Return whether a point is farther outside the frame than the size of the face."""
     size = max((max(along) - min(along) for along in zip(*points, strict=True)), default=0.0)
-    return any(_outside_px(x, y, width_px, height_px) > size for x, y in points)
+    return any(_distance_outside_px(x, y, width_px, height_px) > size for x, y in points)
 
 
 class OffFrameReport:
@@ -102,7 +102,7 @@ class FrameAnalyzer:
         self._health = CameraHealth(rotation_deg)
         self._off_frame = OffFrameReport()
 
-    def look(self, shot: Shot) -> Detections:
+    def analyze(self, shot: Shot) -> Detections:
         """Find and locate faces (unless the camera has found them), people, palms and motion."""
         began_s = perf_counter()
         height, width = shot.image.shape[:2]
@@ -150,7 +150,7 @@ class FrameAnalyzer:
             scene=self._cuts.scene(shot.image),
             people=people,
             palms=palms,
-            conditions=self._health.look(shot, faces, spent_s, field_assumed),
+            conditions=self._health.assess(shot, faces, spent_s, field_assumed),
         )
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)
@@ -241,7 +241,7 @@ class CaptureLoop:
         self._source.open()
         self._counted = self._number = 0
 
-    def next(self, stop: threading.Event) -> Detections | None:
+    def next_detections(self, stop: threading.Event) -> Detections | None:
         """Return the detections in the next frame, None if ``stop`` was set meanwhile.
 
         Raises:
@@ -251,7 +251,7 @@ class CaptureLoop:
         if shot is None:
             return None
         self._number = self._counted + shot.number
-        found = self._frames.look(shot._replace(number=self._number))
+        found = self._frames.analyze(shot._replace(number=self._number))
         for line in (*self._source.events(), *self._frames.events()):
             self._report(line)
         return found

@@ -60,14 +60,14 @@ class ClockSync:
             self._drift, self._offset_s = 0.0, 0.0
             self.jumps += 1
         self._store(device_s, difference_s)
-        host_s = device_s + self._line_s(device_s) - self._least_delay_s
+        host_s = device_s + self._fitted_difference_s(device_s) - self._least_delay_s
         if self._last is not None and device_s >= self._last[0]:
             host_s = max(host_s, self._last[1])
         host_s = min(host_s, arrived_s)
         self._last = device_s, host_s
         return host_s
 
-    def _line_s(self, device_s: float) -> float:
+    def _fitted_difference_s(self, device_s: float) -> float:
         """Return host minus device time at a device time."""
         return self._offset_s + self._drift * device_s
 
@@ -75,7 +75,7 @@ class ClockSync:
         """Return whether the clocks no longer match the line."""
         if self._last is None:
             return False
-        off_s = difference_s - self._line_s(device_s)
+        off_s = difference_s - self._fitted_difference_s(device_s)
         if off_s <= _JUMP_S:
             self._late_since_s = None
             # A frame cannot arrive before its capture: the device's clock is ahead of the line.
@@ -95,13 +95,13 @@ class ClockSync:
             self._bucket = bucket
             self._drift = self._slope()  # of whole buckets only
             self._best.append(new)
-        elif self._above_drift(new) < self._above_drift(self._best[-1]):
+        elif self._without_drift_s(new) < self._without_drift_s(self._best[-1]):
             self._best[-1] = new
         else:
             return
-        self._offset_s = min(self._above_drift(best) for best in self._best)
+        self._offset_s = min(self._without_drift_s(best) for best in self._best)
 
-    def _above_drift(self, best: _BestFrame) -> float:
+    def _without_drift_s(self, best: _BestFrame) -> float:
         """Return a frame's difference without the drift since device time 0."""
         return best.difference_s - self._drift * best.device_s
 

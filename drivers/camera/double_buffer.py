@@ -29,11 +29,11 @@ class DoubleBuffer:
         return int(self._count.value)
 
     @property
-    def older(self) -> int:
+    def older_index(self) -> int:
         """Return the index of the entry to fill next, 0 or 1."""
         return self.count % 2
 
-    def filled(self) -> None:
+    def mark_filled(self) -> None:
         """Mark the older entry as the newer; only one thread writes."""
         self._count.value += 1
 
@@ -76,11 +76,11 @@ class JpegSlot:
         """Store a picture; only one thread writes. Return False if it is too large."""
         if not 0 < len(data) <= MOST_BYTES:
             return False
-        entry = self._newest.older
+        entry = self._newest.older_index
         start = entry * MOST_BYTES
         self._entries[start : start + len(data)] = data
         self._sizes[entry], self._times[entry] = len(data), came_s
-        self._newest.filled()
+        self._newest.mark_filled()
         return True
 
     @property
@@ -104,7 +104,7 @@ _POSE_WIDTH = 13  # time, the rotation's nine numbers, the position
 Row = tuple[float, float, float]
 
 
-class PoseAt(NamedTuple):
+class TimedPose(NamedTuple):
     """Rotation (three rows) and position [m] of the head in the world at a time [s]."""
 
     t_s: float
@@ -130,23 +130,23 @@ class PoseSlot:
         if self._newest.count == 0:
             self._first_s.value = t_s
         x, y, z = R_world_head
-        start = self._newest.older * _POSE_WIDTH
+        start = self._newest.older_index * _POSE_WIDTH
         self._entries[start : start + _POSE_WIDTH] = [t_s, *x, *y, *z, *p_world_head_m]
-        self._newest.filled()
+        self._newest.mark_filled()
 
     @property
     def first_s(self) -> float:
         """Return the time of the first pose, seconds; 0 before it."""
         return float(self._first_s.value)
 
-    def newest(self) -> PoseAt | None:
+    def newest(self) -> TimedPose | None:
         """Return the newest pose, None before the first."""
         found = self._newest.read(self._copy)
         if found is None:
             return None
         t_s, *v = found[1]
         rows = (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])
-        return PoseAt(t_s, rows, (v[9], v[10], v[11]))
+        return TimedPose(t_s, rows, (v[9], v[10], v[11]))
 
     def _copy(self, entry: int) -> list[float]:
         start = entry * _POSE_WIDTH
@@ -185,7 +185,7 @@ class PoseBuffer:
         self._entries[start : start + _WIDTH] = [t_s, *x, *y, *z]
         self._count.value = count + 1
 
-    def at(self, t_s: float) -> Floats | None:
+    def rotation_at(self, t_s: float) -> Floats | None:
         """Return R_world_camera (3, 3) at a time; None if it is not stored."""
         # The complete entries in the order of time: (n, 10).
         before = int(self._count.value)
@@ -208,7 +208,7 @@ class PoseBuffer:
         )
         return np.asarray(U @ Vt)
 
-    def turned(self, now_s: float, before_s: float) -> Floats | None:
+    def rotation_between(self, now_s: float, before_s: float) -> Floats | None:
         """Return R_now_before (3, 3), which turns directions in camera axes; None if unknown."""
-        now, before = self.at(now_s), self.at(before_s)
+        now, before = self.rotation_at(now_s), self.rotation_at(before_s)
         return None if now is None or before is None else np.asarray(now.T @ before)

@@ -95,7 +95,7 @@ class GuardedCamera:
 
         def read_camera() -> tuple[Detections | None, str, tuple[str, ...]]:
             found = self.camera.latest(now_s)
-            wrong = "" if found is self._checked else fault_of(found)
+            wrong = "" if found is self._checked else detections_fault(found)
             return found, wrong, tuple(map(str, self.camera.events()))
 
         outcome = self._call(read_camera)
@@ -147,20 +147,20 @@ class GuardedCamera:
         self._log.add(f"{self._label} {why}: the rig continues without frames")
 
 
-def fault_of(found: Any) -> str:
+def detections_fault(found: Any) -> str:
     """Return the fault in the detections of a camera, "" for none."""
     try:
-        return "" if found is None else _fault(found)
+        return "" if found is None else _detections_fault(found)
     except Exception as error:  # its attributes may be anything
         return f"detections that cannot be read ({describe_error(error)})"
 
 
-def _fault(found: Any) -> str:
+def _detections_fault(found: Any) -> str:
     if not isinstance(found, Detections):
         return f"a {type(found).__name__}, wanted Detections or None"
-    if not _finite(found.captured_s) or not isinstance(found.number, int):
+    if not _is_finite(found.captured_s) or not isinstance(found.number, int):
         return f"captured_s {found.captured_s!r} and number {found.number!r}"
-    if not (_whole(found.width_px) and _whole(found.height_px)):
+    if not (_is_positive_int(found.width_px) and _is_positive_int(found.height_px)):
         return f"a frame of {found.width_px!r} x {found.height_px!r}"
     if found.turn is not None and not found.turn.is_rotation:
         return "a turn of the camera that is no rotation"
@@ -169,43 +169,47 @@ def _fault(found: Any) -> str:
     if not all(isinstance(line, str) for line in found.conditions):
         return f"conditions that are no lines of text: {found.conditions!r}"
     for person in found.people:
-        if not (all(map(_finite, (*person.head_px, person.trunk_px))) and person.trunk_px > 0.0):
+        if not (all(map(_is_finite, (*person.head_px, person.trunk_px))) and person.trunk_px > 0.0):
             return f"a person at {person.head_px!r} of {person.trunk_px!r} px"
     for palm in found.palms or ():
-        if not (all(map(_finite, (*palm.centre_px, palm.size_px))) and palm.size_px > 0.0):
+        if not (all(map(_is_finite, (*palm.centre_px, palm.size_px))) and palm.size_px > 0.0):
             return f"a palm at {palm.centre_px!r} of {palm.size_px!r} px"
     for face in found.faces:
-        if wrong := fault_of_face(face):
+        if wrong := face_fault(face):
             return wrong
     for blob in found.blobs:
         if not isinstance(blob, MovingBlob) or not all(
-            map(_finite, (*blob.p_camera_m, blob.radius_m))
+            map(_is_finite, (*blob.p_camera_m, blob.radius_m))
         ):
             return f"a thing {str(blob)[:60]!r}"
     return ""
 
 
-def fault_of_face(face: Any) -> str:
+def face_fault(face: Any) -> str:
     """Return the fault in a face, "" for none."""
     if not isinstance(face, DetectedFace):
         return f"a {type(face).__name__} as a face, wanted a DetectedFace"
-    if len(face.box_px) != 4 or not all(map(_finite, face.box_px)) or not _finite(face.confidence):
+    if (
+        len(face.box_px) != 4
+        or not all(map(_is_finite, face.box_px))
+        or not _is_finite(face.confidence)
+    ):
         return f"a face with the box {face.box_px!r} and confidence {face.confidence!r}"
     shape = getattr(face.landmarks_px, "shape", None)
-    if shape != (5, 2) or not all(map(_finite, face.landmarks_px.ravel().tolist())):
+    if shape != (5, 2) or not all(map(_is_finite, face.landmarks_px.ravel().tolist())):
         return "a face whose landmarks are not five finite points"
     gaze = face.gaze_camera
-    if gaze is not None and (len(gaze) != 3 or not all(map(_finite, gaze)) or not any(gaze)):
+    if gaze is not None and (len(gaze) != 3 or not all(map(_is_finite, gaze)) or not any(gaze)):
         return f"a face with the gaze {gaze!r}, wanted a direction (x, y, z) or None"
     return ""
 
 
-def _finite(value: Any) -> bool:
+def _is_finite(value: Any) -> bool:
     try:
         return isfinite(value)
     except TypeError:
         return False
 
 
-def _whole(value: Any) -> bool:
+def _is_positive_int(value: Any) -> bool:
     return isinstance(value, int) and value > 0

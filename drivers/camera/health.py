@@ -77,34 +77,34 @@ FIELD_TEXT = (
 class PictureStats(NamedTuple):
     """Image statistics of a frame.
 
-    bright: 95th percentile of the grey level, 0..255
+    brightness: 95th percentile of the grey level, 0..255
     edge_px: width of its edges, scaled to at most 640 px of width; None if it has too few
     """
 
-    bright: float
+    brightness: float
     edge_px: float | None
 
 
 class CameraObservation(NamedTuple):
     """Observations of a camera for one assessment; None: unknown.
 
-    upright: whether a nearly upright face is found
+    has_upright_face: whether a nearly upright face is found
     turned_deg: clockwise angle of the frame, from faces that are upright after turning it back; 0:
         it is upright
-    offered, looked_at: delivered and analysed frames since the last assessment; over_s: the time
-        between
+    delivered_frames, analysed_frames: counts since the last assessment
+    duration_s: time since the last assessment
     spent_ms: time per frame by stage
-    field_assumed: whether the field of view is not measured
+    is_field_assumed: whether the field of view is not measured
     """
 
     picture: PictureStats | None = None
-    upright: bool = False
+    has_upright_face: bool = False
     turned_deg: float | None = None
-    offered: int = 0
-    looked_at: int = 0
-    over_s: float = 0.0
+    delivered_frames: int = 0
+    analysed_frames: int = 0
+    duration_s: float = 0.0
     spent_ms: Mapping[str, float] = {}
-    field_assumed: bool = False
+    is_field_assumed: bool = False
 
 
 class _Condition:
@@ -148,7 +148,7 @@ class HealthModel:
         return tuple([one.text for one in self._on.values() if one.text])
 
     @property
-    def lacks_upright(self) -> bool:
+    def lacks_upright_faces(self) -> bool:
         """Return whether few upright faces are found, so that turned ones are worth a search."""
         few = len(self._upright) >= _BEGINS and 2 * sum(self._upright) < len(self._upright)
         return few and not self._on["turned"].text
@@ -156,27 +156,27 @@ class HealthModel:
     def step(self, seen: CameraObservation) -> tuple[str, ...]:
         """Add observations; return the lines to report."""
         texts = {
-            "dark": self._dark(seen.picture),
-            "turned": self._roll(seen),
-            "blurred": self._blurred(seen.picture),
-            "field": FIELD_TEXT if seen.field_assumed else "",
-            "slow": self._slow(seen),
+            "dark": self._dark_condition(seen.picture),
+            "turned": self._roll_condition(seen),
+            "blurred": self._blur_condition(seen.picture),
+            "field": FIELD_TEXT if seen.is_field_assumed else "",
+            "slow": self._slow_condition(seen),
         }
         return tuple([line for name, text in texts.items() if (line := self._on[name].step(text))])
 
-    def _dark(self, picture: PictureStats | None) -> str | None:
+    def _dark_condition(self, picture: PictureStats | None) -> str | None:
         if picture is None:
             return None
-        if picture.bright >= (_LIT if self._on["dark"].text else _DARK):
+        if picture.brightness >= (_LIT if self._on["dark"].text else _DARK):
             return ""
-        if picture.bright < _BLACK:
+        if picture.brightness < _BLACK:
             return "the picture is black: uncover the lens, switch on a light"
         return (
             "the picture is too dark: switch on a light before the person, "
             "or set webcam.exposure_ms and webcam.gain higher"
         )
 
-    def _blurred(self, picture: PictureStats | None) -> str | None:
+    def _blur_condition(self, picture: PictureStats | None) -> str | None:
         if picture is None or picture.edge_px is None:
             return None
         if picture.edge_px <= (_SHARP_PX if self._on["blurred"].text else _BLURRED_PX):
@@ -185,8 +185,8 @@ class HealthModel:
             "the picture is out of focus: clean or turn the lens, or set webcam.focus (oak.focus)"
         )
 
-    def _roll(self, seen: CameraObservation) -> str | None:
-        self._upright.append(seen.upright)
+    def _roll_condition(self, seen: CameraObservation) -> str | None:
+        self._upright.append(seen.has_upright_face)
         if 2 * sum(self._upright) > len(self._upright):
             self._turned.clear()
             return ""
@@ -195,11 +195,13 @@ class HealthModel:
         self._turned.append(seen.turned_deg)
         if len(self._turned) < _PROBES or 0.0 in self._turned:
             return None
-        if any(abs(_within_half(one - seen.turned_deg)) > _AGREE_DEG for one in self._turned):
+        if any(
+            abs(_wrap_half_turn_deg(one - seen.turned_deg)) > _AGREE_DEG for one in self._turned
+        ):
             return None
         deg = seen.turned_deg
         quarter = round(deg / 90.0) * 90 % 360
-        off = abs(_within_half(deg - quarter))
+        off = abs(_wrap_half_turn_deg(deg - quarter))
         about = (
             f"{quarter} deg" if off < 0.5 * _QUARTER_DEG else f"about {5 * round(deg / 5.0)} deg"
         )
@@ -208,18 +210,21 @@ class HealthModel:
             cure = f"set camera.rotation: {(self._rotation - quarter) % 360}"
         return f"the camera is turned by {about}, according to the faces: {cure}"
 
-    def _slow(self, seen: CameraObservation) -> str | None:
-        if seen.over_s <= 0.0 or seen.offered <= 0:
+    def _slow_condition(self, seen: CameraObservation) -> str | None:
+        if seen.duration_s <= 0.0 or seen.delivered_frames <= 0:
             return None
         was = bool(self._on["slow"].text)
         share, hz = (_SHARE_AGAIN, _AGAIN_HZ) if was else (_SHARE, _SLOW_HZ)
-        if seen.looked_at >= share * seen.offered or seen.looked_at >= hz * seen.over_s:
+        if (
+            seen.analysed_frames >= share * seen.delivered_frames
+            or seen.analysed_frames >= hz * seen.duration_s
+        ):
             return ""
-        each_ms = 1e3 * seen.over_s / max(1, seen.looked_at)
+        each_ms = 1e3 * seen.duration_s / max(1, seen.analysed_frames)
         spent = {**seen.spent_ms, "reading": each_ms - sum(seen.spent_ms.values())}
         stage = max(spent, key=lambda name: spent[name])
         return (
-            f"{seen.looked_at / seen.over_s:.0f} of {seen.offered / seen.over_s:.0f} frames a "
+            f"{seen.analysed_frames / seen.duration_s:.0f} of {seen.delivered_frames / seen.duration_s:.0f} frames a "
             f"second are analysed; {stage} take{'s' * (stage in ('motion', 'reading'))} "
             f"{spent[stage]:.0f} of {each_ms:.0f} ms a frame: {_REMEDIES[stage]}"
         )
@@ -235,13 +240,13 @@ class CameraHealth:
 
     def __init__(self, rotation_deg: int = 0, probe_s: float = PROBE_S) -> None:
         self._model, self._every_s = HealthModel(rotation_deg), probe_s
-        self._probe = TurnedFaces()
+        self._probe = TurnedFaceSearch()
         self._events: list[str] = []
         self._due_s, self._probe_s, self._last_s = -inf, -inf, -inf
         self._number = self._looked_at = 0
         self._spent: Counter[str] = Counter()
 
-    def look(
+    def assess(
         self,
         shot: Shot,
         faces: Sequence[DetectedFace],
@@ -270,8 +275,8 @@ class CameraHealth:
         self._due_s, self._last_s = t_s + EVERY_S, t_s
         seen = CameraObservation(
             picture_stats(shot.image),
-            _any_upright(faces),
-            self._turned(shot.image, t_s, bool(faces)),
+            _has_upright_face(faces),
+            self._search_turned(shot.image, t_s, bool(faces)),
             shot.number - self._number,
             self._looked_at,
             over_s,
@@ -288,9 +293,9 @@ class CameraHealth:
         told, self._events = tuple(self._events), []
         return told
 
-    def _turned(self, image: ImageArray, t_s: float, tilted: bool) -> float | None:
+    def _search_turned(self, image: ImageArray, t_s: float, tilted: bool) -> float | None:
         """Search a turned copy if upright faces are missing and a search is due."""
-        if not self._model.lacks_upright or self._probe_s > t_s:
+        if not self._model.lacks_upright_faces or self._probe_s > t_s:
             return None
         found = self._probe.find(image, tilted)
         fruitless = tilted and found == 0.0
@@ -298,7 +303,7 @@ class CameraHealth:
         return found
 
 
-class TurnedFaces:
+class TurnedFaceSearch:
     """Search for faces in turned frames, in another direction each time until one is found."""
 
     def __init__(self) -> None:
@@ -327,25 +332,25 @@ class TurnedFaces:
             return None
         small = _limit_width(image[..., :3], _PROBE_PX)
         if tilted:
-            if _any_upright(detector.find(small)):
+            if _has_upright_face(detector.find(small)):
                 return 0.0
-        elif not _any_sure(detector.find(_turn_back(small, self._ways[0]))):
+        elif not _has_confident_face(detector.find(_rotate_back(small, self._ways[0]))):
             self._ways.rotate(-1)
             return 0.0
         found = [
             (face.confidence - _PER_DEG * abs(roll_deg(face)), way, face)
             for way in range(0, 360, 45)
-            for face in detector.find(_turn_back(small, way))
+            for face in detector.find(_rotate_back(small, way))
         ]
         if not found:
             return 0.0
         _, way, surest = max(found, key=lambda one: one[0])
-        turned_deg = _within_half(way + roll_deg(surest))
+        turned_deg = _wrap_half_turn_deg(way + roll_deg(surest))
         sure = surest.confidence >= _SURE and abs(turned_deg) > _UPRIGHT_DEG
         return turned_deg if sure else 0.0
 
 
-def _turn_back(image: NDArray[Any], deg: float) -> ImageArray:
+def _rotate_back(image: NDArray[Any], deg: float) -> ImageArray:
     """Return a whole image turned counter-clockwise."""
     if deg % 90 == 0:
         return np.asarray(np.ascontiguousarray(np.rot90(image, int(deg) // 90)), np.uint8)
@@ -356,16 +361,16 @@ def _turn_back(image: NDArray[Any], deg: float) -> ImageArray:
     return np.asarray(cv2.warpAffine(image, turn, (side, side)), np.uint8)
 
 
-def _any_sure(faces: Sequence[DetectedFace]) -> bool:
+def _has_confident_face(faces: Sequence[DetectedFace]) -> bool:
     return any(face.confidence >= _SURE for face in faces)
 
 
-def _any_upright(faces: Sequence[DetectedFace]) -> bool:
+def _has_upright_face(faces: Sequence[DetectedFace]) -> bool:
     """Return whether any face is confident and nearly upright."""
-    return _any_sure([face for face in faces if abs(roll_deg(face)) < _UPRIGHT_DEG])
+    return _has_confident_face([face for face in faces if abs(roll_deg(face)) < _UPRIGHT_DEG])
 
 
-def _within_half(deg: float) -> float:
+def _wrap_half_turn_deg(deg: float) -> float:
     """Return the same angle within -180..180 deg."""
     return (deg + 180.0) % 360.0 - 180.0
 

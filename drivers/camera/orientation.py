@@ -44,26 +44,26 @@ class FrameOrientation:
     mirrored: bool = False
 
     @property
-    def plain(self) -> bool:
+    def is_plain(self) -> bool:
         """Return whether frames need no change."""
         return self.rotation == 0 and not self.mirrored
 
-    def upright(self, shot: Shot) -> Shot:
+    def turn_shot(self, shot: Shot) -> Shot:
         """Return a frame turned upright, with its data."""
-        if self.plain:
+        if self.is_plain:
             return shot
         height, width = shot.image.shape[:2]
         return shot._replace(
-            image=self.turned(shot.image),
-            depth_m=None if shot.depth_m is None else self.turned(shot.depth_m),
-            lens=None if shot.lens is None else self.lens(shot.lens, width, height),
+            image=self.turn_image(shot.image),
+            depth_m=None if shot.depth_m is None else self.turn_image(shot.depth_m),
+            lens=None if shot.lens is None else self.turn_lens(shot.lens, width, height),
             faces=None
             if shot.faces is None
-            else tuple(self.face(face, width, height) for face in shot.faces),
-            turn=None if shot.turn is None else self._turn(shot.turn),
+            else tuple(self.turn_face(face, width, height) for face in shot.faces),
+            turn=None if shot.turn is None else self._convert_turn(shot.turn),
         )
 
-    def turned(self, image: NDArray[Any]) -> NDArray[Any]:
+    def turn_image(self, image: NDArray[Any]) -> NDArray[Any]:
         """Return an image (h, w) or (h, w, c) turned upright, read-only."""
         import cv2  # only in the process with the camera, not in that of the control loop
 
@@ -80,33 +80,33 @@ class FrameOrientation:
         out.setflags(write=False)
         return out
 
-    def points(self, points_px: Floats, width_px: int, height_px: int) -> Floats:
+    def turn_points(self, points_px: Floats, width_px: int, height_px: int) -> Floats:
         """Return the positions of pixels (n, 2) of a frame of this size in the upright one."""
-        across = self._across()
+        across = self._image_rotation()
         far = np.array([width_px - 1, height_px - 1], dtype=np.float64)
         least = np.minimum(across @ far, 0.0)  # the corner that becomes the upper left one
         out: Floats = np.asarray(points_px, dtype=np.float64) @ across.T - least
         return out
 
-    def lens(self, lens: Intrinsics, width_px: int, height_px: int) -> Intrinsics:
+    def turn_lens(self, lens: Intrinsics, width_px: int, height_px: int) -> Intrinsics:
         """Return the lens of upright frames from that of original frames of this size."""
-        (cx, cy), *_ = self.points(np.array([[lens.cx_px, lens.cy_px]]), width_px, height_px)
-        across = self._across()
+        (cx, cy), *_ = self.turn_points(np.array([[lens.cx_px, lens.cy_px]]), width_px, height_px)
+        across = self._image_rotation()
         fx, fy = np.abs(across) @ (lens.fx_px, lens.fy_px)
         k1, k2, p1, p2, k3 = lens.distortion
         # The tangential part is r2 t + 2 (t . x) x with t = (p2, p1), so t turns like a point.
         p2, p1 = across @ (p2, p1)
         return Intrinsics(fx, fy, float(cx), float(cy), (k1, k2, float(p1), float(p2), k3))
 
-    def face(self, face: DetectedFace, width_px: int, height_px: int) -> DetectedFace:
+    def turn_face(self, face: DetectedFace, width_px: int, height_px: int) -> DetectedFace:
         """Return a face of a frame of this size in the coordinates of the upright frame."""
         x, y, width, height = face.box_px
-        ends = self.points(np.array([(x, y), (x + width, y + height)]), width_px, height_px)
+        ends = self.turn_points(np.array([(x, y), (x + width, y + height)]), width_px, height_px)
         (left, top), (right, bottom) = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
-        marks = self.points(face.landmarks_px, width_px, height_px)
+        marks = self.turn_points(face.landmarks_px, width_px, height_px)
         gaze = face.gaze_camera
         if gaze is not None:
-            gx, gy = (self._across() @ gaze[:2]).tolist()
+            gx, gy = (self._image_rotation() @ gaze[:2]).tolist()
             gaze = gx, gy, gaze[2]
         return replace(
             face,
@@ -115,14 +115,14 @@ class FrameOrientation:
             gaze_camera=gaze,
         )
 
-    def _turn(self, turn: CameraTurn) -> CameraTurn:
+    def _convert_turn(self, turn: CameraTurn) -> CameraTurn:
         """Return the camera's turn in the axes of upright frames."""
         axes = np.eye(3)
-        axes[:2, :2] = self._across()
+        axes[:2, :2] = self._image_rotation()
         x, y, z = (axes @ np.array(turn.R_start_camera) @ axes.T).tolist()
         return turn._replace(R_start_camera=(tuple(x), tuple(y), tuple(z)))
 
-    def _across(self) -> Floats:
+    def _image_rotation(self) -> Floats:
         """Return the matrix (2, 2) that turns directions in the image."""
         mirror = np.diag([-1.0 if self.mirrored else 1.0, 1.0])
         return np.array(_QUARTERS[self.rotation], dtype=np.float64) @ mirror
@@ -163,7 +163,7 @@ class UprightSource:
             CameraError: there will be no more frames.
         """
         shot = self._source.take(now_s, stop)
-        return None if shot is None else self._orientation.upright(shot)
+        return None if shot is None else self._orientation.turn_shot(shot)
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
@@ -178,8 +178,10 @@ def upright(
     source: Callable[[], FrameSource], orientation: FrameOrientation
 ) -> Callable[[], FrameSource]:
     """Return a factory of a source with upright frames; picklable."""
-    return source if orientation.plain else partial(_upright, source, orientation)
+    return source if orientation.is_plain else partial(_create_upright_source, source, orientation)
 
 
-def _upright(source: Callable[[], FrameSource], orientation: FrameOrientation) -> FrameSource:
+def _create_upright_source(
+    source: Callable[[], FrameSource], orientation: FrameOrientation
+) -> FrameSource:
     return UprightSource(source(), orientation)

@@ -44,7 +44,7 @@ class Intrinsics:
             raise ValueError(f"distortion is five finite numbers, not {self.distortion}")
 
     @property
-    def distorts(self) -> bool:
+    def has_distortion(self) -> bool:
         """Return whether straight lines are bent in its frames."""
         return any(self.distortion)
 

@@ -196,12 +196,12 @@ class CameraReplay:
     @property
     def length_s(self) -> float:
         """Return the duration of one repeat, seconds."""
-        self._opened()
+        self._require_recording()
         return self._times.length_s
 
     def due_s(self, number: int) -> float:
         """Return the film time at which a frame is due."""
-        self._opened()
+        self._require_recording()
         return self._times.due_s(number)
 
     def shot(self, number: int) -> Shot:
@@ -210,7 +210,7 @@ class CameraReplay:
         Raises:
             CameraError: the file is damaged there.
         """
-        recording = self._opened()
+        recording = self._require_recording()
         found = recording.shot((number - 1) % len(recording.times_s))
         return found._replace(captured_s=self._times.due_s(number), number=number)
 
@@ -220,7 +220,7 @@ class CameraReplay:
         Raises:
             CameraError: the file is damaged there.
         """
-        self._opened()
+        self._require_recording()
         due = self._pace.wait(self._times, now_s, stop)
         return None if due is None else self.shot(due.number)._replace(captured_s=due.host_s)
 
@@ -235,7 +235,7 @@ class CameraReplay:
             self._recording.close()
         self._recording = None
 
-    def _opened(self) -> Recording:
+    def _require_recording(self) -> Recording:
         """Return the open file."""
         if self._recording is None:
             raise CameraError(f"{self._path} is not open: call open() before reading")

@@ -363,8 +363,8 @@ class CameraProcess:
         self._number = self._counted + found.number
         if self._starts > 1:
             found = offset_ids(found, self._starts - 1)
-        slots[0].see(message.image)
-        slots[1].see(message.depth)
+        slots[0].record_memory(message.image)
+        slots[1].record_memory(message.depth)
         found = replace(found, number=self._number)
         self._newest = SharedDetections(found, message.image, message.depth, slots)
         now_s = self._now_s()

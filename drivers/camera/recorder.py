@@ -26,7 +26,7 @@ class RecordingWriter:
 
     The file has no chunks, so after a kill it can be read up to the last complete frame.
 
-    written: number of frames so far
+    written_frames: number of frames so far
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class RecordingWriter:
         self._writer.add_metadata("gazerig", about)
         self._file.flush()
         self._synced_ns = 0
-        self.written = 0
+        self.written_frames = 0
 
     def write(self, shot: Shot) -> None:
         """Add a frame and its data.
@@ -84,7 +84,7 @@ class RecordingWriter:
         for topic, data in messages:
             self._writer.add_message(self._channels[topic], stamp, data, stamp, number)
         self._file.flush()
-        self.written += 1
+        self.written_frames += 1
         if abs(stamp - self._synced_ns) >= _SYNC_NS:
             self._synced_ns = stamp
             os.fsync(self._file.fileno())
@@ -123,8 +123,8 @@ class CameraRecorder:
         jpeg_quality: Quality 1..100, None keeps the frames exactly.
         over: Whether to overwrite an existing file.
 
-    failure: reason why the recording ended early, or ""; left_out: number of frames omitted because
-        of a slow disk
+    failure: reason why the recording ended early, or ""
+    dropped_frames: number of frames omitted because of a slow disk
     """
 
     def __init__(
@@ -146,12 +146,12 @@ class CameraRecorder:
         self._waiting: queue.Queue[_QueuedFrame | None] = queue.Queue(_MOST_WAITING)
         self._events: list[str] = []
         self.failure = ""
-        self.left_out = 0
+        self.dropped_frames = 0
 
     @property
-    def written(self) -> int:
+    def written_frames(self) -> int:
         """Return the number of frames in the file."""
-        return 0 if self._writer is None else self._writer.written
+        return 0 if self._writer is None else self._writer.written_frames
 
     def open(self) -> None:
         """Open the source and, the first time, create the file.
@@ -181,12 +181,12 @@ class CameraRecorder:
         shot = self._source.take(now_s, stop)
         if shot is not None and not self.failure:
             if self._waiting.full():
-                if self.left_out == 0:
+                if self.dropped_frames == 0:
                     self._events.append(
                         f"{self._path}: this machine is slower than the camera, frames are omitted "
                         "from the recording; --jpeg makes them smaller and faster"
                     )
-                self.left_out += 1
+                self.dropped_frames += 1
             elif self._encoders is not None:
                 messages = self._encoders.submit(encode_shot, shot, self._jpeg_quality)
                 self._waiting.put(_QueuedFrame(shot.captured_s, shot.number, messages))
@@ -217,10 +217,10 @@ class CameraRecorder:
         assert writer is not None
         while (one := self._waiting.get()) is not None:
             if not self.failure:
-                self._try(partial(_add, writer, one))
-        self._try(writer.close)
+                self._call_guarded(partial(_write_encoded, writer, one))
+        self._call_guarded(writer.close)
 
-    def _try(self, write: Callable[[], None]) -> None:
+    def _call_guarded(self, write: Callable[[], None]) -> None:
         """Call ``write``, or record why it failed: the camera continues after any error."""
         try:
             write()
@@ -231,6 +231,6 @@ class CameraRecorder:
                 self._events.append(self.failure)
 
 
-def _add(writer: RecordingWriter, one: _QueuedFrame) -> None:
+def _write_encoded(writer: RecordingWriter, one: _QueuedFrame) -> None:
     """Wait until a frame is encoded, and write it."""
     writer.add(one.captured_s, one.number, one.messages.result())

@@ -105,7 +105,7 @@ def encode_shot(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]
     if shot.lens is not None:
         fx, fy, cx, cy = shot.lens.fx_px, shot.lens.fy_px, shot.lens.cx_px, shot.lens.cy_px
         lens = {
-            "timestamp": _stamp(stamp),
+            "timestamp": _time_stamp(stamp),
             "frame_id": _FRAME,
             "width": shot.image.shape[1],
             "height": shot.image.shape[0],
@@ -117,19 +117,19 @@ def encode_shot(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]
         }
         found.append((LENS, _dump(lens)))
     if shot.depth_m is not None:
-        file = _file(".png", to_millimetres(shot.depth_m), _DEPTH_PNG)
-        found.append((DEPTH, _dump(_image("png", file, stamp))))
+        file = _encode_file(".png", to_millimetres(shot.depth_m), _DEPTH_PNG)
+        found.append((DEPTH, _dump(_image_message("png", file, stamp))))
     if shot.faces is not None:
         found.append((FACES, _dump({"faces": [_face(face) for face in shot.faces]})))
     if shot.turn is not None:
         R = [value for row in shot.turn.R_start_camera for value in row]
         found.append((TURN, _dump({"epoch": shot.turn.epoch, "R": R})))
     if jpeg_quality is None:
-        file = _file(".png", shot.image, _COLOUR_PNG)
-        found.append((PICTURE, _dump(_image("png", file, stamp))))
+        file = _encode_file(".png", shot.image, _COLOUR_PNG)
+        found.append((PICTURE, _dump(_image_message("png", file, stamp))))
     else:
-        file = _file(".jpg", shot.image, [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])
-        found.append((PICTURE, _dump(_image("jpeg", file, stamp))))
+        file = _encode_file(".jpg", shot.image, [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])
+        found.append((PICTURE, _dump(_image_message("jpeg", file, stamp))))
     return found
 
 
@@ -139,7 +139,7 @@ def decode_image(data: bytes) -> ImageArray:
     Raises:
         BadMessage: it contains no frame.
     """
-    pixels = to_bgr(_pixels(data))
+    pixels = to_bgr(_decode_file(data))
     if pixels is None:
         raise BadMessage("no image in it")
     return pixels
@@ -151,7 +151,7 @@ def decode_depth(data: bytes) -> Depth:
     Raises:
         BadMessage: it contains no 16-bit frame.
     """
-    mm = _pixels(data)
+    mm = _decode_file(data)
     if mm.dtype != np.uint16 or mm.ndim != 2:
         raise BadMessage("no 16-bit depth image in it")
     return to_metres(mm)
@@ -219,21 +219,21 @@ def _face(face: DetectedFace) -> dict[str, Any]:
     return data
 
 
-def _image(kind: str, file: bytes, stamp: int) -> dict[str, Any]:
+def _image_message(kind: str, file: bytes, stamp: int) -> dict[str, Any]:
     return {
-        "timestamp": _stamp(stamp),
+        "timestamp": _time_stamp(stamp),
         "frame_id": _FRAME,
         "format": kind,
         "data": base64.b64encode(file).decode("ascii"),
     }
 
 
-def _stamp(nanoseconds_: int) -> dict[str, int]:
+def _time_stamp(nanoseconds_: int) -> dict[str, int]:
     sec, nsec = divmod(nanoseconds_, 1_000_000_000)
     return {"sec": sec, "nsec": nsec}
 
 
-def _file(ending: str, pixels: NDArray[Any], how: list[int]) -> bytes:
+def _encode_file(ending: str, pixels: NDArray[Any], how: list[int]) -> bytes:
     _, file = cv2.imencode(ending, pixels, how)
     return bytes(file)
 
@@ -249,7 +249,7 @@ def _load(data: bytes, key: str) -> Any:
         raise BadMessage(f"no {key} in it") from error
 
 
-def _pixels(data: bytes) -> NDArray[Any]:
+def _decode_file(data: bytes) -> NDArray[Any]:
     """Decode the file inside an image message."""
     try:
         file = base64.b64decode(_load(data, "data"), validate=True)

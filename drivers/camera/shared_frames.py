@@ -52,7 +52,7 @@ class SlotWriter:
         memory = self._memory
         self._stamp += 2  # odd during a write
         slot = self._stamp // 2 % _SLOTS
-        stamp, data = _views(memory, slot, self._slot_bytes)
+        stamp, data = _stamp_and_bytes(memory, slot, self._slot_bytes)
         stamp[0] = self._stamp - 1
         np.copyto(data[: array.nbytes].view(array.dtype).reshape(array.shape), array)
         stamp[0] = self._stamp
@@ -76,7 +76,7 @@ class SlotReader:
         self._memory: SharedMemory | None = None
         self._name = ""
 
-    def see(self, where: SlotAddress | None) -> None:
+    def record_memory(self, where: SlotAddress | None) -> None:
         """Record the writer's memory, even if it is never read."""
         if where is not None:
             self._name = where.memory
@@ -90,7 +90,7 @@ class SlotReader:
                     self._memory = SharedMemory(where.memory)
                 except FileNotFoundError:  # the writer now uses larger memory
                     return None
-            stamp, data = _views(self._memory, where.slot, where.slot_bytes)
+            stamp, data = _stamp_and_bytes(self._memory, where.slot, where.slot_bytes)
             dtype = np.dtype(where.dtype)
             count = int(np.prod(where.shape)) * dtype.itemsize
             array = data[:count].view(dtype).reshape(where.shape).copy()
@@ -118,7 +118,7 @@ class SlotReader:
                 memory.unlink()
 
 
-def _views(
+def _stamp_and_bytes(
     memory: SharedMemory, slot: int, slot_bytes: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     """Return the stamp and the bytes of a slot."""

@@ -127,7 +127,7 @@ class CameraThread:
     def _watch(self) -> None:
         """Analyse one frame after another until stopped."""
         try:
-            while (found := self._camera.next(self._stop)) is not None:
+            while (found := self._camera.next_detections(self._stop)) is not None:
                 self.frames += 1
                 self.frames_with_face += bool(found.faces)
                 self._newest = found

@@ -95,7 +95,9 @@ def measured_rate_hz(times_s: Sequence[float]) -> float | None:
     return rate_hz if is_even(times_s, rate_hz) else None
 
 
-def from_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTimestamps | None:
+def timestamps_from_rate(
+    stated_hz: float, note: str, times_s: Sequence[float]
+) -> VideoTimestamps | None:
     """Return time stamps based on the first frames; None if they are uneven.
 
     stated_hz, note: the rate from the container's header, and assumptions about it
@@ -114,7 +116,7 @@ def from_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTim
     )
 
 
-def from_frame_times(times_s: Sequence[float]) -> VideoTimestamps:
+def timestamps_from_times(times_s: Sequence[float]) -> VideoTimestamps:
     """Return a table of the times; the last frame lasts as long as most frames do."""
     starts = tuple(t - times_s[0] for t in times_s)
     last_s = median(b - a for a, b in zip(starts, starts[1:], strict=False))
@@ -195,7 +197,7 @@ def open_video(path: Path) -> VideoReader:
         raise CameraError(f"cannot read {path} ({error.strerror}): check its rights") from error
     # A GIF is a film; OpenCV's image reader would return only its first frame.
     still = path.suffix.lower() != ".gif" and cv2.haveImageReader(str(path))
-    return _Still(path) if still else _Film(path)
+    return _StillReader(path) if still else _FilmReader(path)
 
 
 def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
@@ -208,7 +210,7 @@ def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
     )
 
 
-class _Still:
+class _StillReader:
     """A still frame."""
 
     times = VideoTimestamps(_STILL_RATE_HZ)
@@ -222,7 +224,7 @@ class _Still:
             raise CameraError(f"{path} is too large an image: scale it down") from error
         if image is None:
             raise CameraError(f"{path} is a damaged image: copy or save it again")
-        self._image = _frozen(image, path)
+        self._image = _read_only_bgr(image, path)
         self._last = 1
 
     def image(self, number: int) -> ImageArray:
@@ -235,7 +237,7 @@ class _Still:
         """Do nothing."""
 
 
-class _Film:
+class _FilmReader:
     """A film that is repeated forever."""
 
     def __init__(self, path: Path) -> None:
@@ -245,9 +247,9 @@ class _Film:
         first_s = _times_s(self._capture, SAMPLE)
         if not first_s:
             raise CameraError(f"{path} holds no readable frame: use another file")
-        times = from_rate(*stated, ascending_times(first_s))
+        times = timestamps_from_rate(*stated, ascending_times(first_s))
         if times is None:
-            times = from_frame_times(
+            times = timestamps_from_times(
                 ascending_times(first_s + _times_s(self._capture, _MOST_TIMES))
             )
         elif times.rate_hz == stated[0]:
@@ -289,7 +291,7 @@ class _Film:
             found, image = self._capture.retrieve()
             if not found:
                 raise CameraError(f"frame {self._index} of {self._path} is damaged: copy it again")
-            self._seen = number, _frozen(image, self._path)
+            self._seen = number, _read_only_bgr(image, self._path)
         return self._seen[1]
 
     def close(self) -> None:
@@ -330,7 +332,7 @@ def _check_forward(number: int, least: int) -> None:
         raise ValueError(f"films are read forward: frame {number} wanted, {least} is the least")
 
 
-def _frozen(image: Any, path: Path) -> ImageArray:
+def _read_only_bgr(image: Any, path: Path) -> ImageArray:
     """Return a frame as a read-only BGR array."""
     pixels = to_bgr(image)
     if pixels is None:
@@ -352,7 +354,7 @@ class VideoFile:
     def __init__(self, path: str | Path) -> None:
         """Set the path; nothing is opened yet."""
         self._path = Path(path).expanduser()
-        self._reel: VideoReader | None = None
+        self._reader: VideoReader | None = None
         self._pace = VideoPacing()
         self._unreported = ""
 
@@ -363,27 +365,27 @@ class VideoFile:
             CameraError: it is absent, no film or frame, empty or cut short.
         """
         self.close()
-        self._reel = open_video(self._path)
+        self._reader = open_video(self._path)
         self._pace = VideoPacing()
-        self._unreported = self._reel.times.note
+        self._unreported = self._reader.times.note
 
     @property
     def rate_hz(self) -> float:
         """Frames per second."""
-        return self._opened().times.rate_hz
+        return self._require_reader().times.rate_hz
 
     @property
     def note(self) -> str:
         """Assumptions about the file in one line, or ""."""
-        return self._opened().times.note
+        return self._require_reader().times.note
 
     def due_s(self, number: int) -> float:
         """Return the film time at which a frame is due."""
-        return self._opened().times.due_s(number)
+        return self._require_reader().times.due_s(number)
 
     def number_at(self, film_s: float) -> int:
         """Return the number of the newest frame at a film time; below 1 before the first."""
-        return self._opened().times.number_at(film_s)
+        return self._require_reader().times.number_at(film_s)
 
     def image(self, number: int) -> ImageArray:
         """Read a frame by number: (height, width, 3) BGR, read-only.
@@ -392,7 +394,7 @@ class VideoFile:
             ValueError: the number is below 1 or below the last one read.
             CameraError: the file cannot be read any more.
         """
-        return self._opened().image(number)
+        return self._require_reader().image(number)
 
     def shot(self, number: int) -> Shot:
         """Read a frame by number with the film time at which it is due.
@@ -419,7 +421,7 @@ class VideoFile:
         Raises:
             CameraError: the file cannot be read any more.
         """
-        due = self._pace.wait(self._opened().times, now_s, stop)
+        due = self._pace.wait(self._require_reader().times, now_s, stop)
         return None if due is None else Shot(due.host_s, due.number, self.image(due.number))
 
     def events(self) -> tuple[str, ...]:
@@ -429,12 +431,12 @@ class VideoFile:
 
     def close(self) -> None:
         """Free the file; safe to call twice."""
-        if self._reel is not None:
-            self._reel.close()
-        self._reel = None
+        if self._reader is not None:
+            self._reader.close()
+        self._reader = None
 
-    def _opened(self) -> VideoReader:
+    def _require_reader(self) -> VideoReader:
         """Return the open file."""
-        if self._reel is None:
+        if self._reader is None:
             raise CameraError(f"{self._path} is not open: call open() before reading")
-        return self._reel
+        return self._reader

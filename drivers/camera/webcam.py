@@ -52,7 +52,7 @@ class Webcam:
         """
         self._file = Path(f"/dev/video{device}" if isinstance(device, int) else device)
         self._params = params = params or WebcamParams()
-        self._wishes = {
+        self._requested = {
             # Set first, as sizes and rates depend on it.
             cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*_FOURCC[params.format]),
             cv2.CAP_PROP_FRAME_WIDTH: params.width_px,
@@ -68,7 +68,7 @@ class Webcam:
         self._rate_hz = 0.0
         self._left_s: float | None = None
         self._events: list[str] = []
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def open(self) -> None:
         """Open the camera and fetch one frame as a check.
@@ -90,7 +90,7 @@ class Webcam:
             )
         with quiet_opencv():
             capture = self._open_capture(str(self._file))
-            for what, value in self._wishes.items():
+            for what, value in self._requested.items():
                 capture.set(what, value)
             works = capture.isOpened() and capture.grab()
         if not works:
@@ -160,13 +160,13 @@ class Webcam:
 
     def _report(self, line: str) -> None:
         """Store a line for ``events``."""
-        if line and line not in self._told:
+        if line and line not in self._reported:
             self._events.append(line)
 
     def _report_once(self, line: str) -> None:
         """Store a line once, even if the camera is reopened."""
         self._report(line)
-        self._told.add(line)
+        self._reported.add(line)
 
 
 # From linux/v4l2-controls.h and videodev2.h.

@@ -92,7 +92,7 @@ def run(
     threading.Thread(target=_receive_requests, args=(pipe, stop, requests), daemon=True).start()
     slots = SlotWriter(), SlotWriter()
     try:
-        while (found := camera.next(stop)) is not None:
+        while (found := camera.next_detections(stop)) is not None:
             image, depth = found.image, found.depth_m
             pipe.send(
                 DetectionMessage(

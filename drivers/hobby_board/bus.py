@@ -42,15 +42,15 @@ class HobbyBoardBus(PortBus):
         ValueError: a servo has a channel or a pulse width that the board does not have.
     """
 
-    holding = "pulses still on"
-    unconfirmed = "end of pulses not confirmed"
+    holding_text = "pulses still on"
+    unconfirmed_text = "end of pulses not confirmed"
     _line: BoardLine
     _supervisor: BoardSupervisor
 
     def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
         self._board, self._line, self._port = board, board.line, board.line.port
         self._check_setups(setups)
-        self._setups = self._wanted = tuple(setups)
+        self._setups = self._target_setups = tuple(setups)
         self._ids = tuple(setup.id for setup in setups)
         if len(set(self._ids)) < len(self._ids):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
@@ -86,7 +86,7 @@ class HobbyBoardBus(PortBus):
             PortError: the port cannot be opened.
             ServoMissing: the board or a channel does not answer.
         """
-        self._setups = self._wanted
+        self._setups = self._target_setups
         self._apply_limits()
         self._begin()
         baud = self._board.timing.baud
@@ -114,12 +114,12 @@ class HobbyBoardBus(PortBus):
         """
         self._now_s = now_s
         link = self._link
-        if (link.down or link.release_due) and not self._reachable(now_s):
+        if (link.down or link.release_due) and not self._reopen_if_needed(now_s):
             return self._nothing
         try:
             answered = self._watch(now_s)
         except BusLost as lost:
-            self._lose(lost)
+            self._record_loss(lost)
             return self._nothing
         if not answered:
             # If any byte arrives the board is present, and noise spoils its answers.
@@ -168,7 +168,7 @@ class HobbyBoardBus(PortBus):
             BusLost: the port is lost.
             ServoMissing: the board does not answer, or a channel does not accept its goal.
         """
-        self._setups = self._wanted
+        self._setups = self._target_setups
         self._apply_limits()
         for channel, setup in zip(self._channels, self._setups, strict=True):
             channel.set_target(setup)
@@ -211,7 +211,7 @@ class HobbyBoardBus(PortBus):
                     channel.aim(goal, now_s)
             self._board.send_goals(held)
         except BusLost as lost:
-            self._lose(lost)
+            self._record_loss(lost)
 
     def faults(self) -> tuple[str, ...]:
         """Return the present faults of channels and the board's errors of the last 10 s."""
@@ -266,7 +266,7 @@ class HobbyBoardBus(PortBus):
     def _switch_off(self) -> ReleaseResult:
         released = switch_off(self._board, self._ids)
         for channel in self._channels:
-            if channel.id not in (*released.holding, *released.unconfirmed):
+            if channel.id not in (*released.holding_ids, *released.unconfirmed_ids):
                 channel.stop()
         return released
 

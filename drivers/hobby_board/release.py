@@ -59,4 +59,4 @@ def stop_pulses(
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 115200")
     released = switch_off(board, channels)
-    return (*released.holding, *released.unconfirmed)
+    return (*released.holding_ids, *released.unconfirmed_ids)

@@ -64,7 +64,7 @@ class SmartServoBus(PortBus):
         self._watchdog = ceil(params.watchdog_ms / 1000.0 / unit_s) if unit_s else 0
         self._check_setups(setups)
         self._port = port
-        self._setups = self._wanted = tuple(setups)
+        self._setups = self._target_setups = tuple(setups)
         self._params = params
         self._ids = tuple(setup.id for setup in setups)
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
@@ -233,7 +233,7 @@ class SmartServoBus(PortBus):
         """
         self._now_s = now_s
         link = self._link
-        if (link.down or link.release_due) and not self._reachable(now_s):
+        if (link.down or link.release_due) and not self._reopen_if_needed(now_s):
             return self._nothing
         line, reader, feedback = self._line, self._reader, self._feedback
         supervisor = self._supervisor
@@ -253,7 +253,7 @@ class SmartServoBus(PortBus):
             if now_s >= supervisor.due_s:
                 supervisor.service(self._poll_list.group, now_s)
         except BusLost as lost:
-            self._lose(lost)
+            self._record_loss(lost)
             return self._nothing
         if self._poll_list.troubled:
             silent_s = self._health.silent_for_s(now_s)
@@ -325,13 +325,13 @@ class SmartServoBus(PortBus):
             else:
                 line.send(packet)
         except BusLost as lost:
-            self._lose(lost)
+            self._record_loss(lost)
 
     def _apply_wanted(self) -> None:
         """Apply the setups stored since torque was last on."""
-        if self._wanted == self._setups:
+        if self._target_setups == self._setups:
             return
-        self._setups = self._wanted
+        self._setups = self._target_setups
         self._lowest = tuple(setup.min_steps for setup in self._setups)
         self._highest = tuple(setup.max_steps for setup in self._setups)
         self._by_id.update({setup.id: setup for setup in self._setups})

@@ -157,7 +157,7 @@ class Supervisor(ABC):
             self._recovered(servo_id)
             if self.engaged:
                 self._rearmed.add(servo_id)
-                self.entering.add_outside(servo_id, position)
+                self.entering.add_if_outside(servo_id, position)
 
     def _recovered(self, servo_id: int) -> None:  # noqa: B027  # most have nothing to add
         """Clear the state of a servo that works again."""
@@ -201,7 +201,7 @@ class Supervisor(ABC):
             steps = self._feedback.position(slot)
             if steps is not None:
                 self._feedback.mark_rearmed(slot)
-                if self.entering.arrived(servo_id, steps, now_s) and self._full_speed(servo_id):
+                if self.entering.has_arrived(servo_id, steps, now_s) and self._full_speed(servo_id):
                     self.entering.end(servo_id)
         for servo_id in tuple(self._rearmed):
             slot = self._slot[servo_id]

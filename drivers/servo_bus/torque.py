@@ -186,7 +186,7 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose {family.usual_bauds}")
     released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
-    return (*released.holding, *released.unconfirmed)
+    return (*released.holding_ids, *released.unconfirmed_ids)
 
 
 def find_faults(line: Transactions, ids: Sequence[int]) -> dict[int, int]:

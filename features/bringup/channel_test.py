@@ -108,7 +108,7 @@ def give_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     finally:
         try:
             left = switch_off(board, (setup.id,))
-            sure = not left.holding and not left.unconfirmed
+            sure = not left.holding_ids and not left.unconfirmed_ids
         except BusLost:
             sure = False
         if not sure:

@@ -83,7 +83,7 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
     for name in bus_names(rig):
         share = _share(rig, name, port_of(paths[name], on_traffic=beat))
         if guardian is not None and name in plans:
-            bus = GuardedBus(share.bus, len(share.places), guardian, guarded.index(name))
+            bus = GuardedBus(share.bus, len(share.servo_indices), guardian, guarded.index(name))
             share = share._replace(bus=bus)
         shares.append(share)
     return _join(shares)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from gazerig.drivers.camera.double_buffer import PoseAt, PoseSlot
+from gazerig.drivers.camera.double_buffer import PoseSlot, TimedPose
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
@@ -37,7 +37,7 @@ class NewestHead(Protocol):
         """Return the start time of the scene."""
         ...
 
-    def newest(self) -> PoseAt | None:
+    def newest(self) -> TimedPose | None:
         """Return the newest pose, None before the first."""
         ...
 
@@ -58,7 +58,7 @@ class DrawnSource:
         self._camera = make(self._head)
         self._period_s = 1.0 / self._camera.rate_hz
         self._poses = poses
-        self._now: PoseAt | None = None
+        self._now: TimedPose | None = None
         self._number = 0
         self._due_s = 0.0
 

@@ -88,7 +88,7 @@ def emulated_lines(rig: Rig) -> dict[str, Emulated]:
 
 def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
     """Return all servos of a rig without bytes, at the start angles of the emulated ones."""
-    measured = [rig.joints[name].facts.measured for name in rig.names]
+    measured = [rig.joints[name].facts.measures_position for name in rig.names]
     return IdealBus(rig_setups(rig), [_start(rig, name) for name in rig.names], measured, now_s)
 
 

@@ -103,12 +103,12 @@ def _record(
                 say(line)
             depth = "with depth" if shot is not None and shot.depth_m is not None else "no depth"
             if sys.stderr.isatty():
-                status(f"{past_s:7.1f} s  {recorder.written} frames, {depth}: Ctrl-C ends")
+                status(f"{past_s:7.1f} s  {recorder.written_frames} frames, {depth}: Ctrl-C ends")
     finally:
         recorder.close()
         recorder.finish()
         size_mb = file.stat().st_size / 1e6
-        left = f", {recorder.left_out} left out" if recorder.left_out else ""
-        say(f"{recorder.written} frames ({size_mb:.1f} MB{left}) in {file}")
+        left = f", {recorder.dropped_frames} left out" if recorder.dropped_frames else ""
+        say(f"{recorder.written_frames} frames ({size_mb:.1f} MB{left}) in {file}")
     if recorder.failure:
         raise SetupError(recorder.failure)

@@ -74,7 +74,7 @@ class Body:
             velocity_steps_s=(0.0,) * len(self.names),
             load=(0.0,) * len(self.names),
             torque=(True,) * len(self.names),  # it was switched on, and no servo denies it
-            measured=tuple([joint.facts.measured for joint in self._joints]),
+            measured=tuple([joint.facts.measures_position for joint in self._joints]),
         )
 
     def _set_joints(self, joints: tuple[JointParams, ...]) -> None:

@@ -81,7 +81,7 @@ def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:
     z = np.where(p[:, 2:] > 0.0, p[:, 2:], np.nan)
     i = intrinsics
     plane = p[:, :2] / z
-    if i.distorts:
+    if i.has_distortion:
         plane = _distort(plane, i.distortion)
     pixels: Floats = plane * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
     return pixels
@@ -92,7 +92,7 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
     i = intrinsics
     found = np.ones((len(points), 3))
-    if i.distorts and len(points):
+    if i.has_distortion and len(points):
         found[:, :2] = _undistort((points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px), i.distortion)
     else:
         found[:, :2] = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)

@@ -290,7 +290,7 @@ class JointParams:
             self.gains,
             self.torque_limit,
             radians(self.max_accel_deg_s2) * linkage.steepest,
-            None if rest_rad is None or facts.measured else round(linkage.steps(rest_rad)),
+            None if rest_rad is None or facts.measures_position else round(linkage.steps(rest_rad)),
             None if own is None else own * facts.steps_per_turn / 360.0,
             radians(min(ENTRY_DEG_S, gentle_deg_s)) * linkage.steepest,
         )

@@ -107,7 +107,7 @@ def _shows_front(points: list[list[float]]) -> bool:
 
 def _rays(points: list[list[float]], lens: Intrinsics) -> list[Vec3]:
     """Return the directions through pixels, with z = 1 and distortion undone."""
-    if lens.distorts:
+    if lens.has_distortion:
         return [(x, y, z) for x, y, z in rays_through(points, lens).tolist()]
     fx, fy, cx, cy = lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px
     return [((x - cx) / fx, (y - cy) / fy, 1.0) for x, y in points]

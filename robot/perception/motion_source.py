@@ -60,7 +60,9 @@ class MotionSource:
             return None
         if shot.turn is not None and (by_gyro := shot.turn.since(before)) is not None:
             return by_gyro
-        return None if self._turns is None else self._turns.turned(shot.captured_s, before_s)
+        return (
+            None if self._turns is None else self._turns.rotation_between(shot.captured_s, before_s)
+        )
 
 
 def motion_finder(

@@ -233,7 +233,7 @@ def through_lens(
 ) -> Rendered:
     """Return the view through a lens that may distort; see ``SceneView.draw``."""
     lens, size_px = seen_by.lens, seen_by.size_px
-    if not lens.distorts:
+    if not lens.has_distortion:
         return view.draw(seen_by, depth=depth, rows=rows)
     ideal, ideal_px, columns, lines = _undistorting(lens, size_px)
     top, bottom = rows or (0, size_px[1])
@@ -255,7 +255,7 @@ def through_lens(
 
 def ideal_size_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
     """Return width and height of the ideal picture that a picture through a lens needs."""
-    return _undistorting(lens, size_px)[1] if lens.distorts else size_px
+    return _undistorting(lens, size_px)[1] if lens.has_distortion else size_px
 
 
 @lru_cache(maxsize=8)

@@ -93,9 +93,9 @@ class FilmCamera:
         """
         while self._captured_s(self.frames + 1) + self._delay_s <= now_s:
             number = self.frames + 1
-            shot = self._orientation.upright(self._video.shot(number))
+            shot = self._orientation.turn_shot(self._video.shot(number))
             shot = shot._replace(captured_s=self._captured_s(number))
-            found = self._frames.look(shot)
+            found = self._frames.analyze(shot)
             self.frames += 1
             self.frames_with_face += bool(found.faces)
             self._newest = found

@@ -12,14 +12,14 @@ from present import present
 from seeing.material import background, carphone, noisy, paste, portrait
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
-from gazerig.drivers.camera.guarded_camera import fault_of
+from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.health import (
     FIELD_TEXT,
     CameraHealth,
     CameraObservation,
     HealthModel,
     PictureStats,
-    TurnedFaces,
+    TurnedFaceSearch,
     picture_stats,
 )
 from gazerig.drivers.camera.source import Shot
@@ -65,7 +65,7 @@ def looked(
     conditions: tuple[str, ...] = ()
     for k, image in enumerate(images):
         faces = detector.find(image) if detector is not None else ()
-        conditions = health.look(Shot(float(k), k + 1, image), faces, FAST)
+        conditions = health.assess(Shot(float(k), k + 1, image), faces, FAST)
         told += health.events()
     return told, conditions
 
@@ -163,15 +163,17 @@ def test_a_film_is_left_alone():
     ],
 )
 def test_a_turned_camera_is_told_with_its_rotation(deg, says, rotation, set_to):
-    found = TurnedFaces()
+    found = TurnedFaceSearch()
     image = turned(room(), deg)
     at = [found.find(image) for _ in range(3)]
     off = [abs((present(one) - deg + 180.0) % 360.0 - 180.0) for one in at if one]
     assert off and max(off) < 15.0
     model = HealthModel(rotation)
-    assert not stepped(model, 5, upright=False)
-    assert model.lacks_upright
-    told = stepped(model, 8, upright=False, turned_deg=max(at, key=lambda one: abs(one or 0.0)))
+    assert not stepped(model, 5, has_upright_face=False)
+    assert model.lacks_upright_faces
+    told = stepped(
+        model, 8, has_upright_face=False, turned_deg=max(at, key=lambda one: abs(one or 0.0))
+    )
     assert len(told) == 1 and says in told[0]
     assert told[0].endswith(f"set camera.rotation: {set_to}")
     assert stepped(model, 20) == ["camera: the picture is upright again"]
@@ -179,7 +181,7 @@ def test_a_turned_camera_is_told_with_its_rotation(deg, says, rotation, set_to):
 
 @pytest.mark.parametrize("deg", [-70, -40, 40, 70])
 def test_a_rolled_camera_is_told_by_about_how_much(deg):
-    roll = present(TurnedFaces().find(turned(room(), deg), True))
+    roll = present(TurnedFaceSearch().find(turned(room(), deg), True))
     assert abs(roll - deg) < 20.0
 
 
@@ -202,21 +204,21 @@ def test_frames_that_come_too_fast_are_told_with_the_stage():
     health, told = CameraHealth(), list[str]()
     for k in range(60):  # 60 a second, of which 8 are looked at
         shot = Shot(k / 8.0, 1 + round(7.5 * k), np.asarray(room()))
-        health.look(shot, (), {"faces": 0.01, "motion": 0.1})
+        health.assess(shot, (), {"faces": 0.01, "motion": 0.1})
         told += health.events()
     assert told == [
         "camera: 8 of 60 frames a second are analysed; motion takes 100 of 125 ms a frame: "
         "lower motion.work_px, or set motion.enabled: false"
     ]
     for k in range(60, 200):
-        health.look(Shot(k / 8.0, 391 + k, np.asarray(room())), (), FAST)
+        health.assess(Shot(k / 8.0, 391 + k, np.asarray(room())), (), FAST)
         told += health.events()
     assert told[1:] == ["camera: frames are analysed in time again"]
 
 
 def test_twenty_of_sixty_frames_are_enough():
-    assert not stepped(HealthModel(), 20, offered=60, looked_at=20, over_s=1.0)
-    assert stepped(HealthModel(), 20, offered=120, looked_at=16, over_s=2.0)
+    assert not stepped(HealthModel(), 20, delivered_frames=60, analysed_frames=20, duration_s=1.0)
+    assert stepped(HealthModel(), 20, delivered_frames=120, analysed_frames=16, duration_s=2.0)
 
 
 class Nobody:
@@ -228,16 +230,16 @@ def test_an_assumed_field_of_view_is_told_until_it_is_known():
     unknown = FrameLocator(None, radians(69.0))
     frames = FrameAnalyzer(Nobody(), None, unknown, has_unknown_lens=True)
     shots = [Shot(float(k), k, np.asarray(room(0))) for k in range(1, 9)]
-    assert frames.look(shots[0]).conditions == (FIELD_TEXT,)
+    assert frames.analyze(shots[0]).conditions == (FIELD_TEXT,)
     assert frames.events() == (f"camera: {FIELD_TEXT}",)
-    assert frames.look(shots[1]).conditions == (FIELD_TEXT,) and frames.events() == ()
+    assert frames.analyze(shots[1]).conditions == (FIELD_TEXT,) and frames.events() == ()
     frames.retune(None, None, FrameLocator(None, radians(84.0)))
-    assert frames.look(shots[2]).conditions == ()
+    assert frames.analyze(shots[2]).conditions == ()
     assert frames.events() == ("camera: the field of view is known now",)
     lens = LensParams(WIDTH, HEIGHT, 500.0, 500.0, 320.0, 240.0)
     for locate, unknown_lens in ((FrameLocator(lens, radians(69.0)), True), (unknown, False)):
         known = FrameAnalyzer(Nobody(), None, locate, has_unknown_lens=unknown_lens)
-        assert known.look(shots[3]).conditions == ()
+        assert known.analyze(shots[3]).conditions == ()
 
 
 @pytest.mark.parametrize(
@@ -254,21 +256,21 @@ def test_an_assumed_field_of_view_is_told_until_it_is_known():
 def test_pictures_that_are_none_are_borne(image):
     told, _ = looked([image] * 30)
     assert len(told) <= 1
-    assert TurnedFaces().find(image) in (None, 0.0)
+    assert TurnedFaceSearch().find(image) in (None, 0.0)
 
 
 def test_times_that_stand_still_or_run_back_are_borne():
     health = CameraHealth()
     for t_s in (5.0, 5.0, nan, 1.0, -3.0, float("inf"), 2.0, 1e9, 3.0):
-        assert health.look(Shot(t_s, 1, np.asarray(room())), (), FAST) == ()
+        assert health.assess(Shot(t_s, 1, np.asarray(room())), (), FAST) == ()
     assert health.events() == ()
 
 
 def test_conditions_of_a_guarded_camera_are_lines():
-    found = FrameAnalyzer(Nobody()).look(Shot(1.0, 1, np.asarray(room(0))))
-    assert fault_of(replace(found, conditions=("too dark: more light",))) == ""
+    found = FrameAnalyzer(Nobody()).analyze(Shot(1.0, 1, np.asarray(room(0))))
+    assert detections_fault(replace(found, conditions=("too dark: more light",))) == ""
     wrong: Any = (3,)
-    assert "conditions" in fault_of(replace(found, conditions=wrong))
+    assert "conditions" in detections_fault(replace(found, conditions=wrong))
 
 
 class Frames:

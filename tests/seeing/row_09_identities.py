@@ -323,7 +323,7 @@ def went_on(film: Film, rng: np.random.Generator) -> tuple[int, int]:
     see, poses = perception()
     frames, ids = FrameAnalyzer(_Found(rng)), []
     for k, image in enumerate(film.images):
-        percept = see.see(frames.look(Shot(k / RATE_HZ, k + 1, image)), poses)
+        percept = see.see(frames.analyze(Shot(k / RATE_HZ, k + 1, image)), poses)
         assert percept is not None
         (face,) = percept.faces
         ids.append(face.id)

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from gazerig.drivers.camera.oak.calibration import imu_to_camera
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.yunet_decoder import STRIDES, fault_of_names
+from gazerig.drivers.camera.oak.yunet_decoder import STRIDES, output_names_fault
 from gazerig.drivers.errors import CameraError
 
 FaceNet = Literal["yunet", "yolo"]
@@ -65,7 +65,7 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
             wrong = f"its description has {len(heads)} heads, wanted 1"
         elif "yunet" in parsers[0].lower():
             outputs = archive.getConfig().model.outputs
-            wrong = fault_of_names([str(output.name) for output in outputs])
+            wrong = output_names_fault([str(output.name) for output in outputs])
             size = archive.getInputSize()
             if not wrong and (size is None or size[0] % STRIDES[-1] or size[1] % STRIDES[-1]):
                 wrong = f"its frames of {size} are no multiples of {STRIDES[-1]} px"
@@ -106,7 +106,7 @@ def supported_settings(
             "use a model with a colour camera, such as OAK-D or OAK-1"
         )
     events = []
-    if params.depth and (why := _no_stereo(dai, device, sockets)):
+    if params.depth and (why := _stereo_fault(dai, device, sockets)):
         events.append(
             f"{label} measures no distances: {why}; they are estimated from the size of faces; "
             "oak.depth: false says so in the rig"
@@ -119,7 +119,7 @@ def supported_settings(
         except UnusableModel as error:
             events.append(f"{error}; until then faces are found on the host")
             params = replace(params, face_model="")
-    if params.gyro and (why := _no_gyro(dai, device, params)):
+    if params.gyro and (why := _gyro_fault(dai, device, params)):
         events.append(f"{label} has no usable gyro: {why}")
         params = replace(params, gyro=False)
     return params, tuple(events)
@@ -148,7 +148,7 @@ def full_line_text(params: OakParams, measured_hz: float) -> str:
     )
 
 
-def _no_stereo(dai: Any, device: Any, sockets: set[Any]) -> str:
+def _stereo_fault(dai: Any, device: Any, sockets: set[Any]) -> str:
     """Return why depth is not available, "" if it is."""
     socket = dai.CameraBoardSocket
     missing = [one.name for one in (socket.CAM_B, socket.CAM_C) if one not in sockets]
@@ -161,7 +161,7 @@ def _no_stereo(dai: Any, device: Any, sockets: set[Any]) -> str:
     return ""
 
 
-def _no_gyro(dai: Any, device: Any, params: OakParams) -> str:
+def _gyro_fault(dai: Any, device: Any, params: OakParams) -> str:
     """Return why the gyro is not available, "" if it is."""
     imu = device.getConnectedIMU()
     if not imu or imu.upper() == "NONE":

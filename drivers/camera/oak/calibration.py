@@ -23,7 +23,7 @@ _NO_LENS = "the calibration of this OAK camera does not hold the lens of its col
 _BOARD = "measure it with the printed board instead (leave --oak away)"
 
 
-def rotation_of(vector_deg: tuple[float, float, float]) -> Floats:
+def rotation_matrix(vector_deg: tuple[float, float, float]) -> Floats:
     """Return the rotation (3, 3) about a vector by its length in degrees (Rodrigues)."""
     x, y, z = np.radians(vector_deg)
     angle = float(np.linalg.norm((x, y, z)))
@@ -50,10 +50,11 @@ class OakCalibration(NamedTuple):
     label: product name
     lens: lens of the frames that the rig requests; without distortion if the camera undistorts them
     width_px, height_px: size of these frames
-    own_distortion: k1 k2 p1 p2 k3 of the lens itself, fitted to the factory's model of it
-    fit_px: residual of that fit, root mean square over the frame
+    raw_distortion: k1 k2 p1 p2 k3 of the lens itself, fitted to the factory's model of it
+    fit_error_px: residual of that fit, root mean square over the frame
     R_camera_imu: takes directions from the gyro's axes to the camera's; None if unknown
-    left_m, right_m: positions of the stereo cameras in the colour camera's axes; None if unknown
+    left_camera_m, right_camera_m: positions of the stereo cameras in the colour camera's axes; None
+        if unknown
     focus: lens position at which it was measured, None if it is fixed or unknown
     """
 
@@ -61,11 +62,11 @@ class OakCalibration(NamedTuple):
     lens: Intrinsics
     width_px: int
     height_px: int
-    own_distortion: Distortion
-    fit_px: float
+    raw_distortion: Distortion
+    fit_error_px: float
     R_camera_imu: Floats | None
-    left_m: Vec3 | None
-    right_m: Vec3 | None
+    left_camera_m: Vec3 | None
+    right_camera_m: Vec3 | None
     focus: int | None
 
     @property
@@ -136,13 +137,13 @@ def read_calibration(dai: Any, calibration: Any, params: OakParams) -> OakCalibr
         own,
         fit_px,
         imu_to_camera(dai, calibration),
-        _place(calibration, socket.CAM_B, socket.CAM_A),
-        _place(calibration, socket.CAM_C, socket.CAM_A),
+        _camera_position_m(calibration, socket.CAM_B, socket.CAM_A),
+        _camera_position_m(calibration, socket.CAM_C, socket.CAM_A),
         focus or None,
     )
 
 
-def _place(calibration: Any, socket: Any, colour: Any) -> Vec3 | None:
+def _camera_position_m(calibration: Any, socket: Any, colour: Any) -> Vec3 | None:
     """Return a camera's position in the colour camera's axes, metres; None if unknown."""
     try:
         found = np.asarray(calibration.getCameraExtrinsics(socket, colour), dtype=np.float64)

@@ -42,14 +42,14 @@ def find_oak(dai: Any, wanted: str = "", usb: Path = Path("/sys/bus/usb/devices"
         if not wanted or wanted in (info.deviceId, info.name):
             _check_rights(dai, info)
             raise CameraError(
-                f"the OAK camera {_name(info)} is in use: end the other program that has it"
+                f"the OAK camera {_configuration_name(info)} is in use: end the other program that has it"
             )
     if wanted:
-        there = ", ".join(_name(info) for info in [*free, *everything]) or "none"
+        there = ", ".join(_configuration_name(info) for info in [*free, *everything]) or "none"
         raise CameraError(
             f"no OAK camera {wanted!r} (there is: {there}): plug it in, or name another"
         )
-    if _plugged_in(usb):
+    if _is_plugged_in(usb):
         # Some versions of the USB library do not list cameras without permission.
         raise CameraError(_RIGHTS)
     raise CameraError(
@@ -64,12 +64,12 @@ def _check_rights(dai: Any, info: Any) -> None:
         raise CameraError(_RIGHTS)
 
 
-def _name(info: Any) -> str:
+def _configuration_name(info: Any) -> str:
     """Return a camera's name as it can be written into the configuration."""
     return str(info.deviceId or info.name or "without id")
 
 
-def _plugged_in(usb: Path) -> bool:
+def _is_plugged_in(usb: Path) -> bool:
     """Return whether the system lists an OAK on USB."""
     for file in usb.glob("*/idVendor"):
         try:

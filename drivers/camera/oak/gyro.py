@@ -58,20 +58,20 @@ class GyroBias:
             if np.abs(means - mean).max() > _SPREAD_RAD_S or np.abs(mean).max() > _MOST_BIAS_RAD_S:
                 self._elsewhere = 0
             elif self.rad_s is None:
-                self._take(mean)
+                self._set_bias(mean)
             else:
                 off = mean - self.rad_s
                 if np.abs(off).max() <= _STEP_RAD_S:
                     self._elsewhere = 0
-                    self._take(np.asarray(self.rad_s) + _SHARE * off)
+                    self._set_bias(np.asarray(self.rad_s) + _SHARE * off)
                 else:
                     self._elsewhere += 1
                     if self._elsewhere == _LASTING:
                         self._elsewhere = 0
-                        self._take(mean)
+                        self._set_bias(mean)
             self._means.clear()
 
-    def _take(self, bias: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+    def _set_bias(self, bias: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
         x, y, z = bias.tolist()
         self.rad_s = x, y, z
 
@@ -116,7 +116,7 @@ class Gyro:
         self.fault = ""
 
     @property
-    def settled(self) -> bool:
+    def is_settled(self) -> bool:
         """Return whether its bias is known, or it is known to be unusable."""
         return bool(self.fault) or self._bias.rad_s is not None
 
@@ -159,7 +159,7 @@ class Gyro:
                     "it needs once for 1.5 s: until then only the joints measure the camera's turns"
                 )
 
-    def at(self, device_s: float) -> CameraTurn | None:
+    def orientation_at(self, device_s: float) -> CameraTurn | None:
         """Return the orientation at a time of the device's clock, None if it is unknown."""
         if self.fault:
             return None
@@ -177,7 +177,7 @@ class Gyro:
         # Extrapolated from the previous reading, or from the newest one with its rate.
         base = max(0, after - 1)
         rates, since_s = _mean(self._rates[base], self._rates[at]), device_s - self._times[base]
-        w, x, y, z = _multiply(self._turned[base], _small_turn(rates, bias, since_s))
+        w, x, y, z = _multiply(self._turned[base], _integrated_rotation(rates, bias, since_s))
         return CameraTurn(
             self._epoch,
             (
@@ -196,7 +196,7 @@ class Gyro:
             turned: _Quaternion = (1.0, 0.0, 0.0, 0.0)
         else:
             bias, since_s = self._bias.rad_s or (0.0, 0.0, 0.0), device_s - self._times[-1]
-            step = _small_turn(_mean(self._rates[-1], rates), bias, since_s)
+            step = _integrated_rotation(_mean(self._rates[-1], rates), bias, since_s)
             turned = _multiply(self._turned[-1], step)
         self._times.append(device_s)
         self._turned.append(turned)
@@ -219,7 +219,7 @@ def _mean(a: Rates, b: Rates) -> Rates:
     return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
-def _small_turn(rates: Rates, bias: Rates, dt_s: float) -> _Quaternion:
+def _integrated_rotation(rates: Rates, bias: Rates, dt_s: float) -> _Quaternion:
     """Return the rotation by rates, minus the bias, in a time."""
     x, y, z = ((rate - off) * dt_s for rate, off in zip(rates, bias, strict=True))
     angle = hypot(x, y, z)

@@ -44,7 +44,7 @@ _GYRO_HZ, _GYRO_BATCH = 200, 2
 _READINGS = 100  # messages in the queue: one second
 
 
-class Outputs(NamedTuple):
+class PipelineOutputs(NamedTuple):
     """Outputs of nodes: frames, depth in millimetres (RAW16), faces, and the gyro's readings.
 
     depth, faces, imu: None if they are not wanted
@@ -58,11 +58,11 @@ class Outputs(NamedTuple):
     face_fault: Callable[[], str] = str
 
 
-MakeNodes = Callable[[Any, Any, OakParams], Outputs]
+MakeNodes = Callable[[Any, Any, OakParams], PipelineOutputs]
 """Creates nodes from depthai, a pipeline and the parameters, and returns their outputs."""
 
 
-def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
+def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> PipelineOutputs:
     """Create the nodes on the camera: colour without distortion, aligned depth, faces.
 
     Raises:
@@ -78,7 +78,7 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
         fps=params.rate_hz,
         enableUndistortion=params.undistort,
     )
-    outputs = Outputs(
+    outputs = PipelineOutputs(
         colour,
         _stereo(dai, pipeline, params, colour) if params.depth else None,
         imu=_imu(dai, pipeline) if params.gyro else None,
@@ -100,7 +100,7 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
         network = network.build(camera, archive, fps=params.rate_hz)
         network.setConfidenceThreshold(params.min_confidence)
         found = FoundFaces(network.out)
-    return outputs._replace(faces=found.out, face_fault=found.fault)
+    return outputs._replace(faces=found.output, face_fault=found.fault)
 
 
 def _imu(dai: Any, pipeline: Any) -> Any:
@@ -112,7 +112,7 @@ def _imu(dai: Any, pipeline: Any) -> Any:
     return imu.out
 
 
-def join_outputs(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
+def join_outputs(dai: Any, pipeline: Any, outputs: PipelineOutputs, rate_hz: float) -> Any:
     """Return the queue of message groups, each with all outputs of one instant."""
     sync = pipeline.create(dai.node.Sync)
     sync.setRunOnHost(True)
@@ -123,7 +123,7 @@ def join_outputs(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> A
     return sync.out.createOutputQueue(maxSize=_QUEUE, blocking=False)
 
 
-def imu_queue(outputs: Outputs) -> Any | None:
+def imu_queue(outputs: PipelineOutputs) -> Any | None:
     """Return the queue of the gyro's readings, None without a gyro.
 
     They are not joined to frames, as there are many per frame, in separate messages.

@@ -15,7 +15,7 @@ from gazerig.drivers.camera.oak.calibration import (
     OakCalibration,
     imu_to_camera,
     read_calibration,
-    rotation_of,
+    rotation_matrix,
 )
 from gazerig.drivers.camera.oak.discovery import find_oak, load_depthai, start_cure
 from gazerig.drivers.camera.oak.gyro import Gyro
@@ -108,7 +108,7 @@ class OakSource:
             # The gyro must find its bias before the head moves.
             if self._gyro_queue is not None:
                 if self._asked.imu_rotation_deg is not None:
-                    R = rotation_of(self._asked.imu_rotation_deg)
+                    R = rotation_matrix(self._asked.imu_rotation_deg)
                 else:
                     found = None
                     if self._device is not None:
@@ -118,12 +118,12 @@ class OakSource:
                 pause = threading.Event()
                 for _ in range(_SETTLING):
                     self._read_gyro()
-                    if self._gyro.settled:
+                    if self._gyro.is_settled:
                         break
                     pause.wait(_SETTLING_S)
         except RuntimeError as error:
             self.close()
-            text = _line(error)
+            text = _one_line(error)
             raise CameraError(
                 f"the OAK camera cannot be started ({text}): {start_cure(text)}"
             ) from error
@@ -163,7 +163,7 @@ class OakSource:
                     group = newer
             except (RuntimeError, self._dai.MessageQueue.QueueException) as error:
                 raise CameraError(
-                    f"the OAK camera was lost ({_line(error)}): check its cable and power supply"
+                    f"the OAK camera was lost ({_one_line(error)}): check its cable and power supply"
                 ) from error
             arrived_s = now_s()
             if group is not None and (shot := self._shot(group, arrived_s)) is not None:
@@ -197,12 +197,12 @@ class OakSource:
         pipeline, device = self._pipeline, self._device
         self._pipeline = self._device = self._queue = self._gyro_queue = self._gyro = None
         # An unplugged camera raises an error from every call.
-        for end in (_ended(pipeline), device.close if device is not None else None):
+        for end in (_create_end(pipeline), device.close if device is not None else None):
             if end is not None:
                 try:
                     end()
                 except RuntimeError as error:
-                    self._events.append(f"closing the OAK camera: {_line(error)}")
+                    self._events.append(f"closing the OAK camera: {_one_line(error)}")
 
     def __del__(self) -> None:
         """Close a camera that was not closed: the SDK's own destructor would wait forever."""
@@ -248,13 +248,15 @@ class OakSource:
         # The lens of a frame, with distortion if the camera has not undistorted it.
         lens, stored = lens_of(group), self._calibration
         if lens is not None and not self._asked.undistort and isinstance(stored, OakCalibration):
-            lens = replace(lens, distortion=stored.own_distortion)
+            lens = replace(lens, distortion=stored.raw_distortion)
         # The camera's orientation at the middle of a frame's exposure.
         turn = None
         if self._gyro is not None:
             self._read_gyro()
             middle = self._dai.CameraExposureOffset.MIDDLE
-            turn = self._gyro.at(group[COLOUR].getTimestampDevice(middle).total_seconds())
+            turn = self._gyro.orientation_at(
+                group[COLOUR].getTimestampDevice(middle).total_seconds()
+            )
             self._events.extend(self._gyro.events())
         return Shot(
             captured_s,
@@ -303,7 +305,7 @@ class OakSource:
         return host_s
 
 
-def _ended(pipeline: Any) -> Callable[[], None] | None:
+def _create_end(pipeline: Any) -> Callable[[], None] | None:
     """Return a function that stops a pipeline and waits for its threads."""
     if pipeline is None:
         return None
@@ -318,6 +320,6 @@ def _ended(pipeline: Any) -> Callable[[], None] | None:
     return end
 
 
-def _line(error: BaseException) -> str:
+def _one_line(error: BaseException) -> str:
     """Return an error's text on one line."""
     return " ".join(str(error).split())

@@ -42,7 +42,7 @@ class UnreadableOutputs(ValueError):
     """The outputs are not those of a YuNet; the message contains the difference."""
 
 
-def fault_of_names(names: Sequence[str]) -> str:
+def output_names_fault(names: Sequence[str]) -> str:
     """Return the missing outputs of a YuNet as text, "" for none."""
     if all(any(kind in name for name in names) for kind in _EARLIER):
         return ""
@@ -64,11 +64,13 @@ def decode(
     Raises:
         UnreadableOutputs: an output is missing, or of another size.
     """
-    if wrong := fault_of_names(list(tensors)):
+    if wrong := output_names_fault(list(tensors)):
         raise UnreadableOutputs(wrong)
     size = width_px, height_px
     later = f"cls_{STRIDES[0]}" in tensors
-    scores, centres, extents, points = (_later if later else _earlier)(tensors, size, least)
+    scores, centres, extents, points = (_decode_cells if later else _decode_fixed_boxes)(
+        tensors, size, least
+    )
     good = np.isfinite(np.column_stack((scores, centres, extents, points))).all(axis=1)
     scores, centres, extents, points = scores[good], centres[good], extents[good], points[good]
     corners = np.column_stack((centres - 0.5 * extents, extents))
@@ -89,7 +91,7 @@ _Found = tuple[Floats, Floats, Floats, Floats]
 """Scores (n,), centres (n, 2), widths and heights (n, 2), landmarks (n, 10), pixels."""
 
 
-def _later(
+def _decode_cells(
     tensors: Mapping[str, NDArray[np.float32]], size: tuple[int, int], least: float
 ) -> _Found:
     """Decode cells: offsets and logarithms of sizes in strides."""
@@ -97,7 +99,7 @@ def _later(
     for stride in STRIDES:
         columns, lines = size[0] // stride, size[1] // stride
         cls, obj, bbox, kps = (
-            _table(tensors, f"{kind}_{stride}", width, columns * lines)
+            _output_table(tensors, f"{kind}_{stride}", width, columns * lines)
             for kind, width in _WIDTHS.items()
         )
         scores = np.sqrt(np.clip(cls, 0.0, 1.0) * np.clip(obj, 0.0, 1.0))[:, 0]
@@ -111,14 +113,14 @@ def _later(
     return a, b, c, d
 
 
-def _earlier(
+def _decode_fixed_boxes(
     tensors: Mapping[str, NDArray[np.float32]], size: tuple[int, int], least: float
 ) -> _Found:
     """Decode fixed boxes: offsets in shares of the box, logarithms of its size."""
     boxes = _fixed_boxes(*size)
     names = {kind: next(name for name in tensors if kind in name) for kind in _EARLIER}
     loc, conf, iou = (
-        _table(tensors, names[kind], width, len(boxes)) for kind, width in _EARLIER.items()
+        _output_table(tensors, names[kind], width, len(boxes)) for kind, width in _EARLIER.items()
     )
     scores = np.sqrt(np.clip(conf[:, 1], 0.0, 1.0) * np.clip(iou[:, 0], 0.0, 1.0))
     at = np.nonzero(scores >= least)[0]
@@ -149,7 +151,9 @@ def _fixed_boxes(width_px: int, height_px: int) -> Floats:
     return boxes
 
 
-def _table(tensors: Mapping[str, NDArray[np.float32]], name: str, width: int, count: int) -> Floats:
+def _output_table(
+    tensors: Mapping[str, NDArray[np.float32]], name: str, width: int, count: int
+) -> Floats:
     """Return an output as (count, width), for any order of its axes."""
     found = np.asarray(tensors[name], dtype=np.float64)
     if found.size != count * width:
@@ -164,11 +168,11 @@ def _table(tensors: Mapping[str, NDArray[np.float32]], name: str, width: int, co
 class FoundFaces(NamedTuple):
     """Output of a network's faces.
 
-    out: output of ImgDetections with five key points
+    output: output of ImgDetections with five key points
     fault: returns why its outputs cannot be read, "" if they can
     """
 
-    out: Any
+    output: Any
     fault: Callable[[], str] = str
 
 

@@ -8,7 +8,7 @@ from -0.5 to w - 0.5.
 from collections.abc import Callable
 from typing import cast
 
-from gazerig.drivers.camera.guarded_camera import fault_of_face
+from gazerig.drivers.camera.guarded_camera import face_fault
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.plugins import (
     DETECTOR,
@@ -92,7 +92,7 @@ class CheckedDetector:
             return self._detector.find(image)
         try:
             faces = tuple(self._detector.find(image))
-            wrong = next((f"returned {bad}" for face in faces if (bad := fault_of_face(face))), "")
+            wrong = next((f"returned {bad}" for face in faces if (bad := face_fault(face))), "")
         except (Exception, SystemExit) as error:
             wrong = f"failed ({describe_error(error)})"
         if not wrong:

@@ -68,7 +68,7 @@ def holding_rig(
 
 def holding_text(rig: Rig) -> str:
     """Return the behaviour of the servos once the torque is on."""
-    measured_joints = [name for name in rig.names if rig.joints[name].facts.measured]
+    measured_joints = [name for name in rig.names if rig.joints[name].facts.measures_position]
     without_feedback = len(rig.names) - len(measured_joints)
     if not without_feedback:
         return f"torque on: {len(measured_joints)} servos hold where they are"

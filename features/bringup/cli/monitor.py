@@ -131,7 +131,7 @@ def _samples(
 
 def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: float) -> Table:
     """Lay a sample out as a table."""
-    hobby = any(not joint.facts.measured for joint in joints.values())
+    hobby = any(not joint.facts.measures_position for joint in joints.values())
     share = sample.unanswered / sample.asked
     caption = (
         f"{rate:g} looks a second, each {1e3 * sample.took_s:.0f} ms; "
@@ -146,7 +146,9 @@ def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: flo
     table.add_column("joint", no_wrap=True)
     table.add_column("id", justify="right", no_wrap=True)
     # The place of a hobby servo is its pulse width in us.
-    units = dict.fromkeys("step" if joint.facts.measured else "us" for joint in joints.values())
+    units = dict.fromkeys(
+        "step" if joint.facts.measures_position else "us" for joint in joints.values()
+    )
     goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
     for name in (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V"):
         table.add_column(name, justify="right", no_wrap=True)

@@ -54,7 +54,7 @@ def examine_camera(
             began_s = perf_counter()
             found = shot.faces if shot.faces is not None else detector.find(shot.image)
             spent_s = {"faces": perf_counter() - began_s}
-            conditions = health.look(shot, found, spent_s, assumed and shot.lens is None)
+            conditions = health.assess(shot, found, spent_s, assumed and shot.lens is None)
             frames, with_face = frames + 1, with_face + bool(found)
             first_s, last_s = first_s if frames > 1 else shot.captured_s, shot.captured_s
             told += turned.events()

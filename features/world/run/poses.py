@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from gazerig.drivers.camera.double_buffer import PoseAt
+from gazerig.drivers.camera.double_buffer import TimedPose
 from gazerig.features.world.state_file import HostState, StateReader
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.clock import Clock
@@ -62,13 +62,13 @@ class WorldPoses:
         """Return the same, 0 before."""
         return self.begin_s or 0.0
 
-    def newest(self) -> PoseAt | None:
+    def newest(self) -> TimedPose | None:
         """Return the newest pose, None before the first."""
         newest = self._file().newest()
         if newest is None:
             return None
         self.state = newest
-        return PoseAt(newest.host_s, *self._rig.head(newest))
+        return TimedPose(newest.host_s, *self._rig.head(newest))
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
         """Return the current pose of the head; upright before the first state."""

@@ -83,7 +83,7 @@ def world_ideal_bus(rig: Rig, world: "World", number: int = 0) -> "WorldIdealBus
     # Imports MuJoCo, which only runs in a world need.
     from gazerig.features.world.ideal_bus import WorldIdealBus
 
-    measured = [rig.joints[name].facts.measured for name in rig.names]
+    measured = [rig.joints[name].facts.measures_position for name in rig.names]
     return WorldIdealBus(rig_setups(rig), world.ideal_shafts(number), measured, world.now_s)
 
 

@@ -40,7 +40,7 @@ def calibration_of_file(file: Path, params: OakParams) -> OakCalibration:
 def upright_calibration(found: OakCalibration, orientation: FrameOrientation) -> OakCalibration:
     """Return the calibration with the lens of frames turned upright."""
     size_px = found.width_px, found.height_px
-    lens = orientation.lens(found.lens, *size_px)
+    lens = orientation.turn_lens(found.lens, *size_px)
     width, height = size_px[::-1] if orientation.rotation in (90, 270) else size_px
     return found._replace(lens=lens, width_px=width, height_px=height)
 
@@ -72,17 +72,23 @@ def print_calibration(found: OakCalibration, params: OakParams) -> None:
         f"{found.label}: focal length {i.fx_px:.1f}, {i.fy_px:.1f} px, axis at {i.cx_px:.1f}, "
         f"{i.cy_px:.1f} px of {found.width_px} x {found.height_px}"
     )
-    numbers = " ".join(f"{value:.4g}" for value in found.own_distortion)
+    numbers = " ".join(f"{value:.4g}" for value in found.raw_distortion)
     straightened = "the camera straightens its frames, so zeros are written"
     say(
-        f"its lens itself: k1 k2 p1 p2 k3 {numbers} (fitted, {found.fit_px:.2f} px are left); "
+        f"its lens itself: k1 k2 p1 p2 k3 {numbers} (fitted, {found.fit_error_px:.2f} px are left); "
         + (straightened if params.undistort else "frames come so, as oak.undistort: false asks")
     )
-    if found.left_m is not None and found.right_m is not None:
+    if found.left_camera_m is not None and found.right_camera_m is not None:
         left, right = (
-            " ".join(f"{1e3 * v:.1f}" for v in at) for at in (found.left_m, found.right_m)
+            " ".join(f"{1e3 * v:.1f}" for v in at)
+            for at in (found.left_camera_m, found.right_camera_m)
         )
-        apart = sum((a - b) ** 2 for a, b in zip(found.left_m, found.right_m, strict=True)) ** 0.5
+        apart = (
+            sum(
+                (a - b) ** 2 for a, b in zip(found.left_camera_m, found.right_camera_m, strict=True)
+            )
+            ** 0.5
+        )
         say(
             f"stereo cameras at {left} and {right} mm from it (right, down, ahead), "
             f"{1e3 * apart:.1f} mm apart"
