@@ -18,6 +18,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.gaze.attention.idle import LOST
 from gazerig.gaze.types import Target, Vec3
 from gazerig.params import Bounds
 
@@ -165,11 +166,13 @@ class Aversion:
         number rises on leaving and on returning. An unchanged target includes the shifts of
         earlier aversions in its count.
 
+        A lost face that is looked after gets no aversion.
+
         ordered: a user has chosen the target, from which only a conversation averts the gaze
         rests_until_s: end of the rest on a part of the face, which the gaze does not leave
             sooner; inf while it is moving there
         """
-        kept = ordered and self._mode == "none"
+        kept = (ordered and self._mode == "none") or target.why.endswith(LOST)
         face = target.id if target.kind == "face" and not kept else None
         if face != self._face:
             self._attend(face, t_s)

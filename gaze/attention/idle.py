@@ -28,6 +28,8 @@ from gazerig.gaze.angles import add, angle_between, direction, norm, scale, sub,
 from gazerig.gaze.types import Angles2, Target, Vec3
 from gazerig.params import Bounds
 
+LOST = "lost, waiting"
+"""Reason of a target that was lost and is still looked at."""
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Angles2 = (0.0, 0.0)
 _TRIES = 12
@@ -178,7 +180,7 @@ class Idle:
             p_world_m=there,
             v_world_m_s=_STILL,
             at_s=t_s,
-            why="lost, waiting",
+            why=LOST,
             centre_world_m=None,
         )
         self._gone = gone._replace(p_world_m=there)
