@@ -62,7 +62,8 @@ def test_a_larger_pull_of_the_face_means_more_time_on_it() -> None:
     gaze = load_rig("desk").gaze
     found = [face_share(with_face_pull(gaze, pull)) for pull in (0.1, 0.3, 0.6, 0.9)]
     assert all(more > less + 0.02 for less, more in zip(found, found[1:], strict=False)), found
-    assert found[0] < 0.4 and found[-1] > 0.8
+    # Hands that move to and fro become known: they have less of the time than the face.
+    assert found[0] < 0.75 and found[-1] > 0.8
 
 
 @pytest.mark.parametrize("name", CHARACTERS)

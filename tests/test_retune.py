@@ -207,6 +207,8 @@ def in_use(key: str) -> dict[str, Value]:
     name = key.split(".")[-1]
     if key.startswith("gaze.scanpath.") and name.split("_")[0] in ("simple", "random"):
         return {"gaze.scanpath.model": name.split("_")[0]}
+    if key in ("gaze.scanpath.rest_spread", "gaze.scanpath.shift_ms"):
+        return {"gaze.scanpath.diagonal": "one_rest"}
     if key == "gaze.saccade.human_peak_over_mean":
         return {"gaze.saccade.profile": "main_sequence"}
     if key == "gaze.saccade.min_duration_ms":

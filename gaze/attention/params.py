@@ -22,7 +22,7 @@ class HabituationParams:
     stay_spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of that time; larger: more long looks among short ones"] = 1.2
     rhythm_ratio: Annotated[float, Bounds(0, 1),
         "factor on the salience of a hand at each change of direction of its motion to and fro at the face, outside a boxing match; "
-        "1: none"] = 0.6
+        "1: none"] = 0.5
     rhythm_recovery_s: Annotated[float, Bounds(0.1, 600), "time constant with which that salience recovers"] = 2.0
     inhibition_of_return_strength: Annotated[float, Bounds(0, 1),
         "how strongly the point that the gaze has just left is avoided; 0: not at all"] = 0.5
