@@ -1,6 +1,13 @@
 """Head, blinks and idle gaze of the running product: the rows of the bench in a short form."""
 
-from human import row_05_homeward_head, row_14_blinks, row_15_head_share, row_16_idle
+from human import (
+    row_05_homeward_head,
+    row_14_blinks,
+    row_15_head_share,
+    row_16_idle,
+    row_31_head_sway,
+    row_32_head_pursuit,
+)
 from human.measured_run import half_rate_run, measured_run
 
 
@@ -40,3 +47,20 @@ def test_e76_the_measured_gaze_explores_a_room() -> None:
     assert outside(wanted, figures) == {}
     assert figures["empty room, gaze within 35 x 20 deg of the middle, %"] >= 98.0
     assert 15.0 <= figures["room with things, gaze on them, %"] <= 80.0
+
+
+def test_the_measured_head_sways_and_the_gaze_keeps_its_place() -> None:
+    figures = row_31_head_sway.measure(half_rate_run, 40.0, (0,))
+    names = [
+        "yaw or roll without a step for 2 s or longer, % of time",
+        "largest step of a goal in a tick, encoder steps",
+        "gaze off the plan, 95th percentile, deg",
+    ]
+    wanted = {name: row_31_head_sway.WANTED[name] for name in names}
+    assert outside(wanted, figures) == {}
+    assert figures["roll: standard deviation, deg"] > 0.1
+
+
+def test_the_measured_head_pursues_a_walker() -> None:
+    figures = row_32_head_pursuit.measure(half_rate_run, 40.0, (0,))
+    assert outside(row_32_head_pursuit.WANTED, figures) == {}

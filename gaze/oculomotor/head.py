@@ -122,7 +122,7 @@ _FASTEST = 3.0
 """Speeds above this multiple of the threshold count as that: it is not reached within .32 s."""
 _GOES_ON = 0.3
 """Share of the threshold at which a pursuit ends."""
-_RELIEF = (0.25, 0.75)
+_RELIEF = (0.4, 0.9)
 """Eccentricity to which an eye is brought back, as a share of comfort_deg."""
 _SWINGS = 2.5
 """A movement lasting longer than this multiple of distance over speed swings past its goal."""

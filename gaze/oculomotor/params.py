@@ -133,7 +133,7 @@ class HeadParams:
     replan_deg: Annotated[float, Bounds(0.05, 20), "a moving head plans its movement again when the goal changes by this much"] = 1.0
     recentre_after_ms: Annotated[float, Bounds(0, 60000),
         "after an eye has been eccentric for this long at least, the head turns slowly to bring it back"] = 3000.0
-    recentre_spread_ms: Annotated[float, Bounds(0, 60000), "mean of a random time by which that is later (exponential)"] = 5000.0
+    recentre_spread_ms: Annotated[float, Bounds(0, 60000), "mean of a random time by which that is later (exponential)"] = 7000.0
     comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 10.0
     recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it brings the eyes back"] = 12.0
     search_deg: Annotated[float, Bounds(0, 90),

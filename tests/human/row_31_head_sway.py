@@ -90,6 +90,7 @@ def _slope(hz: np.ndarray, power: np.ndarray) -> float:
     rows = [
         (np.log(np.sqrt(a * b)), np.log(power[(hz >= a) & (hz < b)].mean()))
         for a, b in zip(edges, edges[1:], strict=False)
+        if ((hz >= a) & (hz < b)).any()
     ]
     return float(np.polyfit(*np.array(rows).T, 1)[0])
 

@@ -23,7 +23,7 @@ WANTED = {
     "slope after 3 s, degrees of head a degree beyond the range": (0.61, 0.93),
     "within the range: head after 3 s, deg, median": (0.0, 1.5),
     "recentrings a minute of eccentric looks": (0.5, 8.0),
-    "delay of recentring, coefficient of variation": (0.3, 2.0),
+    "delay of recentring, coefficient of variation": (0.25, 2.0),
     "peak speed of recentring, deg/s, median": (1.0, 20.0),
     "eyes off straight ahead at the end of a look, deg, median": (6.0, 17.9),
 }
