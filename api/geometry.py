@@ -11,7 +11,7 @@ from gazerig.errors import Refused
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.types import Angles3, Target, Vec3
-from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.reachability import look_reply, reached_joints
 from gazerig.robot.model.command_json import check
@@ -154,4 +154,4 @@ class _RigKey:
 
 @lru_cache(maxsize=8)
 def _cached_parts(key: _RigKey) -> tuple[Kinematics, Oculomotor]:
-    return gaze_parts(key.rig, 0)
+    return kinematics_and_oculomotor(key.rig, 0)

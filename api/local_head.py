@@ -92,7 +92,7 @@ class LocalHead(Head):
 
     def menus(self) -> Mapping[str, tuple[str, ...]]:
         """Return behaviours, conversation modes and lid states; the active one is the first."""
-        return self._active_run().made.robot.menus()
+        return self._active_run().assembly.robot.menus()
 
     def _progress(self) -> Progress:
         return self._feed.progress()
@@ -101,7 +101,7 @@ class LocalHead(Head):
         return self._feed.events(after)
 
     def _send(self, command: Command) -> Order:
-        robot = self._active_run().made.robot
+        robot = self._active_run().assembly.robot
         try:
             ticket = robot.command(command)
         except ValueError as error:
@@ -291,7 +291,7 @@ class SimulatedHead(LocalHead):
         composed = self._compose()
         stack = contextlib.ExitStack()
         with stack:
-            stack.callback(composed.made.close)
+            stack.callback(composed.assembly.close)
             self._session = session.Session(
                 composed,
                 Interrupts(signals=False),
@@ -320,7 +320,7 @@ class SimulatedHead(LocalHead):
     @property
     def time_s(self) -> float:
         """Return the simulated time."""
-        return self._active_run().made.clock.now_s()
+        return self._active_run().assembly.clock.now_s()
 
     def step(self, seconds: float | None = None) -> None:
         """Let simulated time pass.
@@ -331,7 +331,7 @@ class SimulatedHead(LocalHead):
         Raises:
             HeadEnded: a fault has ended the head.
         """
-        made = self._active_run().made
+        made = self._active_run().assembly
         ticks = 1 if seconds is None else round(seconds * made.loop.rate_hz)
         for _ in range(ticks):
             self._tick()

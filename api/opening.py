@@ -91,7 +91,7 @@ def open(
         character=character, profile=profile, seed=seed, record=_path(record), seconds=_FOR_EVER_S,
     )  # fmt: skip
     blind = own is None and not sees and not mock
-    options = options.checked(blind=blind or own is not None)
+    options = options.check_and_complete(blind=blind or own is not None)
     substitutes = Substitutes(program=ProgramParts(own, detector, attention))
     if blind:
         substitutes = substitutes._replace(camera=lambda rigs: NoCamera())

@@ -29,7 +29,7 @@ from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams  # noqa:
 from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalise  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import Tick, run  # noqa: E402
 from gazerig.sim_mock.true_gaze import (  # noqa: E402
@@ -232,7 +232,7 @@ def watched(scene: str, seconds: float, placed_by: Literal["capture", "newest"])
     made = assemble(rig, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
     assert made.scene is not None
     people, rows = made.scene.people, []
-    kinematics, _ = gaze_parts(rig, 0)
+    kinematics, _ = kinematics_and_oculomotor(rig, 0)
 
     def watch(tick: Tick) -> None:
         person = people(tick.t_s - (rows[0][0] if rows else tick.t_s))[0]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gazerig.config.rig import LidJoints
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.types import Floats, GazeState
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.model.coupling_params import CouplingParams
 from gazerig.robot.model.frames import CameraMount
@@ -34,7 +34,7 @@ class Expected(NamedTuple):
 
 def expected(rig: Rig, angles: Mapping[str, float]) -> Expected:
     """Return where everything is according to robot/model/kinematics.py."""
-    kinematics = kinematics_of(rig)
+    kinematics = rig_kinematics(rig)
     values = tuple(angles[name] for name in rig.names)
     still = (0.0,) * len(values)
     state = kinematics.forward(JointState(values, still, still, ()))

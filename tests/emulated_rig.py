@@ -6,7 +6,7 @@ from math import degrees
 from mixed_rig import mixed_rig as mixed_rig
 
 from gazerig.config.schema import Rig
-from gazerig.robot.app.run_bus import emulated_lines, place_of
+from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -33,7 +33,9 @@ class EmulatedRig:
         """Return the true joint angles in degrees."""
         return {
             name: degrees(
-                joint.angle_rad(self.devices[joint.bus].positions_steps()[place_of(self.rig, name)])
+                joint.angle_rad(
+                    self.devices[joint.bus].positions_steps()[servo_index(self.rig, name)]
+                )
             )
             for name, joint in self.rig.joints.items()
         }

@@ -17,7 +17,7 @@ from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus, rig_setups
+from gazerig.robot.app.bus_wiring import bus_ports, guarded_rig_bus, rig_bus, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
 from gazerig.testing.bus_bench import rows
@@ -39,7 +39,7 @@ def slow(kind: str, watchdog: bool = True) -> Rig:
 def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
     """Drive all joints slowly to their ends, 100 ticks a second, and say what happens."""
     rig = slow(kind, watchdog)
-    paths = ports_of(rig, path)
+    paths = bus_ports(rig, path)
     bus = (
         guarded_rig_bus(rig, paths)
         if guarded
@@ -47,7 +47,7 @@ def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
     )
     bus.open()
     bus.enable_torque()
-    goals: list[Any] = [setup.max_steps for setup in rig_setups(rig)]
+    goals: list[Any] = [setup.max_steps for setup in servo_configs(rig)]
     said = False
     ticks = 0
     while True:

@@ -41,7 +41,7 @@ class Rig:
     def __init__(self, host: str = "127.0.0.1") -> None:
         made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         self.made, self.robot = made, made.robot
-        self.tuning = ParamStore(made.live, self.robot.command, "desk")
+        self.tuning = ParamStore(made.live_params, self.robot.command, "desk")
         self.said: list[str] = []
         # Not fast: the page is for real time, of which these ticks are a slow imitation.
         options = RunOptions(page=f"{host}:{free_port()}")

@@ -73,7 +73,7 @@ def record(
     stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, made.loop, stop, watch)
     made.robot.stop()
-    said = recorder.close(count.stopped_by, made.sent_digest())
+    said = recorder.close(count.stopped_by, made.sent_bytes_digest())
     made.close()
     assert recorder.events() == () and recorder.lost == 0
     return Recorded(path, seen, info, said, goals)

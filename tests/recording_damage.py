@@ -48,7 +48,7 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
         made.robot.stop()
     finally:
         made.close()
-        recorder.close("seconds", made.sent_digest())
+        recorder.close("seconds", made.sent_bytes_digest())
     return path.read_bytes()
 
 
@@ -179,7 +179,7 @@ def _shown(file: Path) -> object:
 def _again(file: Path) -> object:
     with used(file):
         done = rerun(RunRecording(file))
-    return done.ticks, done.same
+    return done.ticks, done.is_same
 
 
 def _reported(file: Path) -> object:

@@ -30,7 +30,7 @@ class Running(NamedTuple):
 
     @property
     def rig(self) -> Rig:
-        return self.made.live.rig
+        return self.made.live_params.rig
 
     def go(self, count: int, dt_s: float = DT_S) -> Tick:
         for _ in range(count):
@@ -40,7 +40,7 @@ class Running(NamedTuple):
 
     def tune(self, changes: dict[str, Value]) -> None:
         base = self.rig
-        self.made.robot.command(self.made.live.prepare(base, changed(base, changes)))
+        self.made.robot.command(self.made.live_params.prepare(base, changed(base, changes)))
 
 
 def started(scene: str = "visitor", rig: Rig = RIG) -> Running:
@@ -62,7 +62,7 @@ class Judge:
 
     def __init__(self, running: Running) -> None:
         self.running = running
-        self.guard = running.made.live.parts.guard
+        self.guard = running.made.live_params.parts.guard
         joints, speeds = running.made.robot.body._joints, self.guard._motion.speed
         self.steps = self._steps()
         self.speed = np.array(
@@ -164,5 +164,5 @@ def fresh(rig: Rig) -> Assembly:
 
 def put(made: Assembly, rig: Rig) -> tuple[str, ...]:
     """Put a rig in force at once."""
-    live = made.live
+    live = made.live_params
     return live(live.prepare(live.rig, rig), 0.0)

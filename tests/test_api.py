@@ -243,7 +243,7 @@ def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) 
         head.jog("neck_yaw", 10.0)
         head.step(0.5)
     again = rerun(RunRecording(file))
-    assert again.same and again.tx_same and not again.notes
+    assert again.is_same and again.sent_bytes_same and not again.notes
 
 
 def test_a_head_moves_in_its_block_alone() -> None:

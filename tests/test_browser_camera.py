@@ -170,7 +170,7 @@ def test_an_emulated_rig_can_be_lent_a_camera_that_stands_still() -> None:
         assert isinstance(camera, BorrowedCamera) and made.mount.on_head
         camera.lent = True
         camera._place()
-        still = CameraMount(fixed_mount(rig.camera, made.shown().kinematics))
+        still = CameraMount(fixed_mount(rig.camera, made.shown_rig().kinematics))
         level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         assert not made.mount.on_head
         assert made.mount.pose(level, (0.0, 0.0, 9.0)) == still.pose(level, (0.0, 0.0, 0.0))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.frames import NewestPose, PoseHistory
@@ -57,7 +57,7 @@ class Seen(NamedTuple):
 def watched(scene: str, seconds: float, placed_by: PlacedBy = "capture") -> Seen:
     """Run a drawn scene and compare the measured gaze with the true place of the face part."""
     made = assemble(RIG, RunOptions(True, True, 0, scene, pixels=True, placed_by=placed_by))
-    kinematics, _ = gaze_parts(RIG, 0)
+    kinematics, _ = kinematics_and_oculomotor(RIG, 0)
     assert made.scene is not None
     people = made.scene.people
     rows: list[tuple[float, ...]] = []
@@ -166,7 +166,7 @@ def test_somebody_who_walks_past_is_followed(walk: Seen) -> None:
 
 
 def test_the_newest_pose_is_given_whatever_the_time() -> None:
-    kinematics, _ = gaze_parts(RIG, 0)
+    kinematics, _ = kinematics_and_oculomotor(RIG, 0)
     now, then = NewestPose(kinematics), PoseHistory(kinematics)
     for poses in (now, then):
         poses.remember(0.0, (0.0, 0.0, 0.0))

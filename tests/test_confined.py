@@ -58,7 +58,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     rig = home / "mine.yaml"
     rig.write_text(Path("config/rigs/desk.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     made = assemble(load_rig(str(rig)), RunOptions(True, True, 0, "visitor"))
-    tuning = ParamStore(made.live, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
+    tuning = ParamStore(made.live_params, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
     hear = PageRequestHandler(
         made.robot.command, tuning, refusals=(ConfigError,), paths=tuning.confined
     )  # fmt: skip

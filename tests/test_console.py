@@ -66,7 +66,7 @@ def test_register_changes_are_told_from_what_happens(event: str, is_one: bool) -
 @pytest.mark.parametrize("verbose", [False, True])
 def test_a_mock_begins_without_registers_and_tables(verbose: bool) -> None:
     said: list[str] = []
-    options = RunOptions(mock=True, fast=True, seconds=0.1, verbose=verbose).checked()
+    options = RunOptions(mock=True, fast=True, seconds=0.1, verbose=verbose).check_and_complete()
     session.run(session.compose(options), Interrupts(signals=False), said.append)
     register = [line for line in said if "->" in line or "Indirect Addresses" in line]
     table = [line for line in said if "do not all sum to 1" in line]
@@ -76,12 +76,14 @@ def test_a_mock_begins_without_registers_and_tables(verbose: bool) -> None:
 
 
 def test_the_first_line_says_what_happens_and_how_it_ends() -> None:
-    mock = RunOptions(mock=True).checked()
+    mock = RunOptions(mock=True).check_and_complete()
     assert what_runs(mock) == (
         "desk: emulated servos; it looks at a simulated scene, visitor. "
         "Ctrl-C parks the head and ends."
     )
-    assert "its servos; it looks at a webcam" in what_runs(RunOptions(camera=0).checked())
+    assert "its servos; it looks at a webcam" in what_runs(
+        RunOptions(camera=0).check_and_complete()
+    )
 
 
 def test_a_fault_of_many_joints_is_told_once() -> None:

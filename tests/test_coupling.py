@@ -18,8 +18,8 @@ from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.bus_wiring import rig_setups
-from gazerig.robot.app.camera_factory import true_head
+from gazerig.robot.app.bus_wiring import servo_configs
+from gazerig.robot.app.camera_factory import true_head_pose
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.control.coupled_servos import CoupledServos
@@ -125,8 +125,8 @@ def test_servos_get_the_limits_that_the_whole_range_needs(kind: str) -> None:
     rig = rig_with(KINDS[kind])
     assert faults(rig) == []
     (pair,) = pairs_of(rig.couplings)
-    found = dict(zip(rig.names, rig_setups(rig), strict=True))
-    plain = dict(zip(rig.names, rig_setups(load_rig("desk")), strict=True))
+    found = dict(zip(rig.names, servo_configs(rig), strict=True))
+    plain = dict(zip(rig.names, servo_configs(load_rig("desk")), strict=True))
     assert {name for name in rig.names if found[name] != plain[name]} == {"neck_pitch", "neck_roll"}
     needed: dict[str, list[float]] = {"neck_pitch": [], "neck_roll": []}
     for first in np.linspace(-PITCH, PITCH, 41):
@@ -232,7 +232,7 @@ def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
     goals = dict(zip(rig.names, sent[-1], strict=True))
     for name, angle in zip(("neck_pitch", "neck_roll"), servos, strict=True):
         assert goals[name] == pytest.approx(rig.joints[name].steps(angle), abs=1.0)
-    setups = dict(zip(rig.names, rig_setups(rig), strict=True))
+    setups = dict(zip(rig.names, servo_configs(rig), strict=True))
     for goal in sent:
         for name, steps in zip(rig.names, goal, strict=True):
             assert setups[name].min_steps - 1 <= steps <= setups[name].max_steps + 1
@@ -244,12 +244,12 @@ def test_the_emulated_camera_sits_where_coupled_servos_hold_the_head() -> None:
     clock = SimulatedClock()
     wires = run_bus(rig, RunOptions(mock=True, fast=True), clock)
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    R, _ = true_head(wires.true_steps, rig, made.poses)(0.0)
+    R, _ = true_head_pose(wires.true_steps, rig, made.poses)(0.0)
     # As the emulated neck starts: 12 deg to the right, 8 deg down.
     assert degrees(np.arcsin(R[2][0])) == pytest.approx(-8.0, abs=0.2)
     assert degrees(np.arctan2(R[1][0], R[0][0])) == pytest.approx(-12.0, abs=0.2)
     plain = replace(rig, couplings={})
-    other, _ = true_head(wires.true_steps, plain, made.poses)(0.0)
+    other, _ = true_head_pose(wires.true_steps, plain, made.poses)(0.0)
     assert abs(degrees(np.arcsin(other[2][0])) + 8.0) > 1.0
     wires.close()
     made.close()
@@ -318,13 +318,13 @@ def test_coupled_joints_keep_their_gears_until_the_next_start() -> None:
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
     made.robot.start(made.clock)
     changes = {"joints.neck_pitch.zero_step": 2100, "joints.neck_roll.max_deg": 20.0}
-    made.robot.command(made.live.prepare(rig, changed(rig, changes)))
+    made.robot.command(made.live_params.prepare(rig, changed(rig, changes)))
     made.clock.sleep_until(made.clock.now_s() + 0.005)
     before = made.robot.body.angles((2048,) * 9)
     tick = made.robot.tick(made.clock.now_s(), 0.005)
     assert any("tuned: joints.neck_roll.max_deg = 20.0" in event for event in tick.events)
     assert made.robot.body.angles((2048,) * 9) == before
-    limits = made.live.parts.guard.limits
+    limits = made.live_params.parts.guard.limits
     assert degrees(limits[rig.names.index("neck_roll")].high_rad) == pytest.approx(20.0)
     made.close()
 
@@ -345,7 +345,7 @@ def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints() -> None:
         couplings={"neck": CouplingParams("differential", "neck_pitch", "neck_roll")},
     )
     assert faults(rig) == []
-    found = dict(zip(rig.names, rig_setups(rig), strict=True))
+    found = dict(zip(rig.names, servo_configs(rig), strict=True))
     own = joint.setup("neck_pitch")
     wide = found["neck_pitch"].max_steps - found["neck_pitch"].min_steps
     assert wide == pytest.approx(2 * (own.max_steps - own.min_steps), abs=4)

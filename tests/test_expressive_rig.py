@@ -153,7 +153,7 @@ def test_a_blink_shuts_the_lids_of_a_sad_face(recorded: tuple[RunRecording, list
 
 def test_the_jaw_moves_on_while_a_stale_frame_holds_the_neck() -> None:
     made = started(load_rig("expressive"))
-    made.live.parts.camera.latest = lambda t_s: None  # type: ignore[assignment,method-assign]
+    made.live_params.parts.camera.latest = lambda t_s: None  # type: ignore[assignment,method-assign]
     made.robot.command(Express("surprised"))
     tick = ticks(made, 600)[-1]
     made.close()
@@ -170,7 +170,7 @@ def test_an_expression_tuned_while_it_is_in_force_moves_without_a_jump() -> None
     for k in range(600):
         if k == 300:
             made.robot.command(
-                made.live.prepare(rig, changed(rig, {"expressions.happy.jaw": 10.0}))
+                made.live_params.prepare(rig, changed(rig, {"expressions.happy.jaw": 10.0}))
             )
         now = degrees(ticks(made, 1)[0].desired_rad[jaw])
         largest, last = max(largest, abs(now - last)), now

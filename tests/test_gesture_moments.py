@@ -12,7 +12,7 @@ from gazerig.gaze.gesture.gesture_player import GesturePlayer
 from gazerig.gaze.gesture.pose_offset import PoseOffset
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.types import Floats
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_limits import lid_ends, lid_spans, limits
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Play
@@ -41,7 +41,7 @@ class Moments(NamedTuple):
 def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
     rig = load_rig(rig_name)
-    kinematics, ends = kinematics_of(rig), lid_ends(rig)
+    kinematics, ends = rig_kinematics(rig), lid_ends(rig)
     eyes = [kinematics.eyes_on(TARGET, *kinematics.head_pose(one.head_rad)) for one in offsets]
     left, right = np.array(eyes)[:, 0, :2].T, np.array(eyes)[:, 1, :2].T
     yaw, pitch = np.array([one.eyes_rad for one in offsets]).T

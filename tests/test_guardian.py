@@ -17,7 +17,7 @@ from sts_rig import Rig as StsRig
 
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.process import child_process
-from gazerig.robot.app.bus_wiring import ports_of, release_plans
+from gazerig.robot.app.bus_wiring import bus_ports, release_plans
 from gazerig.robot.guardian.guardian import HUNG_S, RETRY_S, GuardedBus, Guardian
 from gazerig.robot.guardian.heartbeat import (
     HANG_S,
@@ -81,7 +81,7 @@ def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
 
 def test_all_ports_are_guarded(tmp_path):
     rig = mixed_rig(tmp_path)
-    plans = release_plans(rig, ports_of(rig, None))
+    plans = release_plans(rig, bus_ports(rig, None))
     kinds = {name: plan.kind for name, plan in plans.items()}
     assert kinds == {"": "maestro", "neck": "dynamixel", "tilt": "feetech"}
     assert plans["tilt"].ids == (1,) and plans["tilt"].baud == rig.bus_named("tilt").baud

@@ -15,7 +15,7 @@ from viser import transforms
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glb, glow
 from gazerig.robot.dashboard.view.head_view import head_dimensions, lid_edges, with_shown_lids
@@ -36,7 +36,7 @@ CANVASES = (1.6, 1280 / 720, 1.0, 0.9, 390 / 380)
 def at_rest(name: str) -> Snapshot:
     """A snapshot of a shipped rig with all joints at 0."""
     rig = load_rig(name)
-    kinematics = kinematics_of(rig)
+    kinematics = rig_kinematics(rig)
     zero = (0.0,) * len(kinematics.names)
     pose = kinematics.forward(JointState(zero, zero, zero, ()))
     own, _ = kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)

@@ -12,7 +12,7 @@ from six_joints import of_six
 from viser import transforms
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.dashboard.view.head_view import HeadView
 from gazerig.robot.dashboard.view.overlays import CommandedPoseView
@@ -77,7 +77,7 @@ def _wanted(shot: Snapshot) -> CommandedPose:
 def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
     """Every link stands in its parent as kinematics say, at any angles of a shipped rig."""
     rig = load_rig("desk")
-    kinematics, view = kinematics_of(rig), HeadView(server.scene)
+    kinematics, view = rig_kinematics(rig), HeadView(server.scene)
     view.shape = shape_of(rig)
     angles = tuple((0.3 * np.sin(np.arange(len(kinematics.names)))).tolist())
     pose = kinematics.forward(JointState(angles, angles, angles, ()))

@@ -121,7 +121,7 @@ def test_a_program_chooses_it_and_is_refused_nonsense():
 def recorded(tmp_path: Path) -> Path:
     file = tmp_path / "run.mcap"
     options = RunOptions(mock=True, fast=True, bus="ideal", seed=3, seconds=3.0, record=file)
-    session.run(session.compose(options.checked()), lambda: None, lambda line: None)
+    session.run(session.compose(options.check_and_complete()), lambda: None, lambda line: None)
     return file
 
 
@@ -130,11 +130,11 @@ def test_a_recording_names_its_bus_and_comes_out_the_same_again(recorded):
     assert recording.info.bus == "ideal" and recording.end.tx_sha256 == ""
     for joints in ("recorded", "emulated"):
         again = rerun(RunRecording(recorded), joints=joints)
-        assert again.same and again.ticks > 590, (joints, again.differs)
-        assert again.tx_same is None
+        assert again.is_same and again.ticks > 590, (joints, again.difference)
+        assert again.sent_bytes_same is None
 
 
 def test_changed_models_move_ideal_servos_again(recorded, monkeypatch):
     monkeypatch.setattr("gazerig.robot.app.run_bus.build", None)  # no emulated device
     again = rerun(RunRecording(recorded), character="sleepy")
-    assert again.joints == "emulated" and not again.same
+    assert again.joints == "emulated" and not again.is_same

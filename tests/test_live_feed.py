@@ -73,7 +73,7 @@ class Page:
 
     def _rig(self, made: Assembly) -> LiveRig:
         self.rigs += 1
-        return LiveRig(200.0, made.shown(), False, self.picture, self.world, self.detector)
+        return LiveRig(200.0, made.shown_rig(), False, self.picture, self.world, self.detector)
 
     def comes_up(self) -> None:
         before = self.page.started
@@ -97,7 +97,7 @@ def page(ran: Run) -> Iterator[Page]:
 
 def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> None:
     page.comes_up()
-    direct = SnapshotBuilder(200.0, ran.made.shown())
+    direct = SnapshotBuilder(200.0, ran.made.shown_rig())
     shots: list[Snapshot] = []
     for tick in ran.ticks:
         page.stream.update(tick)
@@ -166,7 +166,7 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     assert found.located is not None
     lens, poses = found.located.intrinsics, page.live._poses
     assert poses is not None
-    R, p_m = ran.made.shown().mount.pose(*poses.head_pose(found.captured_s))
+    R, p_m = ran.made.shown_rig().mount.pose(*poses.head_pose(found.captured_s))
     for gaze_px in (None, gaze_pixel(tick, R, p_m, lens)):
         drawn = draw_detections(ground(found, depth), found, gaze_px, lens, faces=False)
         if np.array_equal(drawn, news.image):

@@ -190,22 +190,22 @@ def test_looks_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> 
         750: LookAtPerson(1, stay=True),
     }
     count = iter(range(10_000))
-    see = composed.made.robot.perception.see
+    see = composed.assembly.robot.perception.see
 
     def see_and_ask(found: Any, poses: Any) -> Any:
         command = asked.get(next(count))
         if command is not None:
-            composed.made.robot.command(command)
+            composed.assembly.robot.command(command)
         return see(found, poses)
 
     watched: Any = see_and_ask
-    composed.made.robot.perception.see = watched  # type: ignore[method-assign]
+    composed.assembly.robot.perception.see = watched  # type: ignore[method-assign]
     run_session(composed, lambda: None, lambda line: None)
     recording = RunRecording(file)
     given = [command for one in recording.moments() for command in one.tick.commands]
     assert [type(one) for one in given] == [type(one) for one in asked.values()]
     again = rerun(recording)
-    assert again.same and again.tx_same and not again.notes
+    assert again.is_same and again.sent_bytes_same and not again.notes
 
 
 def test_checks_take_what_the_recording_holds() -> None:

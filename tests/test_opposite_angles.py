@@ -8,9 +8,9 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, sub
 from gazerig.gaze.oculomotor.binocular import EyeGeometry, Eyes, OppositeAngles
 from gazerig.gaze.types import Angles3, Target, Vec3
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 
-KINEMATICS = kinematics_of(load_rig("desk"))
+KINEMATICS = rig_kinematics(load_rig("desk"))
 POINT: Vec3 = (1.0, 0.0, 0.125)
 TARGET = Target(POINT, (0.0, 0.0, 0.0), 0.0, "face", 1, 0.5, True, "N", 1, "a face")
 LIMIT_RAD = radians(20.0)

@@ -23,7 +23,7 @@ from gazerig.drivers.camera.orientation import (
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.types import CameraTurn, DetectedFace, ImageArray
-from gazerig.robot.app.camera_factory import orientation_of
+from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project, rays
 from gazerig.robot.perception.frame_locator import FrameLocator
@@ -197,8 +197,8 @@ def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None
 
 def test_the_rig_says_how_frames_are_turned() -> None:
     rig = load_rig("desk")
-    assert orientation_of(rig.camera) == AS_DELIVERED
-    turned = orientation_of(replace(rig.camera, rotation=180, mirrored=True))
+    assert frame_orientation(rig.camera) == AS_DELIVERED
+    turned = frame_orientation(replace(rig.camera, rotation=180, mirrored=True))
     assert turned == FrameOrientation(180, True)
     source = upright(partial(Frames, iter(())), turned)
     assert isinstance(source(), UprightSource)

@@ -111,7 +111,7 @@ def test_same_seed_same_bytes(name: str, tmp_path: Path) -> None:
     sent = []
     for seed in (3, 3, 4):
         made, _, _ = ran(rig, 0.75, seed)
-        sent.append(made.sent_digest())
+        sent.append(made.sent_bytes_digest())
         made.close()
     assert sent[0] == sent[1] != sent[2]
 
@@ -120,7 +120,7 @@ def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
     """What the emulated shafts do, not what anybody believes of them."""
     rig = rig_of("mixed", tmp_path)
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene="boxing"))
-    from gazerig.robot.app.run_bus import place_of
+    from gazerig.robot.app.run_bus import servo_index
 
     ports = [share.bus._port for share in made.robot.body.bus._shares]  # type: ignore[attr-defined]
     devices = dict(zip(("", "neck", "tilt"), (port.chain for port in ports), strict=True))
@@ -128,7 +128,7 @@ def test_true_servos_keep_to_their_joints_ranges(tmp_path: Path) -> None:
 
     def look(tick: Tick) -> None:
         for name, joint in rig.joints.items():
-            place = devices[joint.bus].positions_steps()[place_of(rig, name)]
+            place = devices[joint.bus].positions_steps()[servo_index(rig, name)]
             angle = degrees(joint.angle_rad(place))
             worst[name] = max(worst[name], angle - joint.max_deg, joint.min_deg - angle)
 

@@ -64,7 +64,7 @@ def test_a_rig_on_it_looks_at_people(example):
     made.close()
     assert "face" in kinds
     assert all(b - a > 0.05 for a, b in zip(low, high, strict=True)), (low, high)
-    assert made.sent_digest()
+    assert made.sent_bytes_digest()
 
 
 def test_its_section_is_checked(example, tmp_path):

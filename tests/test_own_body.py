@@ -10,14 +10,14 @@ from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.gaze.angles import norm, rotate_back, sub
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.types import Bodies, Percept, Vec3
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.kinematics import Capsule
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 
-NECK = kinematics_of(load_rig("desk"))
+NECK = rig_kinematics(load_rig("desk"))
 BEHIND: Vec3 = (-0.5, 0.0, 0.12)
 """A camera on the base, behind the head, that sees it from the back."""
 

@@ -35,7 +35,7 @@ from gazerig.drivers.plugins import (
     Plugin,
 )
 from gazerig.robot.app.camera_factory import real_camera
-from gazerig.robot.app.options import RunOptions, camera_of
+from gazerig.robot.app.options import RunOptions, parse_camera
 from gazerig.robot.cli import kinds
 from gazerig.robot.model.clock import RealClock
 
@@ -327,7 +327,7 @@ def fish(folder):
 @pytest.mark.parametrize("name", [pytest.param("frames", marks=pytest.mark.slow), "finds"])
 def test_a_camera_of_a_package_is_looked_through_by_its_name(fish, tmp_path, name):
     rig, clock = fish_rig(tmp_path), RealClock()
-    options = RunOptions(mock=True, camera=camera_of(name))
+    options = RunOptions(mock=True, camera=parse_camera(name))
     camera = real_camera(rig, options, clock, rig.camera, None)
     camera.open()
     try:

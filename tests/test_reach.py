@@ -12,7 +12,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
 from gazerig.robot.control.loop import run
@@ -38,7 +38,7 @@ def target_at(point: Vec3) -> Target:
 def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[CommandReply, float]:
     """Return the reply, and the gaze error in deg of ideal joints that followed for a while."""
     rig = loaded(name)
-    kinematics, oculomotor = gaze_parts(rig, 0)
+    kinematics, oculomotor = kinematics_and_oculomotor(rig, 0)
     spans = limits(rig.joints)
     reply = look_reply(target_at(point), oculomotor, kinematics, spans)
     q: JointAngles = tuple(min(max(0.0, one.low_rad), one.high_rad) for one in spans)
@@ -63,7 +63,7 @@ def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Com
     st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.5)),
 )
 def test_the_error_told_is_the_error_that_comes(name: str, point: Vec3) -> None:
-    middle = gaze_parts(loaded(name), 0)[0].head_pose((0.0, 0.0, 0.0))[1]
+    middle = kinematics_and_oculomotor(loaded(name), 0)[0].head_pose((0.0, 0.0, 0.0))[1]
     if norm(sub(point, middle)) < 0.3 or (point[0] < 0.0 and abs(point[1]) < 0.05):
         return  # inside the head; or right behind it, where either side is as near
     reply, error_deg = foretold_and_true(name, point)

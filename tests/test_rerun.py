@@ -115,32 +115,32 @@ def exact(tick: Tick) -> str:
 
 def test_the_same_code_and_configuration_give_the_same_to_the_bit(once: Once, again: Again) -> None:
     found = again.found
-    assert found.same and found.ticks == found.agreeing == len(once.ticks) == 419
-    assert found.first_difference_s is None and found.differs == ""
+    assert found.is_same and found.ticks == found.agreeing_ticks == len(once.ticks) == 419
+    assert found.first_difference_s is None and found.difference == ""
     assert found.joints == "recorded" and found.notes == ()
-    assert found.recorded == found.again
+    assert found.recorded_figures == found.rerun_figures
     # Not the decisions alone: whole ticks, stop, puppet and tuning included.
     assert list(map(exact, again.ticks)) == list(map(exact, once.ticks))
 
 
 def test_the_same_bytes_go_over_the_bus(once: Once, again: Again) -> None:
     assert len(once.recording.end.tx_sha256) == 64
-    assert again.found.tx_same is True
+    assert again.found.sent_bytes_same is True
 
 
 def test_emulated_servos_do_what_they_did(once: Once) -> None:
     found = rerun(once.recording, joints="emulated")
     assert found.joints == "emulated"
-    assert found.same and found.tx_same is True
+    assert found.is_same and found.sent_bytes_same is True
 
 
 def test_with_other_dice_it_differs(once: Once) -> None:
     recording = RunRecording(once.recording.path)
     recording.info = replace(recording.info, seed=6)
     found = rerun(recording)
-    assert not found.same and found.agreeing < found.ticks
-    assert found.tx_same is False
-    assert found.first_difference_s is not None and found.differs
+    assert not found.is_same and found.agreeing_ticks < found.ticks
+    assert found.sent_bytes_same is False
+    assert found.first_difference_s is not None and found.difference
 
 
 def test_the_last_bit_of_one_joint_is_seen(once: Once, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,9 +168,9 @@ def test_another_character_is_followed_by_the_servos(once: Once, tmp_path: Path)
     )
     seen: list[Tick] = []
     found = rerun(once.recording, character=str(bold), on_tick=seen.append)
-    assert found.joints == "emulated" and not found.same
+    assert found.joints == "emulated" and not found.is_same
     assert len(seen) == found.ticks == 419
-    assert found.agreeing < found.ticks and found.differs
+    assert found.agreeing_ticks < found.ticks and found.difference
     # What was seen is the same, and the servos went where the new commands sent them.
     assert [captured(t.percept) for t in seen] == [captured(t.percept) for t in once.ticks]
     behind = [
@@ -188,7 +188,7 @@ def captured(percept: Percept | None) -> float | None:
 def test_another_rig_by_name_and_as_it_is(once: Once) -> None:
     by_name = rerun(once.recording, rig="desk", joints="recorded")
     as_it_is = rerun(once.recording, rig=load_rig("desk"), joints="recorded")
-    assert by_name.same and as_it_is.same
+    assert by_name.is_same and as_it_is.is_same
     with pytest.raises(
         SetupError, match="joints upside_down: unknown; choose recorded or emulated"
     ):
@@ -198,7 +198,7 @@ def test_another_rig_by_name_and_as_it_is(once: Once) -> None:
 def test_a_run_of_a_character_is_done_again_without_its_file(tmp_path: Path) -> None:
     path = tmp_path / "shy.mcap"
     recorded(path, 1.0, character="shy")
-    assert rerun(RunRecording(path)).same
+    assert rerun(RunRecording(path)).is_same
 
 
 def test_the_recorded_rig(once: Once, tmp_path: Path) -> None:
@@ -223,7 +223,7 @@ def test_a_run_on_the_hosts_clock_is_done_again(tmp_path: Path) -> None:
     ticks = recorded(path, 3.0, {100: (Stop("x"),), 550: (Resume(),)}, start_s=345678.9012345)
     recording = RunRecording(path)
     found = rerun(recording)
-    assert found.same and found.ticks == len(ticks)
+    assert found.is_same and found.ticks == len(ticks)
 
 
 def test_a_fault_that_ended_a_run_ends_nothing_here(tmp_path: Path) -> None:
@@ -238,7 +238,7 @@ def test_a_fault_that_ended_a_run_ends_nothing_here(tmp_path: Path) -> None:
     recording = RunRecording(path)
     assert recording.end.stopped_by.startswith("fault")
     found = rerun(recording)
-    assert found.same and found.ticks == len(ticks)
+    assert found.is_same and found.ticks == len(ticks)
 
 
 def test_an_order_that_is_none_any_more_is_told(tmp_path: Path) -> None:
@@ -344,7 +344,7 @@ def test_what_the_planner_chose_is_recorded_and_chosen_again(tmp_path: Path) -> 
     recorded = [moment.tick.target.plan for moment in recording.moments()]
     assert recorded[: len(plans)] == plans
     again = rerun(recording, joints="emulated")
-    assert again.same and again.tx_same is True
+    assert again.is_same and again.sent_bytes_same is True
 
 
 # A recorded run with gestures is done again to the same bytes, without the gestures' files
@@ -386,4 +386,4 @@ def test_gestures_are_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     recording = RunRecording(path)
     assert "head_yaw_deg: 6" in recording.info.gestures_yaml
     again = rerun(recording, joints="emulated")
-    assert again.same and again.tx_same is True
+    assert again.is_same and again.sent_bytes_same is True

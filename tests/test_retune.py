@@ -140,7 +140,7 @@ OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor"
 
 def running_parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]:
     """Return what some of the running parts, the loop and the parking go by."""
-    parts = made.live.parts
+    parts = made.live_params.parts
     held = inside({name: getattr(parts, name) for name in names}, "", {})
     return {**held, "park": made.park_rad, "loop": (made.loop.rate_hz, made.loop.park_s)}
 
@@ -196,7 +196,7 @@ def test_parts_retuned_go_by_what_new_parts_would_go_by(
                 continue
     made = fresh(RIG)
     put(made, other)
-    assert made.live.rig == other != RIG
+    assert made.live_params.rig == other != RIG
     got, wanted = running_parameters(made, names), running_parameters(fresh(other), names)
     assert {k: got[k] for k in got if got[k] != wanted.get(k)} == {}
     assert got.keys() == wanted.keys()
@@ -377,7 +377,7 @@ def test_another_rate_goes_on_from_the_last_slot() -> None:
 
 def test_what_looks_at_pictures_is_retuned_too() -> None:
     made = assemble(RIG, RunOptions(True, True, 0, "visitor", pixels=True))
-    camera = made.live.parts.camera
+    camera = made.live_params.parts.camera
     other = changed(RIG, {"detector.min_face_px": 60, "motion.max_blobs": 3})
     put(made, other)
     held = inside(vars(camera), "", {})

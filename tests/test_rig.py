@@ -17,7 +17,7 @@ from gazerig.config.save_text import comment
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 from gazerig.drivers.bus.multi_bus import MultiBus
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
+from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.command_list import PANELS
 from gazerig.robot.cli.main import app
@@ -174,8 +174,8 @@ def test_joints_stand_in_their_order_whatever_bus_they_are_on(mixed: Rig) -> Non
     )  # fmt: skip
     assert bus_names(mixed) == ("", "neck", "tilt")
     assert joints_on(mixed, "neck") == ("neck_yaw",)
-    assert [setup.name for setup in rig_setups(mixed)] == list(mixed.names)
-    rests = {setup.name: setup.rest_steps for setup in rig_setups(mixed)}
+    assert [setup.name for setup in servo_configs(mixed)] == list(mixed.names)
+    rests = {setup.name: setup.rest_steps for setup in servo_configs(mixed)}
     assert rests["neck_yaw"] is None and rests["neck_pitch"] is None
     lid = mixed.joints["left_upper_lid"]
     assert rests["left_upper_lid"] == round(lid.made().steps(-20.0 * 3.141592653589793 / 180.0))
@@ -224,12 +224,12 @@ def test_a_lid_needs_its_ends(tmp_path: Path) -> None:
 
 
 def test_ports_are_named_by_their_bus(mixed: Rig) -> None:
-    assert ports_of(mixed, None)["tilt"] == "/dev/ttyACM1"
-    given = ports_of(mixed, "/dev/x,neck=/dev/y")
+    assert bus_ports(mixed, None)["tilt"] == "/dev/ttyACM1"
+    given = bus_ports(mixed, "/dev/x,neck=/dev/y")
     assert (given[""], given["neck"], given["tilt"]) == ("/dev/x", "/dev/y", "/dev/ttyACM1")
     with pytest.raises(SetupError, match="it can be PORT, neck=PORT, tilt=PORT"):
-        ports_of(mixed, "lids=/dev/z")
-    assert ports_of(load_rig("maker"), "/dev/z") == {"": "/dev/z"}
+        bus_ports(mixed, "lids=/dev/z")
+    assert bus_ports(load_rig("maker"), "/dev/z") == {"": "/dev/z"}
 
 
 def test_one_bus_is_itself_and_several_are_one(mixed: Rig) -> None:

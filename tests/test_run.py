@@ -42,7 +42,7 @@ def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
 
 
 def test_who_asks_for_no_figures_gets_the_same_bytes_and_how_it_ended() -> None:
-    asked = RunOptions(True, True, scene="boxing", seconds=0.5, rig="desk").checked()
+    asked = RunOptions(True, True, scene="boxing", seconds=0.5, rig="desk").check_and_complete()
     whole, less = (
         session.run(session.compose(asked), lambda: None, lambda line: None, summarised=summarised)
         for summarised in (True, False)

@@ -425,7 +425,7 @@ def test_info_of_another_version_is_read_as_far_as_it_is_known() -> None:
         *(("rate_hz", value) for value in ("0", "1e9", "NaN", '"200"')),
         *(("pictures_hz", value) for value in ("-1", "Infinity")), ("mock", "1"), ("fast", '"no"'),
         ("rig", "5"), ("scene", "[]"), ("versions", "[]"), ("started_utc", '"yesterday"'),
-        ("stands", "[1.0, 2.0]"), ("stands", json.dumps([1e9] * 12)), ("eyes", "{"),
+        ("placement", "[1.0, 2.0]"), ("placement", json.dumps([1e9] * 12)), ("eyes", "{"),
     ],
 )  # fmt: skip
 def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: str) -> None:

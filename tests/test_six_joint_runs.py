@@ -84,14 +84,14 @@ def test_words_for_numbers_come_back_for_any_number_of_joints(maker: Run) -> Non
 def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: Run) -> None:
     seen: list[Tick] = []
     found = rerun(maker.recording, on_tick=seen.append)
-    assert found.same and found.tx_same and found.notes == ()
+    assert found.is_same and found.sent_bytes_same and found.notes == ()
     assert list(map(exact, seen)) == list(map(exact, maker.ticks))
-    assert rerun(maker.recording, joints="emulated").same
+    assert rerun(maker.recording, joints="emulated").is_same
 
 
 def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, desk: Run) -> None:
     found = rerun(desk.recording, rig="maker")
-    assert not found.same and found.joints == "emulated"
+    assert not found.is_same and found.joints == "emulated"
     assert any("the rig has the joints eyes_pan" in note for note in found.notes)
     with pytest.raises(SetupError, match=r"the rig has the joints .*: let the servos be emulated"):
         rerun(maker.recording, rig="desk", joints="recorded")

@@ -14,7 +14,7 @@ from gazerig.gaze.angles import angle_between
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, pack, unpack
@@ -41,7 +41,7 @@ def shown_rig() -> ShownRig:
     rig, made, _ = visit()
     limits = tuple(rig.joints[name].limit() for name in GAZE_JOINTS)
     return ShownRig(
-        gaze_parts(rig, 0)[0],
+        kinematics_and_oculomotor(rig, 0)[0],
         limits,
         rig.guard.health,
         made.mount,
@@ -193,7 +193,7 @@ def test_snapshots_survive_the_way_and_are_short() -> None:
 def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
     """Two seconds of six hobby servos on a Maestro, in one snapshot."""
     _, made, ticks = visit("maker", 2.0)
-    snapshots = SnapshotBuilder(RATE_HZ, made.shown())
+    snapshots = SnapshotBuilder(RATE_HZ, made.shown_rig())
     for tick in ticks:
         snapshots.update(tick)
     shot = snapshots.take(SnapshotTexts())

@@ -36,13 +36,13 @@ class Bench:
         self.made: Assembly = assemble(rig, RunOptions(True, True, 0, "visitor", **chosen))
         self.orders: list[Command] = []
         self.tuning = ParamStore(
-            self.made.live, self.take, name, character, now=lambda: NOW, elsewhere=here
+            self.made.live_params, self.take, name, character, now=lambda: NOW, elsewhere=here
         )
 
     def take(self, order: Command) -> None:
         self.orders.append(order)
         assert isinstance(order, Tune)
-        self.said = self.made.live(order, 0.0)
+        self.said = self.made.live_params(order, 0.0)
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def mine(tmp_path: Path) -> Path:
 def test_set_puts_all_in_force_with_one_order() -> None:
     bench = Bench("desk")
     lines = bench.tuning.set({"gaze.lids.close_ms": 90, "bus.port": "/dev/ttyACM1"})
-    assert len(bench.orders) == 1 and bench.made.live.rig.gaze.lids.close_ms == 90.0
+    assert len(bench.orders) == 1 and bench.made.live_params.rig.gaze.lids.close_ms == 90.0
     assert "gaze.lids.close_ms = 90.0" in lines
     assert "bus.port = /dev/ttyACM1 (next start: the servo bus is opened with it)" in lines
     assert bench.tuning.version == 1
@@ -147,7 +147,7 @@ def test_a_file_spoilt_by_hand_is_kept_and_what_is_in_force_is_saved(
         with pytest.raises(ConfigError):
             bench.tuning.reload(mine)
     saved = bench.tuning.save()
-    assert load_rig(str(mine)) == bench.made.live.rig and bench.tuning.unsaved() == ()
+    assert load_rig(str(mine)) == bench.made.live_params.rig and bench.tuning.unsaved() == ()
     assert len(saved.changes) == len(changes)
     if text is not None:
         assert saved.backup is not None and saved.backup.read_text(encoding="utf-8") == text
@@ -164,7 +164,7 @@ def test_a_spoilt_file_is_not_copied(mine: Path, tmp_path: Path) -> None:
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
     mine.write_text("name: 5\n", encoding="utf-8")
     bench.tuning.save(tmp_path / "copy.yaml")
-    assert load_rig(str(tmp_path / "copy.yaml")) == bench.made.live.rig
+    assert load_rig(str(tmp_path / "copy.yaml")) == bench.made.live_params.rig
     assert mine.read_text(encoding="utf-8") == "name: 5\n"
 
 
@@ -176,7 +176,7 @@ def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine: Path)
     bench.tuning.save()
     rig = load_rig(str(mine))
     assert (rig.loop.rate_hz, rig.gaze.lids.close_ms) == (100.0, 90.0)
-    assert rig == bench.made.live.rig
+    assert rig == bench.made.live_params.rig
 
 
 def test_a_copy_that_fails_names_a_file_that_is_there(mine: Path, tmp_path: Path) -> None:
@@ -224,10 +224,10 @@ def test_a_copy_never_takes_the_place_of_another_file(mine: Path, tmp_path: Path
 
 def test_revert_takes_everything_back() -> None:
     bench = Bench("desk")
-    first = bench.made.live.rig
+    first = bench.made.live_params.rig
     bench.tuning.set({"gaze.lids.close_ms": 90.0, "face_parts_mm.N": (1.0, 2.0, 3.0)})
     bench.tuning.revert()
-    assert bench.made.live.rig == first and bench.tuning.unsaved() == ()
+    assert bench.made.live_params.rig == first and bench.tuning.unsaved() == ()
 
 
 def test_a_file_edited_by_hand_is_put_in_force_and_what_is_unsaved_stays(mine: Path) -> None:
@@ -238,7 +238,7 @@ def test_a_file_edited_by_hand_is_put_in_force_and_what_is_unsaved_stays(mine: P
     mine.write_text(text.replace("open_ms: 175.0", "open_ms: 150.0"), encoding="utf-8")
     lines = bench.tuning.reload(mine)
     assert set(lines) == {"loop.rate_hz = 100.0", "gaze.lids.open_ms = 150.0"}
-    lids = bench.made.live.rig.gaze.lids
+    lids = bench.made.live_params.rig.gaze.lids
     assert (lids.close_ms, lids.open_ms, bench.made.loop.rate_hz) == (90.0, 150.0, 100.0)
     assert [c.key for c in bench.tuning.unsaved()] == ["gaze.lids.close_ms"]
 
@@ -259,14 +259,14 @@ def test_characters_are_switched_and_what_is_unsaved_stays_over_them() -> None:
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
     bench.tuning.character("sleepy")
     want = load_rig("desk", "sleepy").gaze
-    got = bench.made.live.rig.gaze
+    got = bench.made.live_params.rig.gaze
     assert got.head == want.head and got.top_down == want.top_down
     assert got.lids.close_ms == 90.0 and got.lids.open_ms == want.lids.open_ms
     assert bench.tuning.character_name == "sleepy"
     bench.tuning.revert()
-    assert bench.made.live.rig == load_rig("desk", "sleepy")
+    assert bench.made.live_params.rig == load_rig("desk", "sleepy")
     bench.tuning.character("none")
-    assert bench.made.live.rig == load_rig("desk")
+    assert bench.made.live_params.rig == load_rig("desk")
     with pytest.raises(ConfigError, match="nothing named 'slepy'"):
         bench.tuning.character("slepy")
     assert bench.tuning.character_name == "none"
@@ -286,7 +286,7 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     assert bench.tuning.unsaved() == ()
     bench.tuning.character("bold")
     bench.tuning.reload(mine)
-    assert bench.made.live.rig.gaze.scanpath.model == "random"
+    assert bench.made.live_params.rig.gaze.scanpath.model == "random"
     bench.tuning.set({"gaze.aversion.min_dwell_s": 0.3})
     bench.tuning.save()
     assert load_rig(str(mine)).gaze.scanpath.model == "markov"
@@ -331,7 +331,7 @@ def test_a_dragged_slider_reads_no_file_and_makes_no_knob_anew(
     for step in range(3):
         bench.tuning.set({"gaze.lids.close_ms": 90.0 + step})
         assert bench.tuning.files() == files and bench.tuning.parameters() is knobs
-        assert bench.tuning.values() == values(bench.made.live.rig)
+        assert bench.tuning.values() == values(bench.made.live_params.rig)
         assert [change.key for change in bench.tuning.unsaved()] == ["gaze.lids.close_ms"]
 
 
@@ -344,7 +344,7 @@ def test_the_files_in_use_are_those_that_the_rig_names_now(mine: Path) -> None:
     assert [path.name for path in bench.tuning.files()] == ["mine.yaml", "mitake.yaml"]
     bench.tuning.character("shy")
     assert [p.name for p in bench.tuning.files()] == ["mine.yaml", "mitake.yaml", "shy.yaml"]
-    assert bench.tuning.values() == values(bench.made.live.rig)
+    assert bench.tuning.values() == values(bench.made.live_params.rig)
 
 
 def test_values_and_what_is_unsaved_go_by_what_was_saved_last(mine: Path) -> None:

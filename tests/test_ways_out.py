@@ -233,9 +233,11 @@ def ran(
     seconds: float = 1.5,
     before: Callable[[Assembly], None] | None = None,
 ) -> dict[str, Any]:
-    composed = session.compose(RunOptions(True, True, rig=rig, seconds=seconds).checked())
+    composed = session.compose(
+        RunOptions(True, True, rig=rig, seconds=seconds).check_and_complete()
+    )
     if before is not None:
-        before(composed.made)
+        before(composed.assembly)
     return session.run(composed, lambda: None, said.append)
 
 
@@ -290,7 +292,7 @@ def test_nobody_to_say_anything_to_ends_nothing(devices: list[Device]) -> None:
     def deaf(line: str) -> None:
         raise BrokenPipeError
 
-    composed = session.compose(RunOptions(True, True, seconds=0.5).checked())
+    composed = session.compose(RunOptions(True, True, seconds=0.5).check_and_complete())
     figures = session.run(composed, lambda: None, deaf, deaf)
     assert figures["stopped_by"] == "seconds" and on(devices[0]) == 0
 

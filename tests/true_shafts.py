@@ -21,7 +21,7 @@ from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits, park_rad
-from gazerig.robot.app.run_bus import emulated_lines, place_of
+from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.types import JointAngles
@@ -53,7 +53,7 @@ class Shafts(SimulatedClock):
         self.angles_rad: list[tuple[float, ...]] = []
         self.looking = True
         self._joints = [
-            (rig.joints[name].made(), rig.joints[name].bus, place_of(rig, name))
+            (rig.joints[name].made(), rig.joints[name].bus, servo_index(rig, name))
             for name in rig.names
         ]
 
@@ -249,7 +249,7 @@ class Bench:
     def turn(self, name: str, angle_rad: float) -> None:
         """Turn a limp joint by hand, as far as its stop."""
         joint = self.rig.joints[name]
-        device, place = self.shafts.devices[joint.bus], place_of(self.rig, name)
+        device, place = self.shafts.devices[joint.bus], servo_index(self.rig, name)
         steps = joint.steps(angle_rad) - device.positions_steps()[place]
         if hasattr(device, "body"):
             device.body.servos[place].turn(steps)

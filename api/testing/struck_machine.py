@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from gazerig.config.rig import Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS, servo_label
-from gazerig.robot.app.bus_wiring import rig_bus, rig_setups
+from gazerig.robot.app.bus_wiring import rig_bus, servo_configs
 from gazerig.robot.app.rig_limits import limits, park_rad
-from gazerig.robot.app.run_bus import emulated_lines, place_of
+from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.safety.guard import Guard
@@ -137,9 +137,9 @@ class Machine:
         self.names = self.body.names
         self.limits = limits(rig.joints)
         self.guard = Guard(rig.guard, self.limits, self.names, self.body.reach, self.period_s)
-        self.setups = rig_setups(rig)
+        self.setups = servo_configs(rig)
         self.linkages = [rig.joints[name].made() for name in self.names]
-        self.places = [(rig.joints[name].bus, place_of(rig, name)) for name in self.names]
+        self.places = [(rig.joints[name].bus, servo_index(rig, name)) for name in self.names]
         self._kinds = [rig.bus_of(name).kind for name in self.names]
         self.heard: tuple[bool, ...] = ()
         self.said: list[str] = []

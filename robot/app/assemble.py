@@ -21,13 +21,13 @@ from gazerig.gaze.field_of_view import FieldOfView
 from gazerig.gaze.gesture.animation import Animation
 from gazerig.gaze.lids.lids import Lids
 from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
-from gazerig.robot.app.camera_factory import make_lendable, placed_camera, run_camera, sight_of
-from gazerig.robot.app.gaze_models import chooser_of, kinematics_of, motion_models, oculomotor
+from gazerig.robot.app.camera_factory import camera_poses, make_lendable, placed_camera, run_camera
+from gazerig.robot.app.gaze_models import motion_models, oculomotor, rig_kinematics, target_chooser
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.app.rig_description import shape_of
-from gazerig.robot.app.rig_limits import animation_tables, lid_spans, limits, own_parts, park_rad
+from gazerig.robot.app.rig_limits import animation_tables, face_parts_m, lid_spans, limits, park_rad
 from gazerig.robot.app.run_bus import run_bus
 from gazerig.robot.app.run_rig import scene_of, with_options
 from gazerig.robot.app.surroundings import RunRoom, surroundings
@@ -53,19 +53,19 @@ from gazerig.sim_mock.scenes.scene import Scene
 T = TypeVar("T")
 
 
-def _unchanged(part: T) -> T:
+def _identity(part: T) -> T:
     return part
 
 
 class Assembly(NamedTuple):
     """A robot with the parts that run it.
 
-    sent_digest: returns the SHA-256 of all bytes sent to the emulated bus, None for another bus
+    sent_bytes_digest: returns the SHA-256 of all bytes to the emulated bus, None for another bus
     close: ends the processes started for it; notes: messages for the user
-    live: holds the present rig and applies changes to the running parts
-    fault: executes a fault command of the emulated servos, None for real or ideal ones
+    live_params: holds the present rig and applies changes to the running parts
+    inject_fault: executes a fault command of the emulated servos, None for real or ideal ones
     room: the surroundings of --world, None without
-    others: the other heads of the same room, which are stopped and resumed with it
+    other_heads: the other heads of the same room, which are stopped and resumed with it
     """
 
     robot: Robot
@@ -73,17 +73,17 @@ class Assembly(NamedTuple):
     mount: CameraMount
     poses: PoseHistory
     scene: Scene | None
-    sent_digest: Callable[[], str | None]
+    sent_bytes_digest: Callable[[], str | None]
     close: Callable[[], None]
     notes: tuple[str, ...]
-    live: LiveParams
-    fault: Callable[[str], str] | None = None
+    live_params: LiveParams
+    inject_fault: Callable[[str], str] | None = None
     room: RunRoom | None = None
-    others: tuple[NamedRobot, ...] = ()
+    other_heads: tuple[NamedRobot, ...] = ()
 
-    def shown(self) -> ShownRig:
+    def shown_rig(self) -> ShownRig:
         """Return the visible structure of the present rig."""
-        rig, parts = self.live.rig, self.live.parts
+        rig, parts = self.live_params.rig, self.live_params.parts
         return ShownRig(
             parts.kinematics,
             limits(rig.joints),
@@ -94,24 +94,24 @@ class Assembly(NamedTuple):
             shape_of(rig),
         )
 
-    def camera(self) -> CameraParams:
+    def camera_params(self) -> CameraParams:
         """Return the present lens and placement of the camera."""
-        return self.live.camera
+        return self.live_params.camera
 
     @property
     def loop(self) -> LoopParams:
         """Return the present rate and time for parking."""
-        return self.live.loop
+        return self.live_params.loop
 
     @property
     def park_rad(self) -> JointAngles:
         """Return the present pose for parking, before torque is switched off."""
-        return self.live.park_rad
+        return self.live_params.park_rad
 
     @property
     def horizontal_field_deg(self) -> float:
         """Return the present field of view of the camera."""
-        return self.live.horizontal_field_deg
+        return self.live_params.horizontal_field_deg
 
 
 class Substitutes(NamedTuple):
@@ -120,10 +120,10 @@ class Substitutes(NamedTuple):
     program: objects of a program, which are checked and supervised
     """
 
-    body: Callable[[Body], Body] = _unchanged
-    camera: Callable[[Camera], Camera] = _unchanged
-    perception: Callable[[Perception], Perception] = _unchanged
-    chooser: Callable[[TargetChooser], TargetChooser] = _unchanged
+    body: Callable[[Body], Body] = _identity
+    camera: Callable[[Camera], Camera] = _identity
+    perception: Callable[[Perception], Perception] = _identity
+    chooser: Callable[[TargetChooser], TargetChooser] = _identity
     program: ProgramParts = NO_PARTS
 
 
@@ -153,7 +153,7 @@ def assemble(
     rig = with_options(rig, options)
     seeds = np.random.SeedSequence(options.seed).spawn(len(_Generators._fields))
     random = _Generators(*map(np.random.default_rng, seeds))
-    kinematics = kinematics_of(rig)
+    kinematics = rig_kinematics(rig)
     camera, notes = placed_camera(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
     clock: Clock = SimulatedClock() if options.fast else RealClock()
@@ -161,29 +161,29 @@ def assemble(
         room = surroundings(options.world).open(rig, options, clock)
     if room is None:
         scene = scene_of(rig, options)
-        wires = run_bus(rig, options, clock)
+        opened = run_bus(rig, options, clock)
     else:
-        scene, clock, wires = room.scene, room.clock, room.wires
+        scene, clock, opened = room.scene, room.clock, room.run_bus
     messages: list[str] = []
     try:
         drawn = options.pixels or (room is not None and not options.no_pictures)
         in_process = scene is None or (drawn and not options.fast)
-        sight = sight_of(kinematics, camera, options, in_process)
+        sight = camera_poses(kinematics, camera, options, in_process)
         program = substitutes.program
         if room is not None:
             seen = room.camera(rig, options, sight, camera, random.camera, program, messages.append)
         else:
             seen = run_camera(
-                rig, options, scene, sight, wires, random.camera, camera, clock, program,
+                rig, options, scene, sight, opened, random.camera, camera, clock, program,
             )  # fmt: skip
         if options.mock and not options.fast:
             seen = make_lendable(
                 seen, rig, clock, lambda: sight.mount.retune(placement.camera(live.rig))
             )
         gentle_deg_s = rig.guard.soft_start_speed_deg_s
-        body = Body(wires.bus, rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
+        body = Body(opened.bus, rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
         # A recorded camera was on other joints: its gyro is not fused with these.
-        parts = _components(
+        parts = _build_components(
             rig, body, kinematics, seen, sight.mount, camera, walk, random,
             GyroFusion(messages.append) if options.replay is None else None,
         )  # fmt: skip
@@ -191,15 +191,15 @@ def assemble(
             lambda rig: placed_camera(rig, options, kinematics, seen)[0], camera.mount
         )
         live = LiveParams(parts, rig, placement)
-        robot = _robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
+        robot = _build_robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
     except BaseException:
-        wires.close()
+        opened.close()
         raise
 
     def close() -> None:
         if isinstance(robot.attention, GuardedChooser):
             robot.attention.close()
-        wires.close()
+        opened.close()
 
     # A shipped walk is noted only if verbose.
     shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
@@ -207,8 +207,8 @@ def assemble(
     if note is not None:
         notes = (*notes, note)
     return Assembly(
-        robot, clock, sight.mount, sight.poses, scene, wires.digest, close, notes, live,
-        wires.fault, room,
+        robot, clock, sight.mount, sight.poses, scene, opened.sent_bytes_digest, close, notes, live,
+        opened.inject_fault, room,
     )  # fmt: skip
 
 
@@ -227,7 +227,7 @@ class _Generators(NamedTuple):
     stays: np.random.Generator
 
 
-def _components(
+def _build_components(
     rig: Rig,
     body: Body,
     kinematics: Kinematics,
@@ -255,7 +255,7 @@ def _components(
             mount,
             placed.horizontal_field_deg,
             tracker,
-            own_parts(rig),
+            face_parts_m(rig),
             placed.lens,
             depth_at,
             gyro,
@@ -295,7 +295,7 @@ def _components(
     )
 
 
-def _robot(
+def _build_robot(
     parts: Components,
     poses: PoseHistory,
     live: LiveParams,
@@ -304,7 +304,7 @@ def _robot(
     simulated: bool,
     messages: list[str],
 ) -> Robot:
-    chooser = chooser_of(rig, parts.attention, messages.append, simulated)
+    chooser = target_chooser(rig, parts.attention, messages.append, simulated)
     chooser = substitutes.program.choose(chooser, messages.append, simulated)
     return Robot(
         substitutes.body(parts.body),

@@ -29,7 +29,7 @@ def joints_on(rig: Rig, name: str) -> tuple[str, ...]:
     return tuple(joint for joint in rig.names if rig.joints[joint].bus == name)
 
 
-def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
+def bus_ports(rig: Rig, given: str | None) -> dict[str, str]:
     """Return the serial port of every bus: the rig's, or the given one.
 
     given: a port for the bus without a name, or for the only one; NAME=PORT for another one;
@@ -50,7 +50,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
     return ports
 
 
-def rig_setups(rig: Rig) -> tuple[ServoConfig, ...]:
+def servo_configs(rig: Rig) -> tuple[ServoConfig, ...]:
     """Return the configuration of a rig's servos for the buses, in the order of its joints."""
     gentle_deg_s = rig.guard.soft_start_speed_deg_s
     return setups(rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
@@ -61,7 +61,7 @@ def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
 
     ports: by the name of the bus
     """
-    return _join([_share(rig, name, ports[name]) for name in bus_names(rig)])
+    return _join_buses([_bus_share(rig, name, ports[name]) for name in bus_names(rig)])
 
 
 def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
@@ -81,12 +81,12 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
     beat = guardian.beat if guardian is not None else None
     shares = []
     for name in bus_names(rig):
-        share = _share(rig, name, port_of(paths[name], on_traffic=beat))
+        share = _bus_share(rig, name, port_of(paths[name], on_traffic=beat))
         if guardian is not None and name in plans:
             bus = GuardedBus(share.bus, len(share.servo_indices), guardian, guarded.index(name))
             share = share._replace(bus=bus)
         shares.append(share)
-    return _join(shares)
+    return _join_buses(shares)
 
 
 def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
@@ -148,13 +148,13 @@ def has_watchdog(rig: Rig, name: str) -> bool:
     return not can_be_released(rig, name)
 
 
-def _join(shares: list[BusShare]) -> ServoBus:
+def _join_buses(shares: list[BusShare]) -> ServoBus:
     """Return several buses as one; a single one is returned unchanged."""
     return shares[0].bus if len(shares) == 1 else MultiBus(shares)
 
 
-def _share(rig: Rig, name: str, port: BusPort) -> BusShare:
-    every = dict(zip(rig.names, rig_setups(rig), strict=True))
+def _bus_share(rig: Rig, name: str, port: BusPort) -> BusShare:
+    every = dict(zip(rig.names, servo_configs(rig), strict=True))
     mine = joints_on(rig, name)
     own = [every[joint] for joint in mine]
     places = tuple(rig.names.index(joint) for joint in mine)

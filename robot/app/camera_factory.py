@@ -33,10 +33,10 @@ from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, HeadPose, scene_pixels
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, label_of, require
-from gazerig.robot.app.run_bus import RunBus, Sight, TrueSteps
+from gazerig.robot.app.run_bus import CameraPoses, RunBus, TrueSteps
 from gazerig.robot.app.surroundings import RoomCamera
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import pairs_of
@@ -58,9 +58,9 @@ if TYPE_CHECKING:
     from gazerig.drivers.camera.video_file import VideoFile
 
 
-def sight_of(
+def camera_poses(
     kinematics: Kinematics, camera: CameraParams, options: RunOptions, real: bool
-) -> Sight:
+) -> CameraPoses:
     """Return the placement of a run's camera.
 
     Args:
@@ -77,15 +77,15 @@ def sight_of(
         if turns is not None:
             turns.record(t_s, mount.rotation(R_world_head))
 
-    return Sight(mount, history(kinematics, tell=send if turns is not None else None), turns)
+    return CameraPoses(mount, history(kinematics, tell=send if turns is not None else None), turns)
 
 
 def run_camera(
     rig: Rig,
     options: RunOptions,
     scene: Scene | None,
-    sight: Sight,
-    wires: RunBus,
+    sight: CameraPoses,
+    run_bus: RunBus,
     rng: np.random.Generator,
     placed: CameraParams,
     clock: Clock,
@@ -94,21 +94,21 @@ def run_camera(
     """Return the robot's camera."""
     if scene is None:
         return real_camera(rig, options, clock, placed, sight.turns, own)
-    locate = locator_of(placed)
-    where = true_head(wires.true_steps, rig, sight.poses)
+    locate = frame_locator(placed)
+    where = true_head_pose(run_bus.true_steps, rig, sight.poses)
     return scene_camera(
         rig, options, scene, sight.mount, where, rng, locate, own, clock, sight.turns
     )
 
 
-def true_head(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> HeadPose:
+def true_head_pose(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> HeadPose:
     """Return the pose of the emulated head: from the servos themselves if they are in this process.
 
     Its mechanics are those of the rig at the start, whatever parameters change later.
     """
     if true_steps is None:
         return poses.head_pose
-    kinematics = kinematics_of(rig)
+    kinematics = rig_kinematics(rig)
     pairs = pairs_of(rig.couplings)
     linkages = {
         name: rig.joints[name].made()
@@ -213,7 +213,7 @@ def placed_camera(
 
     seen: the present camera, which may be a browser's
     """
-    what = options.looks_through
+    what = options.camera_source
     if isinstance(seen, BorrowedCamera) and seen.lent:
         return fixed_mount(rig.camera, kinematics), ()
     turns = options.video is None and options.replay is None and not options.mock
@@ -258,25 +258,25 @@ def real_camera(
     detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)
     motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
-    locate = locator_of(placed)
+    locate = frame_locator(placed)
     if own.camera is not None:
         return program_camera(rig, own, clock, motion, locate, options.fast)
     if options.fast:
         from gazerig.sim_mock.cameras.video import FilmCamera
 
-        film, delay_s = _film(options), options.film_delay_s
-        faces, turned = own.find_faces(rig.detector), orientation_of(placed)
+        film, delay_s = _film_source(options), options.film_delay_s
+        faces, turned = own.find_faces(rig.detector), frame_orientation(placed)
         return FilmCamera(film, faces, delay_s, motion=motion(), locate=locate, orientation=turned)
     name = options.camera if isinstance(options.camera, str) else None
     if own.detector is not None and (name is None or is_ours(CAMERA, name)):
-        return supervise_source(rig, own, _source(rig, options)(), clock, motion, locate)
+        return supervise_source(rig, own, _source_factory(rig, options)(), clock, motion, locate)
     if name is None or is_ours(CAMERA, name):
-        parts = CameraParts(_source(rig, options), detector, motion, locate)
+        parts = CameraParts(_source_factory(rig, options), detector, motion, locate)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery)
-    params, label = _section(rig, name), find(CAMERA, name).label
+    params, label = _camera_section(rig, name), find(CAMERA, name).label
     camera = create_camera_part(name, params)
     if is_source(camera):
-        source = upright(partial(create_plugin_source, name, params), orientation_of(placed))
+        source = upright(partial(create_plugin_source, name, params), frame_orientation(placed))
         parts = CameraParts(source, detector, motion, locate)
         process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
         return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S, open_s=OPEN_PROCESS_S)
@@ -304,7 +304,7 @@ def program_camera(
     if fast:
         raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
     source = CheckedSource(cast(FrameSource, camera), label)
-    turned = UprightSource(source, orientation_of(rig.camera))
+    turned = UprightSource(source, frame_orientation(rig.camera))
     return GuardedCamera(supervise_source(rig, parts, turned, clock, motion, locate), label)
 
 
@@ -321,17 +321,17 @@ def supervise_source(
     return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)
 
 
-def locator_of(placed: CameraParams) -> FrameLocator:
+def frame_locator(placed: CameraParams) -> FrameLocator:
     """Return the locator of faces and things in the axes of a camera with this lens."""
     return FrameLocator(placed.lens, radians(placed.horizontal_field_deg))
 
 
-def orientation_of(camera: CameraParams) -> FrameOrientation:
+def frame_orientation(camera: CameraParams) -> FrameOrientation:
     """Return the rotation of the camera's frames to upright."""
     return FrameOrientation(camera.rotation, camera.mirrored)
 
 
-def _section(rig: Rig, name: str) -> object:
+def _camera_section(rig: Rig, name: str) -> object:
     """Return the parameters of a package's camera: the rig's section of its name, or defaults."""
     section = getattr(rig, name, None)
     if section is not None:
@@ -352,7 +352,7 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     detector = partial(face_detector, after.detector) if after.detector != before.detector else None
     seen_through = after.camera.lens, after.camera.horizontal_field_deg
     before_through = before.camera.lens, before.camera.horizontal_field_deg
-    locate = locator_of(placed) if seen_through != before_through else None
+    locate = frame_locator(placed) if seen_through != before_through else None
     moves = after.motion != before.motion or locate is not None
     if detector is None and not moves:
         return ""
@@ -368,7 +368,11 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
             case DrawnCamera():
                 return retune_camera(camera.process, before, after, placed)
             case RoomCamera():
-                return retune_camera(camera.seeing, before, after, placed) if camera.seeing else ""
+                return (
+                    retune_camera(camera.wrapped_camera, before, after, placed)
+                    if camera.wrapped_camera
+                    else ""
+                )
             case CameraProcess():
                 done = camera.retune(detector, motion, locate)
             case CameraThread():  # it uses the program's own detector
@@ -404,7 +408,7 @@ def _retune_detecting(
     return True
 
 
-def _film(options: RunOptions) -> "VideoFile | CameraReplay":
+def _film_source(options: RunOptions) -> "VideoFile | CameraReplay":
     if options.replay is not None:
         from gazerig.drivers.camera.playback import CameraReplay
 
@@ -414,7 +418,7 @@ def _film(options: RunOptions) -> "VideoFile | CameraReplay":
     return VideoFile(str(options.video))
 
 
-def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
+def _source_factory(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return a factory of the source of upright frames, for the process that will use it."""
     source: Callable[[], FrameSource]
     if options.replay is not None:
@@ -426,4 +430,4 @@ def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     else:
         number = options.camera if isinstance(options.camera, int) else 0
         source = partial(camera_plugins.webcam, number, rig.webcam)
-    return upright(source, orientation_of(rig.camera))
+    return upright(source, frame_orientation(rig.camera))

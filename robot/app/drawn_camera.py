@@ -29,7 +29,7 @@ HeadPose = Callable[[float], tuple[Mat3, Vec3]]
 """Function that returns rotation and position [m] of the head in the world at a time [s]."""
 
 
-class NewestHead(Protocol):
+class NewestHeadPose(Protocol):
     """Newest pose of the head in the camera's process."""
 
     @property
@@ -53,9 +53,9 @@ class DrawnSource:
     def __init__(
         self,
         make: "Callable[[HeadPose], PixelCamera]",
-        poses: NewestHead,
+        poses: NewestHeadPose,
     ) -> None:
-        self._camera = make(self._head)
+        self._camera = make(self._head_pose)
         self._period_s = 1.0 / self._camera.rate_hz
         self._poses = poses
         self._now: TimedPose | None = None
@@ -95,7 +95,7 @@ class DrawnSource:
         """Free the renderer; safe to call twice."""
         self._camera.close()
 
-    def _head(self, t_s: float) -> tuple[Mat3, Vec3]:
+    def _head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
         assert self._now is not None  # ``take`` waits for the first
         return self._now.R_world_head, self._now.p_world_head_m
 

@@ -20,18 +20,18 @@ from gazerig.robot.control.chooser import LONGEST_S, GuardedChooser, TargetChoos
 from gazerig.robot.model.kinematics import Kinematics
 
 
-def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
+def kinematics_and_oculomotor(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
     """Return a rig's geometry and its oculomotor model, for gaze without a camera."""
     lid_rng, landing_rng, head_rng, sway_rng = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
     )
-    kinematics = kinematics_of(rig)
+    kinematics = rig_kinematics(rig)
     lids = Lids(rig.gaze.lids, lid_rng)
     moves = motion_models(rig, head_rng, sway_rng)
     return kinematics, oculomotor(rig, kinematics, moves, lids, landing_rng)
 
 
-def kinematics_of(rig: Rig) -> Kinematics:
+def rig_kinematics(rig: Rig) -> Kinematics:
     """Return a rig's geometry."""
     return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
 
@@ -82,7 +82,7 @@ def oculomotor(
     )
 
 
-def chooser_of(
+def target_chooser(
     rig: Rig, own: TargetChooser, say: Callable[[str], None], simulated: bool
 ) -> TargetChooser:
     """Return the chooser of the target: the rig's attention, or a package's rule before it.

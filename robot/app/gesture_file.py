@@ -58,8 +58,8 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
     Raises:
         SetupError: a joint is not the rig's, the gesture is too long, or nothing moves.
     """
-    tracks = {_track(name) for name in rig.names}
-    unknown = [name for name in series if _track(name) not in tracks]
+    tracks = {_track_of_joint(name) for name in rig.names}
+    unknown = [name for name in series if _track_of_joint(name) not in tracks]
     if unknown:
         raise SetupError(
             f"no joint {unknown[0]!r}; there is {', '.join(rig.names)}; rename the column"
@@ -72,9 +72,9 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
         )
     keys: Keys = {}
     for name, (times, angles) in series.items():
-        for time_s, value in _keys(rig, name, times, angles, start_s):
-            keys.setdefault(_track(name), []).append((time_s, value))
-    keys = {track: _mean(found) for track, found in keys.items() if found}
+        for time_s, value in _joint_keys(rig, name, times, angles, start_s):
+            keys.setdefault(_track_of_joint(name), []).append((time_s, value))
+    keys = {track: _average_keys(found) for track, found in keys.items() if found}
     if not keys:
         raise SetupError(f"nothing moves; movements below {TOLERANCE_DEG:g} deg count as jitter")
     frames: dict[float, dict[str, float]] = {}
@@ -82,7 +82,7 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
         for time_s, value in found:
             frames.setdefault(time_s, {})[track] = value
     lines = [f"description: {written(description)}", "space: joint", "fit: slow", "frames:"]
-    lines += [f"  - {{{', '.join(_frame(t, frames[t]))}}}" for t in sorted(frames)]
+    lines += [f"  - {{{', '.join(_frame_lines(t, frames[t]))}}}" for t in sorted(frames)]
     return "\n".join(lines) + "\n"
 
 
@@ -120,7 +120,7 @@ def fit_to_rig(rig: Rig, gesture: Gesture) -> FittedGesture:
     return fit.fit("", motions(gesture, rig.names), 1.0, middle, bounds, share)
 
 
-def _track(joint: str) -> str:
+def _track_of_joint(joint: str) -> str:
     """Return the track of a joint: both eyes have one."""
     if joint.startswith("neck_"):
         return joint.replace("neck", "head")
@@ -129,7 +129,7 @@ def _track(joint: str) -> str:
     return "eyes_pitch" if joint.endswith(("eye_tilt", "eyes_tilt")) else joint
 
 
-def _keys(
+def _joint_keys(
     rig: Rig, joint: str, times_s: Floats, angles_deg: Floats, start_s: float
 ) -> list[tuple[float, float]]:
     """Return the keys of one joint; for a lid, factors of its first opening."""
@@ -155,7 +155,7 @@ def _keys(
     return [(round(k * GRID_S, 3), round(v, 3)) for k, v in pairs.items() if k > 0]
 
 
-def _mean(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def _average_keys(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return keys in the order of their times; two joints of one track are averaged."""
     at: dict[float, list[float]] = {}
     for time_s, value in sorted(keys):
@@ -163,7 +163,7 @@ def _mean(keys: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return [(time_s, round(sum(them) / len(them), 3)) for time_s, them in at.items()]
 
 
-def _frame(time_s: float, values: Mapping[str, float]) -> list[str]:
+def _frame_lines(time_s: float, values: Mapping[str, float]) -> list[str]:
     own = [
         f"{n}_deg: {v}" for n, v in values.items() if n in (*HEAD_TRACKS, "eyes_yaw", "eyes_pitch")
     ]
@@ -245,7 +245,7 @@ class _Table:
                 continue
             for joint, time_s, angle in self._cells(line, row):
                 if time_s <= last_s.get(joint, -1.0):
-                    self._blame(line, f"{joint}: {time_s:g} s is not after {last_s[joint]:g} s")
+                    self._add_error(line, f"{joint}: {time_s:g} s is not after {last_s[joint]:g} s")
                 last_s[joint] = time_s
                 found.setdefault(joint, {})[time_s] = angle
         return {
@@ -256,13 +256,15 @@ class _Table:
     def _cells(self, line: int, row: Sequence[str]) -> Iterator[tuple[str, float, float]]:
         """Yield the keys of one row; an empty cell of a wide table is no key."""
         if len(row) != len(self._head):
-            self._blame(line, f"has {len(row)} columns, and the first row names {len(self._head)}")
+            self._add_error(
+                line, f"has {len(row)} columns, and the first row names {len(self._head)}"
+            )
             return
-        time = self._number(line, self._head[self._time], row[self._time])
+        time = self._read_number(line, self._head[self._time], row[self._time])
         if time is None:
             return
         if time < 0.0:
-            self._blame(line, f"{self._head[self._time]} {time:g} is before 0")
+            self._add_error(line, f"{self._head[self._time]} {time:g} is before 0")
             return
         if self._joint is not None and self._angle is not None:
             pairs = [(row[self._joint].strip(), row[self._angle])]
@@ -271,19 +273,19 @@ class _Table:
                 (n, row[i]) for i, n in enumerate(self._head) if i != self._time and row[i].strip()
             ]
         for joint, cell in pairs:
-            angle = self._number(line, joint, cell)
+            angle = self._read_number(line, joint, cell)
             if angle is not None:
                 yield joint, time * self._unit_s, angle
 
-    def _number(self, line: int, what: str, cell: str) -> float | None:
+    def _read_number(self, line: int, what: str, cell: str) -> float | None:
         try:
             value = float(cell)
         except ValueError:
             value = float("nan")
         if isfinite(value):
             return value
-        self._blame(line, f"{what}: {cell.strip()!r:.40} is no number")
+        self._add_error(line, f"{what}: {cell.strip()!r:.40} is no number")
         return None
 
-    def _blame(self, line: int, text: str) -> None:
+    def _add_error(self, line: int, text: str) -> None:
         self.faults.append(f"{self._path}:{line}: {text}")

@@ -33,11 +33,11 @@ from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (
     animation_tables,
     eye_limits,
+    face_parts_m,
     head_limits,
     lid_ends,
     lid_spans,
     limits,
-    own_parts,
     park_pose,
 )
 from gazerig.robot.control.body import Body
@@ -89,7 +89,7 @@ class CameraPlacement(NamedTuple):
     mount: MountedOn
 
 
-class _Ready(NamedTuple):
+class _PreparedChange(NamedTuple):
     """A rig that was checked before it is applied.
 
     changes: differences from ``base``; walk: of its scanpath, None if unchanged
@@ -121,7 +121,7 @@ class LiveParams:
         self._started = rig
         self._coupled = partners(pairs_of(rig.couplings))
         self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
-        self._ready: dict[int, _Ready] = {}
+        self._ready: dict[int, _PreparedChange] = {}
 
     @property
     def loop(self) -> LoopParams:
@@ -152,7 +152,7 @@ class LiveParams:
             gazerig.config.load.ConfigError: the walk that the rig names is invalid.
         """
         command = Tune(tuple(differences(base, rig).items()))
-        self._ready[id(command.changes)] = _prepare(command, base, rig)
+        self._ready[id(command.changes)] = _prepare_change(command, base, rig)
         return command
 
     def __call__(self, command: Tune, t_s: float) -> tuple[str, ...]:
@@ -163,7 +163,7 @@ class LiveParams:
         ready = self._ready.pop(id(command.changes), None)
         if ready is None or ready.changes is not command.changes or ready.base is not self.rig:
             try:
-                ready = _prepare(command, self.rig, changed(self.rig, dict(command.changes)))
+                ready = _prepare_change(command, self.rig, changed(self.rig, dict(command.changes)))
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         before, self.rig = self.rig, ready.rig
@@ -184,17 +184,17 @@ class LiveParams:
         if now.gestures != was.gestures or new.lid_joints != before.lid_joints:
             parts.gestures.retune(now.gestures, lid_spans(new))
         self._walk = walk
-        said = self._put_machine(before, new)
+        said = self._apply_to_machine(before, new)
         return (*(f"tuned: {k} = {v}{start_note(k)}" for k, v in command.changes), *said)
 
-    def _put_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
+    def _apply_to_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
         parts = self.parts
         bends = (new.geometry, new.lid_joints) != (old.geometry, old.lid_joints)
         if bends:
             parts.kinematics.retune(new.geometry, lid_ends(new))
         said: tuple[str, ...] = ()
         if (new.joints, new.guard) != (old.joints, old.guard):
-            said = self._put_joints(old, new)
+            said = self._apply_joints(old, new)
         if bends or new.ranges != old.ranges:
             parts.guard.go_gently()  # desired angles jump
         if new.loop.rate_hz != old.loop.rate_hz:
@@ -205,11 +205,11 @@ class LiveParams:
         if placed != was_placed:
             parts.mount.retune(replace(placed, mount=self._placed.mount))
         if (placed, new.face_parts_mm) != (was_placed, old.face_parts_mm):
-            parts.perception.retune(placed.horizontal_field_deg, own_parts(new), placed.lens)
+            parts.perception.retune(placed.horizontal_field_deg, face_parts_m(new), placed.lens)
         camera = retune_camera(parts.camera, old, new, placed)
         return (*said, camera) if camera else said
 
-    def _put_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
+    def _apply_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
         """Apply joint limits to body and guard; the guard gets the present angles of the joints.
 
         Returns the changes that wait for the next setup of the servos.
@@ -240,7 +240,7 @@ class LiveParams:
     def _keep_servos(self, rig: Rig) -> dict[str, JointParams]:
         """Return the joints with the servos that the bus was opened with."""
         return {
-            name: _with_servo(rig.joints[name], first, name in self._coupled)
+            name: _with_servo_of(rig.joints[name], first, name in self._coupled)
             for name, first in self._started.joints.items()
         }
 
@@ -253,7 +253,7 @@ _OF_A_PAIR = ("sign", "ratio", "zero_step")
 """Further fields that stay if two servos move two joints together."""
 
 
-def _with_servo(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
+def _with_servo_of(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
     """Return a joint with the servo of another; the same object if it has that already."""
     keys = (*_OF_THE_SERVO, *_OF_A_PAIR) if coupled else _OF_THE_SERVO
     kept = {key: getattr(first, key) for key in keys}
@@ -262,8 +262,8 @@ def _with_servo(joint: JointParams, first: JointParams, coupled: bool) -> JointP
     return replace(joint, **kept)
 
 
-def _prepare(command: Tune, base: Rig, rig: Rig) -> _Ready:
+def _prepare_change(command: Tune, base: Rig, rig: Rig) -> _PreparedChange:
     """Build a checked change, with a new face walk if that has changed."""
     name = rig.gaze.scanpath.transition_matrix
     walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
-    return _Ready(command.changes, base, rig, walk)
+    return _PreparedChange(command.changes, base, rig, walk)

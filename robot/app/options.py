@@ -21,7 +21,7 @@ class RunOptions:
         mock: emulated servos instead of the rig's.
         fast: simulated time.
         seed: of all random generators.
-        scene, video, camera, oak, replay, world: source of the view; one of them (see ``checked``);
+        scene, video, camera, oak, replay, world: source of the view; one of them;
             a camera is the number of a webcam or the name of another package's.
         world: a world with physics, by name or path; its camera's images are rendered and analysed
             by the real detectors.
@@ -82,7 +82,7 @@ class RunOptions:
     name: str | None = None
 
     @property
-    def looks_through(self) -> str | None:
+    def camera_source(self) -> str | None:
         """Return the real or filmed camera, None for a scene."""
         if self.video is not None:
             return "a film"
@@ -106,22 +106,22 @@ class RunOptions:
         """
         if self.page is None:
             return None
-        address = host_port(self.page)
+        address = parse_host_port(self.page)
         return None if self.no_page or self.fast else address
 
     @property
-    def written(self) -> tuple[Path, ...]:
+    def output_files(self) -> tuple[Path, ...]:
         """Return the files whose names must be free before the run starts."""
         named = None if self.summary is None or self.summary == "-" else Path(self.summary)
         return tuple(path for path in (self.record, self.heatmap, named) if path is not None)
 
     @property
-    def choices(self) -> tuple[tuple[str, str], ...]:
+    def initial_choices(self) -> tuple[tuple[str, str], ...]:
         """Return the initial choices of the robot's menus, as (menu, choice)."""
         asked = (("behaviour", self.behaviour), ("conversation", self.conversation))
         return tuple((menu, choice) for menu, choice in asked if choice is not None)
 
-    def checked(self, blind: bool = False) -> "RunOptions":
+    def check_and_complete(self, blind: bool = False) -> "RunOptions":
         """Return the options with the default scene if none was given.
 
         Args:
@@ -197,7 +197,7 @@ class RunOptions:
             raise SetupError("--fast needs --seconds S with a film: it would never end")
 
 
-def host_port(text: str) -> tuple[str, int]:
+def parse_host_port(text: str) -> tuple[str, int]:
     """Return host and port of HOST:PORT.
 
     Raises:
@@ -209,6 +209,6 @@ def host_port(text: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def camera_of(text: str | None) -> int | str | None:
+def parse_camera(text: str | None) -> int | str | None:
     """Return the value of --camera: the number of a webcam, or the name of a camera."""
     return int(text) if text is not None and text.isdecimal() else text

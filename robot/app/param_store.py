@@ -50,13 +50,13 @@ NO_CHARACTER = "none"
 _DEFAULTS = "desk"
 
 
-class _ParamState(NamedTuple):
+class _RigState(NamedTuple):
     """State at one moment, replaced as a whole.
 
     saved: rig of the files, with the options; rig: the present one
     name: of the rig as given, a shipped name or a path
     files: in use, with their contents at the last valid read
-    was, values: of ``saved`` and of ``rig``, by key
+    file_values, values: of ``saved`` and of ``rig``, by key
     """
 
     saved: Rig
@@ -64,7 +64,7 @@ class _ParamState(NamedTuple):
     name: str
     character: str | None
     files: RigFiles
-    was: Mapping[str, Value]
+    file_values: Mapping[str, Value]
     values: Mapping[str, Value]
     version: int
 
@@ -107,7 +107,7 @@ class ParamStore:
         read, files = read_all(RigLayers(rig, character, profile))
         whole, found = live_params.rig, values(live_params.rig)
         self._options = differences(read, whole)
-        self._state = _ParamState(whole, whole, rig, character, files, found, found, 0)
+        self._state = _RigState(whole, whole, rig, character, files, found, found, 0)
         self._described = described(whole, self._defaults)
         # A shipped rig's own folder is the package's, which contains no file of a user.
         at_home = rig in shipped_names("rigs")
@@ -168,12 +168,12 @@ class ParamStore:
             gazerig.config.load.ConfigError: with every fault; nothing changes.
         """
         with self._changing:
-            return self._put(self._state, changed(self._state.rig, changes))
+            return self._apply(self._state, changed(self._state.rig, changes))
 
     def unsaved(self) -> tuple[ParamChange, ...]:
         """Return the present values that differ from the files."""
         state = self._state
-        return _changes(state.saved, state.rig, state.was)
+        return _changes(state.saved, state.rig, state.file_values)
 
     def differs(self) -> tuple[ParamChange, ...]:
         """Return the values that differ from the defaults, those of the shipped rig."""
@@ -182,7 +182,7 @@ class ParamStore:
     def revert(self) -> tuple[str, ...]:
         """Apply the values in the files again."""
         with self._changing:
-            return self._put(self._state, self._state.saved)
+            return self._apply(self._state, self._state.saved)
 
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write the present values into the rig's file, or into a copy of it at a new path.
@@ -225,7 +225,7 @@ class ParamStore:
             saved: SavedFile
             saved, files = done
             self._state = state._replace(
-                saved=state.rig, was=state.values, files=files, version=state.version + 1
+                saved=state.rig, file_values=state.values, files=files, version=state.version + 1
             )
             return saved
 
@@ -247,7 +247,7 @@ class ParamStore:
             wanted = None if name in (NO_CHARACTER, "") else name
             state = self._read(state._replace(character=wanted))
             rig = changed(state.saved, differences(self._state.saved, self._state.rig))
-            return self._put(state, rig)
+            return self._apply(state, rig)
 
     def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
         """Apply the present values of the files; unsaved values stay unless the files changed them.
@@ -271,18 +271,18 @@ class ParamStore:
                 for other in edited
             )
         }
-        return self._put(state, changed(state.saved, kept))
+        return self._apply(state, changed(state.saved, kept))
 
-    def _layers(self, state: _ParamState) -> RigLayers:
+    def _layers(self, state: _RigState) -> RigLayers:
         return RigLayers(state.name, state.character, self._profile)
 
-    def _read(self, state: _ParamState) -> _ParamState:
+    def _read(self, state: _RigState) -> _RigState:
         """Read the files, with the options over them; the present rig stays."""
         rig, files = self._elsewhere(read_all, self._layers(state))
         saved = changed(rig, self._options)
-        return state._replace(saved=saved, was=values(saved), files=files)
+        return state._replace(saved=saved, file_values=values(saved), files=files)
 
-    def _put(self, state: _ParamState, rig: Rig) -> tuple[str, ...]:
+    def _apply(self, state: _RigState, rig: Rig) -> tuple[str, ...]:
         """Apply a checked rig, and return the changes."""
         before = self._state
         found = differences(before.rig, rig)

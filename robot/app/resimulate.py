@@ -39,25 +39,25 @@ class Resimulation(NamedTuple):
     joints: source of the joints' angles
     ticks: compared; agreeing: number with the same target, gaze and commands, to the bit
     first_difference_s: from the first tick, None if all agree; differs: the difference there
-    tx_same: whether the bytes on the emulated bus are the same too, None if unknown
-    recorded, again: the figures of both (gazerig.robot.analysis.summary)
+    sent_bytes_same: whether the bytes on the emulated bus are the same too, None if unknown
+    recorded_figures, rerun_figures: the figures of both (gazerig.robot.analysis.summary)
     notes: further messages for the user
     """
 
     joints: Joints
     ticks: int
-    agreeing: int
+    agreeing_ticks: int
     first_difference_s: float | None
-    differs: str
-    tx_same: bool | None
-    recorded: dict[str, object]
-    again: dict[str, object]
+    difference: str
+    sent_bytes_same: bool | None
+    recorded_figures: dict[str, object]
+    rerun_figures: dict[str, object]
     notes: tuple[str, ...]
 
     @property
-    def same(self) -> bool:
+    def is_same(self) -> bool:
         """Return whether every tick is identical."""
-        return self.agreeing == self.ticks
+        return self.agreeing_ticks == self.ticks
 
 
 def rerun(
@@ -83,13 +83,13 @@ def rerun(
     changed = rig is not None or character is not None
     fed: Joints = "emulated" if joints == "emulated" or (joints is None and changed) else "recorded"
     with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
-        with_rig = _rig(recording, rig, character, Path(folder))
+        with_rig = _resimulation_rig(recording, rig, character, Path(folder))
         # The scene is not needed: its percepts are in the recording.
         info = recording.info
         options = RunOptions(True, True, info.seed, "visitor", bus=info.bus)
         again = _Resimulator(with_rig, options, fed, on_tick)
         try:
-            return again.whole(recording)
+            return again.resimulate(recording)
         finally:
             again.close()
 
@@ -111,13 +111,13 @@ class _Resimulator:
             rig,
             options,
             Substitutes(
-                body=self._played if joints == "recorded" else lambda own: own,
+                body=self._wrap_body if joints == "recorded" else lambda own: own,
                 camera=lambda own: NoCamera(),
                 perception=lambda own: self._perception,
             ),
         )
 
-    def _played(self, own: Body) -> Body:
+    def _wrap_body(self, own: Body) -> Body:
         self._body = PlaybackBody(own)
         return self._body
 
@@ -125,7 +125,7 @@ class _Resimulator:
         """End the processes started for it."""
         self._made.close()
 
-    def whole(self, recording: RunRecording) -> Resimulation:
+    def resimulate(self, recording: RunRecording) -> Resimulation:
         """Resimulate the whole run and compare."""
         moments = recording.moments()
         first = next(moments, None)
@@ -149,7 +149,7 @@ class _Resimulator:
         if self._body is not None:
             self._body.play(first)
         self._made.robot.start(self._made.clock)
-        ended = self._run(chain((first,), moments))
+        ended = self._run_ticks(chain((first,), moments))
         end = recording.end
         if ended is None and end.ran_s is not None:
             self._made.clock.sleep_until(began_s + end.ran_s)
@@ -159,11 +159,11 @@ class _Resimulator:
         shut_down(self._made, count, lambda line: None)
         if ended is not None:
             self._notes.append(f"the new run ended early by {ended}")
-        now = self._made.sent_digest()
+        now = self._made.sent_bytes_digest()
         same = now == end.tx_sha256 if end.tx_sha256 else None
         return self._compared.result(self._joints, same, tuple(self._notes))
 
-    def _run(self, moments: Iterator[TickRecord]) -> str | None:
+    def _run_ticks(self, moments: Iterator[TickRecord]) -> str | None:
         """Run all ticks; return the reason of an early end."""
         made = self._made
         for moment in moments:
@@ -211,7 +211,7 @@ class _Comparison:
         self._is.update(now)
         pairs = zip(_Decisions._fields, _decisions(was), _decisions(now), strict=True)
         name = next((name for name, then, again in pairs if then != again), None)
-        differs = f"{name}: {_short(was, now, name)}" if name is not None else ""
+        differs = f"{name}: {_describe_difference(was, now, name)}" if name is not None else ""
         if not differs:
             self._agreeing += 1
         elif self._first_s is None:
@@ -251,7 +251,7 @@ def _decisions(tick: Tick) -> _Decisions:
     )
 
 
-def _short(was: Tick, now: Tick, name: str) -> str:
+def _describe_difference(was: Tick, now: Tick, name: str) -> str:
     """Return a short text on how one part of a tick differs."""
     if name == "target":
         return f"{now.target.why}, was {was.target.why}"
@@ -271,14 +271,14 @@ def _short(was: Tick, now: Tick, name: str) -> str:
     return f"{joint} {new:.6f} rad, was {old:.6f}"
 
 
-def _rig(
+def _resimulation_rig(
     recording: RunRecording, rig: Rig | str | None, character: str | None, folder: Path
 ) -> Rig:
     """Return the rig of the resimulation: the recorded one, unless another is given."""
     if isinstance(rig, str):
         return load_rig(rig, character)
     text = params_text(rig) if rig is not None else recording.info.config_yaml
-    whole = _write(text, folder / "recorded.yaml")
+    whole = _write_text(text, folder / "recorded.yaml")
     try:
         base = rig if rig is not None else load(whole, Rig)
     except ConfigError as error:
@@ -294,7 +294,7 @@ def _rig(
         found = load(file, Rig, defaults=(whole,))
     if rig is None and recording.info.gestures_yaml:
         # The files of gestures may have changed since, too.
-        kept = _write(recording.info.gestures_yaml, folder / "gestures.yaml")
+        kept = _write_text(recording.info.gestures_yaml, folder / "gestures.yaml")
         (folder / "gestures").mkdir()
         found = replace(found, gesture_files=gesture_files(kept, folder / "gestures"))
     scanpath = found.gaze.scanpath
@@ -302,12 +302,12 @@ def _rig(
     if not same_walk or not recording.info.walk_yaml:
         return found
     # The walk's own file may have changed since, or be on another machine.
-    walk = str(_write(recording.info.walk_yaml, folder / "walk.yaml"))
+    walk = str(_write_text(recording.info.walk_yaml, folder / "walk.yaml"))
     return replace(
         found, gaze=replace(found.gaze, scanpath=replace(scanpath, transition_matrix=walk))
     )
 
 
-def _write(text: str, file: Path) -> Path:
+def _write_text(text: str, file: Path) -> Path:
     file.write_text(text, encoding="utf-8")
     return file

@@ -72,11 +72,11 @@ def collision_hints(rig: Rig) -> list[str]:
     return [
         one.text()
         for one in collisions(shape)
-        if not any(_forbids(two, one.angles_deg) for two in rig.guard.collisions)
+        if not any(_forbids_pose(two, one.angles_deg) for two in rig.guard.collisions)
     ]
 
 
-def _forbids(pair: CollisionParams, angles_deg: Mapping[str, float]) -> bool:
+def _forbids_pose(pair: CollisionParams, angles_deg: Mapping[str, float]) -> bool:
     first, second = angles_deg.get(pair.first, 0.0), angles_deg.get(pair.second, 0.0)
     within = pair.first_min_deg <= first <= pair.first_max_deg
     return within and pair.second_min_deg <= second <= pair.second_max_deg

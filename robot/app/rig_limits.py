@@ -26,7 +26,7 @@ def park_pose(rig: Rig) -> JointAngles:
     return tuple(radians(rig.park_deg.get(name, 0.0)) for name in in_order(rig.joints))
 
 
-def own_parts(rig: Rig) -> dict[str, Vec3]:
+def face_parts_m(rig: Rig) -> dict[str, Vec3]:
     """Return the rig's own positions of face parts in metres."""
     return {code: (x / 1e3, y / 1e3, z / 1e3) for code, (x, y, z) in rig.face_parts_mm.items()}
 
@@ -48,7 +48,7 @@ def lid_spans(rig: Rig) -> dict[str, float]:
 
 def eye_limits(rig: Rig) -> EyeLimits:
     """Return the eyes' ranges: the narrower of the joints' and the profile's."""
-    return (_eye(rig, "left"), _eye(rig, "right"))
+    return (_eye_ranges(rig, "left"), _eye_ranges(rig, "right"))
 
 
 def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2], Angles2]:
@@ -58,27 +58,30 @@ def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2], Angles2]:
         The limit, ((yaw low, high), (pitch low, high)) and (roll low, high), radians.
     """
     smallest = min(abs(end) for eye in eye_limits(rig) for span in eye for end in span)
-    neck = _span(rig, "neck_yaw", rig.ranges.neck_yaw_deg), _span(rig, "neck_pitch", 180.0)
+    neck = (
+        _joint_range(rig, "neck_yaw", rig.ranges.neck_yaw_deg),
+        _joint_range(rig, "neck_pitch", 180.0),
+    )
     return smallest, neck, neck_span(rig, "neck_roll")
 
 
 def neck_span(rig: Rig, name: str) -> Angles2:
     """Return the range of an axis of the neck; (0, 0) without it."""
-    return _span(rig, name, 180.0)
+    return _joint_range(rig, name, 180.0)
 
 
-def _eye(rig: Rig, side: str) -> tuple[Angles2, Angles2]:
-    yaw = _span(rig, _turned_by(rig, side, "pan"), rig.ranges.eye_yaw_deg)
-    return yaw, _span(rig, _turned_by(rig, side, "tilt"), rig.ranges.eye_pitch_deg)
+def _eye_ranges(rig: Rig, side: str) -> tuple[Angles2, Angles2]:
+    yaw = _joint_range(rig, _turning_joint(rig, side, "pan"), rig.ranges.eye_yaw_deg)
+    return yaw, _joint_range(rig, _turning_joint(rig, side, "tilt"), rig.ranges.eye_pitch_deg)
 
 
-def _turned_by(rig: Rig, side: str, way: str) -> str:
+def _turning_joint(rig: Rig, side: str, axis: str) -> str:
     """Name the joint that turns an eye: its own, or that of both."""
-    own = f"{side}_eye_{way}"
-    return own if own in rig.joints else f"eyes_{way}"
+    own = f"{side}_eye_{axis}"
+    return own if own in rig.joints else f"eyes_{axis}"
 
 
-def _span(rig: Rig, name: str, most_deg: float) -> Angles2:
+def _joint_range(rig: Rig, name: str, most_deg: float) -> Angles2:
     """Return a joint's range within +-most_deg, in radians; (0, 0) without it."""
     joint = rig.joints.get(name)
     if joint is None:
@@ -94,7 +97,7 @@ def park_rad(rig: Rig) -> dict[str, float]:
 def animation_tables(rig: Rig) -> AnimationTables:
     """Return the pose offsets of expressions and levels."""
     expressions = {name: pose_offset(rig, angles) for name, angles in rig.expressions.items()}
-    levels = {name: _level(rig, level) for name, level in rig.levels.items()}
+    levels = {name: _level_range(rig, level) for name, level in rig.levels.items()}
     return AnimationTables(expressions, rig.expression_blend_s, levels)
 
 
@@ -116,7 +119,7 @@ def pose_offset(rig: Rig, offsets_deg: Mapping[str, float]) -> PoseOffset:
     return NO_OFFSET._replace(head_rad=(yaw, pitch, roll), lids=(a, b, c, d), joints_rad=joints)
 
 
-def _level(rig: Rig, level: LevelParams) -> LevelRange:
+def _level_range(rig: Rig, level: LevelParams) -> LevelRange:
     low, high = (
         pose_offset(rig, {level.joint: angle}) for angle in (level.low_deg, level.high_deg)
     )

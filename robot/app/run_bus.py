@@ -16,11 +16,11 @@ from gazerig.drivers.serial.list_ports import check_owner, serial_ports
 from gazerig.drivers.types import ServoBus
 from gazerig.robot.app.bus_wiring import (
     bus_names,
+    bus_ports,
     guarded_rig_bus,
     joints_on,
-    ports_of,
     rig_bus,
-    rig_setups,
+    servo_configs,
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.description.mass import HEAD_LOAD_KG_M2
@@ -50,19 +50,19 @@ class RunBus(NamedTuple):
     """The bus of the rig.
 
     true_steps: true positions of the servos, None if unknown in this process
-    digest: returns the SHA-256 of all bytes sent, None if they are not counted
+    sent_bytes_digest: returns the SHA-256 of all bytes sent, None if they are not counted
     close: ends the processes started for it
-    fault: executes a fault command of the emulated servos, None for real or ideal ones
+    inject_fault: executes a fault command of the emulated servos, None for real or ideal ones
     """
 
     bus: ServoBus
     true_steps: TrueSteps | None = None
-    digest: Callable[[], str | None] = lambda: None
+    sent_bytes_digest: Callable[[], str | None] = lambda: None
     close: Callable[[], None] = lambda: None
-    fault: Callable[[str], str] | None = None
+    inject_fault: Callable[[str], str] | None = None
 
 
-class Sight(NamedTuple):
+class CameraPoses(NamedTuple):
     """Placement of the camera, history of the head's pose, and its further receivers."""
 
     mount: CameraMount
@@ -83,42 +83,47 @@ _NECK_SERVO_NM = 1.0
 
 def emulated_lines(rig: Rig) -> dict[str, Emulated]:
     """Return the emulated device of each bus, by the bus's name; servos in the order of joints."""
-    return {name: _line(rig, name) for name in bus_names(rig)}
+    return {name: _emulated_line(rig, name) for name in bus_names(rig)}
 
 
 def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
     """Return all servos of a rig without bytes, at the start angles of the emulated ones."""
     measured = [rig.joints[name].facts.measures_position for name in rig.names]
-    return IdealBus(rig_setups(rig), [_start(rig, name) for name in rig.names], measured, now_s)
+    return IdealBus(
+        servo_configs(rig), [_start_step(rig, name) for name in rig.names], measured, now_s
+    )
 
 
 def emulated_servo(rig: Rig, name: str) -> ServoSpec:
     """Return the smart servo of one joint."""
     joint = rig.joints[name]
-    start, (low, high) = _start(rig, name), _stops(rig, name)
+    start, (low, high) = _start_step(rig, name), _mechanical_stops(rig, name)
     steps_per_rad = joint.facts.steps_per_turn / (2.0 * pi)
     load = HEAD_LOAD_KG_M2.get(name, 0.0) * (steps_per_rad / joint.made().steepest) ** 2
     physics = Physics(load_kg_m2=load, stop_low_steps=low, stop_high_steps=high)
     return ServoSpec(joint.id, joint.model, start, physics=physics)
 
 
-def place_of(rig: Rig, joint: str) -> int:
+def servo_index(rig: Rig, joint: str) -> int:
     """Return the index of a joint's servo in the true positions of its emulated device."""
     bus, servo_id = rig.joints[joint].bus, rig.joints[joint].id
     # A board lists all its channels, a chain only its servos.
     return servo_id if rig.bus_of(joint).kind in HOBBY_KINDS else joints_on(rig, bus).index(joint)
 
 
-def _line(rig: Rig, name: str) -> Emulated:
+def _emulated_line(rig: Rig, name: str) -> Emulated:
     config, joints = rig.bus_named(name), joints_on(rig, name)
     if config.kind in CHAINS:
         specs = tuple(emulated_servo(rig, joint) for joint in joints)
         return CHAINS[config.kind](specs, config.baud)
     if config.kind in BOARDS:
-        return BOARDS[config.kind](config, tuple(_hobby(rig, one) for one in joints))
+        return BOARDS[config.kind](config, tuple(_hobby_spec(rig, one) for one in joints))
     servos = tuple(
         EmulatedJoint(
-            rig.joints[name].id, rig.joints[name].model, _start(rig, name), *_stops(rig, name)
+            rig.joints[name].id,
+            rig.joints[name].model,
+            _start_step(rig, name),
+            *_mechanical_stops(rig, name),
         )
         for name in joints
     )
@@ -142,9 +147,9 @@ BOARDS: dict[str, Callable[[BusConfig, tuple[HobbySpec, ...]], Emulated]] = {
 """Emulated boards with their hobby servos by the kind of bus."""
 
 
-def _hobby(rig: Rig, name: str) -> HobbySpec:
+def _hobby_spec(rig: Rig, name: str) -> HobbySpec:
     joint = rig.joints[name]
-    low, high = _stops(rig, name)
+    low, high = _mechanical_stops(rig, name)
     facts, spec = joint.facts, HobbySpec(joint.id)
     if joint.servo_speed_deg_s is not None:
         spec = spec._replace(speed_steps_s=joint.servo_speed_deg_s * facts.steps_per_turn / 360.0)
@@ -152,7 +157,7 @@ def _hobby(rig: Rig, name: str) -> HobbySpec:
         spec = spec._replace(stall_torque_nm=_NECK_SERVO_NM)
     # The board's own range of the channel is as wide as that of such servos.
     return spec._replace(
-        start_steps=_start(rig, name),
+        start_steps=_start_step(rig, name),
         stop_low_steps=low,
         stop_high_steps=high,
         min_steps=facts.lowest,
@@ -160,7 +165,7 @@ def _hobby(rig: Rig, name: str) -> HobbySpec:
     )
 
 
-def crooked_rad(rig: Rig) -> dict[str, float]:
+def start_angles_rad(rig: Rig) -> dict[str, float]:
     """Return the start angles of a rig's emulated joints."""
     crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
     for first, second, _ in pairs_of(rig.couplings):
@@ -171,14 +176,14 @@ def crooked_rad(rig: Rig) -> dict[str, float]:
     return crooked
 
 
-def _start(rig: Rig, name: str) -> int:
-    crooked = crooked_rad(rig)
+def _start_step(rig: Rig, name: str) -> int:
+    crooked = start_angles_rad(rig)
     for first, second, coupling in pairs_of(rig.couplings):
         crooked[first], crooked[second] = coupling.servo_rad((crooked[first], crooked[second]))
     return round(rig.joints[name].steps(crooked[name]))
 
 
-def _stops(rig: Rig, name: str) -> tuple[float, float]:
+def _mechanical_stops(rig: Rig, name: str) -> tuple[float, float]:
     """Return the first and last step of the servo that its mechanics allow."""
     joint = rig.joints[name]
     for pair in pairs_of(rig.couplings):
@@ -202,27 +207,27 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
         clock: of the run.
     """
     if not options.mock:
-        paths, here = ports_of(rig, options.port), serial_ports()
+        paths, here = bus_ports(rig, options.port), serial_ports()
         for name, path in paths.items():
             check_owner(path, rig.bus_named(name).kind, here)
         return RunBus(guarded_rig_bus(rig, paths))
     if options.bus == "ideal":
-        return without_wires(rig, ideal_bus(rig, clock.now_s))
+        return ideal_run_bus(rig, ideal_bus(rig, clock.now_s))
     lines = emulated_lines(rig)
     if not options.fast and has_terminals():
         buses = PtyBuses()
         paths = buses.start(lines)
-        return RunBus(guarded_rig_bus(rig, paths), close=buses.stop, fault=buses.command)
-    return in_process(rig, {name: build(line, clock.now_s) for name, line in lines.items()})
+        return RunBus(guarded_rig_bus(rig, paths), close=buses.stop, inject_fault=buses.command)
+    return in_process_run_bus(rig, {name: build(line, clock.now_s) for name, line in lines.items()})
 
 
-def without_wires(rig: Rig, ideal: IdealBus) -> RunBus:
+def ideal_run_bus(rig: Rig, ideal: IdealBus) -> RunBus:
     """Return ideal servos of a rig, with their true positions."""
     names = rig.names
     return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
 
 
-def in_process(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
+def in_process_run_bus(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
     """Return emulated devices in this process, by the name of their bus, with a digest."""
     from gazerig.sim_mock.in_process_port import InProcessPort
 
@@ -233,7 +238,7 @@ def in_process(rig: Rig, devices: Mapping[str, Device]) -> RunBus:
 
 def _true_steps(rig: Rig, devices: Mapping[str, Device]) -> TrueSteps:
     """Return the reader of the shafts of emulated devices; ``devices``: by the name of the bus."""
-    places = tuple((name, rig.joints[name].bus, place_of(rig, name)) for name in rig.names)
+    places = tuple((name, rig.joints[name].bus, servo_index(rig, name)) for name in rig.names)
 
     def now() -> dict[str, float]:
         steps = {bus: device.positions_steps() for bus, device in devices.items()}

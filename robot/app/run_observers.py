@@ -52,7 +52,7 @@ class SteeringButtons(NamedTuple):
 
     keys: tuple[str, ...]
     press: Callable[[str], str | None]
-    shown: Callable[[], str]
+    status_text: Callable[[], str]
 
 
 class RunObservers:
@@ -73,7 +73,7 @@ class RunObservers:
 
     def __init__(
         self,
-        made: Assembly,
+        assembly: Assembly,
         options: RunOptions,
         say: Callable[[str], None],
         status: Callable[[str], None] | None = None,
@@ -83,13 +83,13 @@ class RunObservers:
         browse: Callable[[str], object] | None = None,
     ) -> None:
         self._steer, self._lent = steer, False
-        self._made, self._fast, self._say = made, options.fast, say
-        self._timing = LoopTiming(made.loop.rate_hz)
+        self._made, self._fast, self._say = assembly, options.fast, say
+        self._timing = LoopTiming(assembly.loop.rate_hz)
         self._emulated = options.mock and steer is None
-        computed = options.no_pictures or (made.scene is not None and not options.pixels)
-        self._detector = "" if computed else str(detector_status(made.live.rig.detector))
+        computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
+        self._detector = "" if computed else str(detector_status(assembly.live_params.rig.detector))
         self._tuning, self._recorder, self._world_recorded = tuning, recorder, False
-        self._commanded = RobotGroup(made.robot, made.others)
+        self._commanded = RobotGroup(assembly.robot, assembly.other_heads)
         name = options.name or rig_name(options.rig)
         about = {"rig": options.rig, "name": name, "pid": os.getpid()}
         self._live = (
@@ -97,20 +97,22 @@ class RunObservers:
                 self._commanded,
                 tuning,
                 (ConfigError,),
-                made.clock,
+                assembly.clock,
                 about,
                 say,
                 self._timing.figures,
-                made.fault,
+                assembly.inject_fault,
                 lambda: {"page": self._page.url() if self._page is not None else None},
                 tuning.confined,
             )
             if tuning is not None and not options.fast
             else None
         )
-        self._picking = ClickToLook(PixelToWorld(made.mount, made.poses, made.camera))
+        self._picking = ClickToLook(
+            PixelToWorld(assembly.mount, assembly.poses, assembly.camera_params)
+        )
         address = options.page_address
-        self._page = self._made_page(address) if address is not None else None
+        self._page = self._make_page(address) if address is not None else None
         # Simulated time runs faster than a page or a line can show.
         live = not options.fast
         self._publisher = None
@@ -119,7 +121,7 @@ class RunObservers:
             self._publisher = Publisher(
                 self._page, self._live_rig, self._run_state, feed, say, browse
             )
-        health = made.robot.body.bus.health
+        health = assembly.robot.body.bus.health
         self._status = (
             StatusLine(status, health, self._timing.figures)
             if live and status is not None
@@ -131,12 +133,12 @@ class RunObservers:
             self._stream.add("the page", self._publisher.take)
             self._parking.add("the page", self._publisher.take)
         self._observers = Observers(say)
-        self.join(self._observers)
+        self.attach(self._observers)
 
-    def _made_page(self, address: tuple[str, int]) -> PageProcess:
+    def _make_page(self, address: tuple[str, int]) -> PageProcess:
         command, steer = self._commanded.command, self._steer
         page_requests = PageRequestHandler(
-            command if steer is None else only_stops(command),
+            command if steer is None else stop_only_taker(command),
             params=self._tuning,
             point=self._picking.point,
             steer=steer.press if steer is not None else None,
@@ -154,7 +156,7 @@ class RunObservers:
         picture = ScenePicture(made.scene) if made.scene is not None else None
         shapes = made.room.shapes() if made.room is not None else None
         return LiveRig(
-            made.loop.rate_hz, made.shown(), self._emulated, picture, shapes, self._detector
+            made.loop.rate_hz, made.shown_rig(), self._emulated, picture, shapes, self._detector
         )
 
     def _run_state(self) -> RunState:
@@ -166,25 +168,25 @@ class RunObservers:
             start_s = self._made.room.start_s()
         in_force: tuple[str, str, str]
         if self._steer is not None:
-            in_force = self._steer.shown(), "", ""
+            in_force = self._steer.status_text(), "", ""
         else:
             menus = robot.menus()
             character = self._tuning.character_name if self._tuning is not None else ""
             in_force = menus["behaviour"][0], menus["conversation"][0], character
         return RunState(
             errors, *in_force, robot.perception.residual(), start_s,
-            [other.seen() for other in self._made.others],
+            [other.seen() for other in self._made.other_heads],
         )  # fmt: skip
 
     def _record_world(self, tick: Tick) -> None:
         """Record the surroundings, once their start is known."""
         if self._world_recorded or self._recorder is None or self._made.room is None:
             return
-        if (world := self._made.room.recorded()) is not None:
+        if (world := self._made.room.world_info()) is not None:
             self._recorder.record_world(world)
             self._world_recorded = True
 
-    def join(self, observers: Observers) -> None:
+    def attach(self, observers: Observers) -> None:
         """Let all of them observe the ticks; each that fails is left out."""
         if self._recorder is not None:
             if self._made.room is not None:
@@ -193,7 +195,7 @@ class RunObservers:
         elif self._publisher is not None:
             observers.add("the page", self._stream.update)
         if not self._fast:
-            observers.add("the loop's time", self._keep_time)
+            observers.add("the loop's time", self._record_time)
         if self._page is not None:
             observers.add("picking a point on the page", self._follow)
         if self._status is not None:
@@ -209,7 +211,7 @@ class RunObservers:
         """Return a message if the computer is too busy, "" if not or if time is simulated."""
         return busy_text(self._timing.figures())
 
-    def parking(self, tick: Tick) -> None:
+    def show_parking(self, tick: Tick) -> None:
         """Show a tick of the motion to the parking pose, which is not recorded."""
         with contextlib.suppress(Exception):  # nothing may keep the head from parking
             if self._status is not None:
@@ -218,7 +220,7 @@ class RunObservers:
                 self._live.update(tick)
             self._parking.update(tick)
 
-    def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
+    def wrap_stop(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Return the loop's ``stop`` as the recording needs it."""
         return self._recorder.wrap_stop(stop) if self._recorder is not None else stop
 
@@ -233,32 +235,32 @@ class RunObservers:
 
     def open(self) -> None:
         """Open the remote controls, once the robot has started; those that fail are left out."""
-        with self._spared("the recording"):
+        with self._report_errors("the recording"):
             if self._recorder is not None:
                 self._recorder.begin()
-        with self._spared("the page"):
+        with self._report_errors("the page"):
             if self._page is not None:
                 self._page.open()
                 steps = None if self._steer is None else {STEER: self._steer.keys}
                 self._page.offer(steps or self._made.robot.menus())
-        with self._spared("the remote control"):
+        with self._report_errors("the remote control"):
             if self._live is not None:
                 self._live.open()
 
     @contextlib.contextmanager
-    def _spared(self, name: str) -> Iterator[None]:
+    def _report_errors(self, name: str) -> Iterator[None]:
         """Report what the block raises, and continue."""
         try:
             yield
         except Exception as error:
             self._say(failure_text(name, error))
 
-    def tell(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Show a message to all users of the page."""
         if self._page is not None:
             self._page.say(text)
 
-    def give_up(self) -> None:
+    def remove_files(self) -> None:
         """Remove the files of a robot that could not start."""
         if self._recorder is not None:
             self._recorder.close("it could not start")
@@ -267,29 +269,29 @@ class RunObservers:
         """Report events to all observers."""
         return self._recorder.events() if self._recorder is not None else ()
 
-    def unwritten(self) -> Path | None:
+    def incomplete_file(self) -> Path | None:
         """Return the requested file that is incomplete, None without one."""
         return self._recorder.unwritten if self._recorder is not None else None
 
     def close(self, count: LoopCount) -> None:
         """Close everything, when the torque is off."""
-        with self._spared("the remote control"):
+        with self._report_errors("the remote control"):
             if self._live is not None:
                 self._live.close()
-        with self._spared("the page"):
+        with self._report_errors("the page"):
             if self._publisher is not None:
                 self._publisher.close()
             if self._page is not None:
                 self._page.close()
-        with self._spared("the recording"):
+        with self._report_errors("the recording"):
             if self._recorder is not None:
-                self._say(self._recorder.close(count.stopped_by, self._made.sent_digest()))
+                self._say(self._recorder.close(count.stopped_by, self._made.sent_bytes_digest()))
 
     def _show_depth(self, on: bool) -> None:
         if self._publisher is not None:
             self._publisher.depth = on
 
-    def _keep_time(self, tick: Tick) -> None:
+    def _record_time(self, tick: Tick) -> None:
         """Record the time of a tick; a tuned loop has slots of its own."""
         if tick.commands and any(isinstance(command, Tune) for command in tick.commands):
             self._timing.retune(self._made.loop.rate_hz)
@@ -307,7 +309,7 @@ class RunObservers:
             self._publisher.resend_geometry()
 
 
-def only_stops(command: CommandTaker) -> CommandTaker:
+def stop_only_taker(command: CommandTaker) -> CommandTaker:
     """Return a taker of stop and resume only; other commands raise ValueError."""
 
     def take(asked: Command) -> Ticket | None:

@@ -44,15 +44,15 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
     if options.rules is not None:
         gaze = replace(gaze, top_down=load_rules(options.rules))
     if options.scanpath is not None:
-        scanpath = _chosen(gaze.scanpath, "model", options.scanpath, "--scanpath")
+        scanpath = _with_choice(gaze.scanpath, "model", options.scanpath, "--scanpath")
         gaze = replace(gaze, scanpath=scanpath)
     if options.saccade is not None:
-        saccade = _chosen(gaze.saccade, "profile", options.saccade, "--saccade")
+        saccade = _with_choice(gaze.saccade, "profile", options.saccade, "--saccade")
         gaze = replace(gaze, saccade=saccade)
-    return for_surroundings(replace(rig, gaze=gaze), options)
+    return with_surroundings(replace(rig, gaze=gaze), options)
 
 
-def _chosen(params: P, key: str, value: str, option: str) -> P:
+def _with_choice(params: P, key: str, value: str, option: str) -> P:
     """Replace one key that has choices by an option of the command line."""
     choices = choices_of(type(params), key)
     if value not in choices:
@@ -71,11 +71,11 @@ def scene_of(rig: Rig, options: RunOptions) -> Scene | None:
     if options.scene is None:
         return None
     scene = load_scene(options.scene, options.seed)
-    refuse_unruled(rig.gaze.top_down, scene, f"--scene {options.scene}")
+    refuse_missing_rules(rig.gaze.top_down, scene, f"--scene {options.scene}")
     return scene
 
 
-def refuse_unruled(rules: TopDownParams, scene: Scene, option: str) -> None:
+def refuse_missing_rules(rules: TopDownParams, scene: Scene, option: str) -> None:
     """Refuse a scene whose planner needs behaviours without rules.
 
     Raises:
@@ -89,7 +89,7 @@ def refuse_unruled(rules: TopDownParams, scene: Scene, option: str) -> None:
         )
 
 
-def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
+def with_surroundings(rig: Rig, options: RunOptions) -> Rig:
     """Return the rig with the settings of a boxing match, if its surroundings are one.
 
     Its action planner is switched on, and in a world the finder of red gloves. Rules that lack a
@@ -108,10 +108,10 @@ def for_surroundings(rig: Rig, options: RunOptions) -> Rig:
     return rig if options.world is None else replace(rig, motion=replace(rig.motion, gloves=True))
 
 
-def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:
+def run_info(rig: Rig, options: RunOptions, placement: tuple[float, ...] = ()) -> RunInfo:
     """Return the header of a run's recording."""
-    eyes = options.looks_through or f"scene {options.scene}"
-    if options.looks_through is None and options.world is not None:
+    eyes = options.camera_source or f"scene {options.scene}"
+    if options.camera_source is None and options.world is not None:
         eyes = f"world {options.world_name}{', no pictures' if options.no_pictures else ''}"
     return RunInfo(
         rig=options.rig,
@@ -130,5 +130,5 @@ def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> R
         bus=options.bus or "emulated",
         pictures_hz=options.record_pictures,
         versions=versions(),
-        stands=stands,
+        placement=placement,
     )

@@ -39,14 +39,14 @@ class SceneScore(NamedTuple):
     planner: PlannerScore
 
     @classmethod
-    def of(cls, scene: Scene) -> "SceneScore":
+    def from_scene(cls, scene: Scene) -> "SceneScore":
         """Return the score of a scene before its first tick."""
         events = scene.events()
         return cls(BehaviourScore(events, scene.round_s), PlannerScore(events, scene.round_s))
 
 
 def run_figures(
-    made: Assembly,
+    assembly: Assembly,
     summary: Summary | None,
     score: SceneScore | None,
     count: LoopCount,
@@ -54,14 +54,14 @@ def run_figures(
     faults: JointFaults,
 ) -> dict[str, object]:
     """Join the figures of the ticks (if summarised), the loop, the frames and the bus."""
-    robot = made.robot
+    robot = assembly.robot
     health = robot.body.bus.health()
     bus: dict[str, object] = {
         "tx_bytes": health.tx_bytes,
         "rx_bytes": health.rx_bytes,
         "errors": {kind: n for kind, n in sorted(health.errors.items()) if n},
     }
-    digest = made.sent_digest()
+    digest = assembly.sent_bytes_digest()
     if digest is not None:
         bus["tx_sha256"] = digest
     ticks = summary.figures() if summary is not None else {}
@@ -96,7 +96,7 @@ class ComposedRun(NamedTuple):
     """
 
     options: RunOptions
-    made: Assembly
+    assembly: Assembly
     tuning: ParamStore | None
     recorder: "Recorder | None"
 
@@ -121,12 +121,17 @@ def compose(
     else:
         from gazerig.robot.recording.recorder import Recorder  # imports file formats
 
-        info = run_info(rig, options, () if room is None else room.stands)
+        info = run_info(rig, options, () if room is None else room.placement)
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
         substitutes = substitutes._replace(body=recorder.wrap_body)
-    made = assemble(rig, options, substitutes, room)
+    assembly = assemble(rig, options, substitutes, room)
     names = (options.rig, options.character, options.profile)
-    return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)
+    return ComposedRun(
+        options,
+        assembly,
+        ParamStore(assembly.live_params, assembly.robot.command, *names),
+        recorder,
+    )
 
 
 def run(
@@ -156,9 +161,9 @@ def run(
     """
     try:
         session = Session(composed, stopped, say, status, watch, browse, summarised)
-        return session.whole(ends)
+        return session.run(ends)
     finally:
-        composed.made.close()
+        composed.assembly.close()
 
 
 class Session:
@@ -177,8 +182,8 @@ class Session:
         browse: Callable[[str], object] | None = None,
         summarised: bool = True,
     ) -> None:
-        options, made = composed.options, composed.made
-        self._options, self._made, self._stopped = options, made, stopped
+        options, assembly = composed.options, composed.assembly
+        self._options, self._made, self._stopped = options, assembly, stopped
 
         def tried(line: str) -> None:  # a failed message ends nothing
             with contextlib.suppress(Exception):
@@ -186,12 +191,12 @@ class Session:
 
         self._say = tried
         self._run_observers = RunObservers(
-            made, options, tried, status, composed.tuning, composed.recorder, browse=browse
+            assembly, options, tried, status, composed.tuning, composed.recorder, browse=browse
         )
         self._summary = Summary() if summarised else None
         self._faults = JointFaults(tried, self._run_observers.busy)
-        scene = made.scene
-        self._score = SceneScore.of(scene) if summarised and scene is not None else None
+        scene = assembly.scene
+        self._score = SceneScore.from_scene(scene) if summarised and scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._lasting = OverdueReport()
         self._start_s = 0.0
@@ -202,7 +207,7 @@ class Session:
         if self._summary is not None:
             observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", self._faults.update)
-        self._run_observers.join(observers)
+        self._run_observers.attach(observers)
         if self._score is not None:
             observers.add("the scene's score", self._score.behaviours.update)
             observers.add("the planner's score", self._score.planner.update)
@@ -212,12 +217,12 @@ class Session:
         if watch is not None:
             observers.add("the program", watch)
         try:
-            for menu, choice in options.choices:
-                made.robot.ask(menu, choice)
+            for menu, choice in options.initial_choices:
+                assembly.robot.ask(menu, choice)
         except ValueError as error:
             raise SetupError(str(error)) from error
         self._observers = observers
-        self._longest_s = _longest_s(made, options)
+        self._longest_s = _longest_s(assembly, options)
         self._interrupts = Interrupts.of(stopped)
 
     def _log(self, tick: Tick) -> None:
@@ -231,12 +236,12 @@ class Session:
             for line in self._lasting.lines():
                 self._made.robot.report(line)
 
-    def _stop(self, seconds: float) -> str | None:
+    def _stop_reason(self, seconds: float) -> str | None:
         """Return the reason why the run ends now, None while it continues."""
         over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
         return self._stopped() or self._interrupts() or (SECONDS if over else None)
 
-    def whole(self, ends: Callable[[str], object] | None = None) -> dict[str, object]:
+    def run(self, ends: Callable[[str], object] | None = None) -> dict[str, object]:
         """Run from torque on to torque off; return the figures.
 
         ends: gets the reason of its end, before the head parks
@@ -254,7 +259,7 @@ class Session:
         figures = run_figures(
             self._made, self._summary, self._score, self._count, wall_s, self._faults
         )
-        unwritten = self._run_observers.unwritten() or self._unwritten_heatmap()
+        unwritten = self._run_observers.incomplete_file() or self._unwritten_heatmap()
         if unwritten is not None:
             figures["not_written"] = str(unwritten)
         if self._unreleased:
@@ -268,26 +273,30 @@ class Session:
         Raises:
             SetupError: before anything moved.
         """
-        made, run_observers, say = self._made, self._run_observers, self._say
+        assembly, run_observers, say = self._made, self._run_observers, self._say
         run_observers.open_files()
         begun = False
         try:
             with (
                 contextlib.nullcontext() if self._options.fast else SWITCH_INTERVAL,
                 self._interrupts,
-                prepare_shutdown(made, say, self._interrupts, run_observers.parking) as leaving,
+                prepare_shutdown(
+                    assembly, say, self._interrupts, run_observers.show_parking
+                ) as leaving,
             ):
-                leaving.switch_on(lambda: made.robot.start(made.clock, self._interrupts.refuse))
+                leaving.switch_on(
+                    lambda: assembly.robot.start(assembly.clock, self._interrupts.refuse)
+                )
                 begun = True
-                self._start_s = made.clock.now_s()
+                self._start_s = assembly.clock.now_s()
                 events, options = self._made.robot.body.bus.events(), self._options
                 if options.mock and not options.verbose:  # without registers of emulated servos
                     events = tuple([event for event in events if not is_register_change(event)])
-                for note in (*made.notes, *group_events(events)):
+                for note in (*assembly.notes, *group_events(events)):
                     say(note)
                 run_observers.open()
                 loop = TickLoop(
-                    made.robot, made.clock, lambda: made.live.rig.loop, run_observers.timed(self._stop),
+                    assembly.robot, assembly.clock, lambda: assembly.live_params.rig.loop, run_observers.wrap_stop(self._stop_reason),
                     self._observers.update,
                 )  # fmt: skip
                 yield loop
@@ -298,7 +307,7 @@ class Session:
             if begun:
                 run_observers.close(self._count)
             else:
-                run_observers.give_up()
+                run_observers.remove_files()
 
     def _unwritten_heatmap(self) -> Path | None:
         """Write the heat map if requested; return its file if that failed."""
@@ -320,44 +329,49 @@ class Session:
         return None
 
 
-def _longest_s(made: Assembly, options: RunOptions) -> float | None:
+def _longest_s(assembly: Assembly, options: RunOptions) -> float | None:
     """Return the duration of the run, s: as given, or a scene's round in simulated time."""
-    if options.seconds is None and options.fast and made.scene is not None:
-        return made.scene.round_s + 1.0  # and the end of the round
+    if options.seconds is None and options.fast and assembly.scene is not None:
+        return assembly.scene.round_s + 1.0  # and the end of the round
     return options.seconds
 
 
 def shut_down(
-    made: Assembly,
+    assembly: Assembly,
     count: LoopCount,
     say: Callable[[str], None],
     interrupts: Interrupts | None = None,
 ) -> None:
     """Park, switch torque off, close, and report the results: the only end, by power_down.py."""
-    leaving = prepare_shutdown(made, say, interrupts if interrupts is not None else Interrupts())
+    leaving = prepare_shutdown(
+        assembly, say, interrupts if interrupts is not None else Interrupts()
+    )
     leaving.cause = count.stopped_by
     leaving.leave()
 
 
 def prepare_shutdown(
-    made: Assembly,
+    assembly: Assembly,
     say: Callable[[str], None],
     interrupts: Interrupts,
     watch: Callable[[Tick], object] | None = None,
 ) -> PowerDown:
     """Return the shutdown of a run of this robot; watch: gets a tick at every step of parking."""
     return PowerDown(
-        lambda again: park_unless_stopped(made, again, watch), made.robot.stop, say, interrupts
+        lambda again: park_unless_stopped(assembly, again, watch),
+        assembly.robot.stop,
+        say,
+        interrupts,
     )
 
 
 def park_unless_stopped(
-    made: Assembly, again: Again, watch: Callable[[Tick], object] | None = None
+    assembly: Assembly, again: Again, watch: Callable[[Tick], object] | None = None
 ) -> str:
     """Park a robot unless it was stopped; return the messages."""
-    robot = made.robot
+    robot = assembly.robot
     if robot.stopped:
         return "not parked, as it was stopped"
-    if robot.park(made.park_rad, made.clock, made.loop, again, watch):
+    if robot.park(assembly.park_rad, assembly.clock, assembly.loop, again, watch):
         return "parked"
     return "not parked (interrupted)" if again() else "not parked"

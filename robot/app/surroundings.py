@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from gazerig.drivers.types import Camera
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.app.program_parts import ProgramParts
-    from gazerig.robot.app.run_bus import RunBus, Sight
+    from gazerig.robot.app.run_bus import CameraPoses, RunBus
     from gazerig.robot.control.tick import Tick
     from gazerig.robot.description.world_shapes import WorldShapes
     from gazerig.robot.model.clock import Clock
@@ -44,20 +44,20 @@ class RunRoom(Protocol):
         ...
 
     @property
-    def wires(self) -> "RunBus":
+    def run_bus(self) -> "RunBus":
         """Return the bus of the rig's servos; its ``close`` ends the surroundings."""
         ...
 
     @property
-    def stands(self) -> tuple[float, ...]:
-        """Return the rig's placement, as of ``RunInfo.stands``; () at the origin."""
+    def placement(self) -> tuple[float, ...]:
+        """Return the rig's placement, as of ``RunInfo.placement``; () at the origin."""
         ...
 
     def camera(
         self,
         rig: "Rig",
         options: "RunOptions",
-        sight: "Sight",
+        sight: "CameraPoses",
         placed: "CameraParams",
         rng: "np.random.Generator",
         own: "ProgramParts",
@@ -84,7 +84,7 @@ class RunRoom(Protocol):
         """Return its appearance, for the page; None: it is not shown."""
         ...
 
-    def recorded(self) -> "WorldInfo | None":
+    def world_info(self) -> "WorldInfo | None":
         """Return its part of a recording, None before its script began or without one."""
         ...
 
@@ -109,7 +109,7 @@ class RoomCamera(Protocol):
     """A camera of a room that wraps another one."""
 
     @property
-    def seeing(self) -> "Camera | None":
+    def wrapped_camera(self) -> "Camera | None":
         """Return the wrapped camera, None before it is known."""
         ...
 
@@ -155,12 +155,12 @@ class Surroundings(ABC):
         """
         return None
 
-    def replayed(self, info: "WorldInfo", stands: tuple[float, ...]) -> "WorldShapes":
+    def replay_shapes(self, info: "WorldInfo", placement: tuple[float, ...]) -> "WorldShapes":
         """Return the appearance of a recorded run's surroundings, relative to its head's neck base.
 
         Args:
             info: the result of ``RunRoom.recorded``.
-            stands: placement of the head, as of ``RunInfo.stands``.
+            placement: placement of the head, as of ``RunInfo.placement``.
 
         Raises:
             SetupError: they cannot be shown; the message has the reason.

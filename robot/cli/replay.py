@@ -15,7 +15,7 @@ from rich.table import Table
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.robot.app.options import host_port
+from gazerig.robot.app.options import parse_host_port
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, ForceOption, clear_errors, complete_rig, say, signals
 
@@ -67,7 +67,7 @@ def replay(
             )
         else:
             with signals() as stopped:
-                well = _show(file, host_port(page), play, seconds, stopped)
+                well = _show(file, parse_host_port(page), play, seconds, stopped)
     if not well:
         raise typer.Exit(FAULT)
 
@@ -208,7 +208,7 @@ def _world(recording: "RunRecording") -> "WorldShapes | None":
 
     try:
         world = surroundings(recording.world.name)
-        return world.replayed(recording.world, recording.info.stands)
+        return world.replay_shapes(recording.world, recording.info.placement)
     except SetupError as error:
         say(str(error))
         return None
@@ -218,7 +218,7 @@ def _built(config_yaml: str) -> "ShownRig | None":
     """Return the recorded rig's build; None, with the reason, if it is unknown."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.rig import Rig
-    from gazerig.robot.app.gaze_models import gaze_parts
+    from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
     from gazerig.robot.app.rig_description import shape_of
     from gazerig.robot.dashboard.feed.snapshot import ShownRig
     from gazerig.robot.model.frames import CameraMount
@@ -235,7 +235,7 @@ def _built(config_yaml: str) -> "ShownRig | None":
             )
             return None
     return ShownRig(
-        gaze_parts(rig, 0)[0],
+        kinematics_and_oculomotor(rig, 0)[0],
         tuple(rig.joints[name].limit() for name in rig.names),
         rig.guard.health,
         CameraMount(rig.camera),
@@ -269,20 +269,20 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
         say(line)
     say(agreement(result))
     table = Table("", "recorded", "run again", title=f"{file.name} run again")
-    for name, was, now in beside(result.recorded, result.again):
+    for name, was, now in beside(result.recorded_figures, result.rerun_figures):
         table.add_row(name, was, now, style=None if was == now else "bold")
     Console().print(table)
     changed = rig is not None or character is not None
-    return result.same or result.joints != "recorded" or changed
+    return result.is_same or result.joints != "recorded" or changed
 
 
 def agreement(result: "Resimulation") -> str:
     """Return a text: how far a rerun agrees with the recorded run."""
-    text = f"{result.agreeing} of {result.ticks} ticks are the same to the bit"
+    text = f"{result.agreeing_ticks} of {result.ticks} ticks are the same to the bit"
     if result.first_difference_s is not None:
-        text += f"; the first other one at {result.first_difference_s:.3f} s: {result.differs}"
-    if result.tx_same is not None:
-        text += f"; the bytes on the bus are {'the same' if result.tx_same else 'others'}"
+        text += f"; the first other one at {result.first_difference_s:.3f} s: {result.difference}"
+    if result.sent_bytes_same is not None:
+        text += f"; the bytes on the bus are {'the same' if result.sent_bytes_same else 'others'}"
     return f"joints {result.joints}: {text}"
 
 

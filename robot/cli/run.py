@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from gazerig.drivers.files.file_output import refuse_existing, write_file
-from gazerig.robot.app.options import RunOptions, camera_of
+from gazerig.robot.app.options import RunOptions, parse_camera
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import desktop_here, open_page
 from gazerig.robot.cli.rig_command import RigCommand
@@ -70,10 +70,10 @@ def run(
 ) -> None:
     """Run the head: gazerig run --mock, then open the page it names."""
     asked = RunOptions(**locals())  # what a person can ask for is a field of the same name
-    asked = replace(asked, camera=camera_of(camera))
+    asked = replace(asked, camera=parse_camera(camera))
     with clear_errors(rig, port, mock):
-        asked = asked.checked()
-        refuse_existing(*asked.written, force=force)
+        asked = asked.check_and_complete()
+        refuse_existing(*asked.output_files, force=force)
         shows = status if not fast and sys.stderr.isatty() else None
         if shows is not None:
             shows("loading: a few seconds ...")
@@ -130,7 +130,7 @@ class Opening:
 def what_runs(asked: RunOptions) -> str:
     """Return what is started, and how it is ended, in one line."""
     servos = "emulated servos" if asked.mock else "its servos"
-    sight = f"it looks at {asked.looks_through or f'a simulated scene, {asked.scene}'}"
+    sight = f"it looks at {asked.camera_source or f'a simulated scene, {asked.scene}'}"
     if asked.world is not None:
         sight = f"it is in a world, {asked.world}"
     return f"{asked.rig}: {servos}; {sight}. Ctrl-C parks the head and ends."

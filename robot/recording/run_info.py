@@ -33,7 +33,7 @@ class RunInfo:
         bus: "ideal" for emulated servos without bytes, "emulated" for those with bytes.
         pictures_hz: Rate of the recorded frames.
         versions: Name -> version of the packages that affect the arithmetic.
-        stands: Pose of the neck base of a head in a world with others: position (3, m), then
+        placement: Pose of the neck base of a head in a world with others: position (3, m), then
             the rows of its rotation (9); () for a single head.
     """
 
@@ -53,7 +53,7 @@ class RunInfo:
     bus: str = "emulated"
     pictures_hz: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
-    stands: tuple[float, ...] = ()
+    placement: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +123,8 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
         ValueError: A field is missing, is not JSON or has an impossible value.
     """
     found = _read(text, {f.name for f in fields(RunInfo)})
-    if isinstance(found.get("stands"), list):
-        found["stands"] = tuple(found["stands"])
+    if isinstance(found.get("placement"), list):
+        found["placement"] = tuple(found["placement"])
     try:
         info = RunInfo(**found)
     except TypeError as error:
@@ -141,7 +141,7 @@ def read_run_info(text: Mapping[str, str]) -> RunInfo:
         raise ValueError("mock or fast is not a boolean")
     if not isinstance(info.versions, dict):
         raise ValueError("no versions")
-    pose = info.stands
+    pose = info.placement
     if not isinstance(pose, tuple) or len(pose) not in (0, 12):
         raise ValueError("an invalid pose of the neck base")
     if not all(_within(number, -1000.0, 1000.0) for number in pose):

@@ -17,7 +17,7 @@ from gazerig.features.bringup.look_at import GazeResult, ends_reached, gaze_text
 from gazerig.features.bringup.manual_control import JogParams, ManualControl, Step, duration_s
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.bus_wiring import rig_bus
-from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.control.body import Body
 from gazerig.robot.safety.guard import Guard
@@ -65,7 +65,7 @@ class Bench(EmulatedRig):
         return [servo.torque for servo in cast(Any, self.devices[""]).servos]
 
     def look(self, point: Vec3, seconds: float) -> GazeResult:
-        kinematics, oculomotor = gaze_parts(self.rig, 0)
+        kinematics, oculomotor = kinematics_and_oculomotor(self.rig, 0)
         return look_at(self.control, kinematics, oculomotor, point, seconds)
 
 

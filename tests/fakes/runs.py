@@ -68,6 +68,6 @@ def record(
     stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
     shut_down(made, count, lambda line: None)
-    recorder.close(count.stopped_by, made.sent_digest())
+    recorder.close(count.stopped_by, made.sent_bytes_digest())
     made.close()
     return seen

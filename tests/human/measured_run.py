@@ -176,7 +176,7 @@ def world_targets(world: str, seed: int, seconds: float) -> Counter[str]:
         kinds: Counter[str] = Counter()
         options = RunOptions(
             True, True, seed, world=world, no_pictures=True, seconds=seconds, bus="ideal"
-        ).checked()
+        ).check_and_complete()
         rig = with_options(load_rig(options.rig, options.character, options.profile), options)
 
         def update(tick: Tick) -> None:
@@ -213,7 +213,7 @@ def _run(
     options = replace(
         RunOptions(True, True, seed, scene, profile=profile, seconds=seconds, bus="emulated"),
         **more,
-    ).checked()
+    ).check_and_complete()
     rig = changed(
         with_options(load_rig(options.rig, options.character, options.profile), options), overrides
     )

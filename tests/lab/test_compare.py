@@ -80,7 +80,7 @@ def test_chances_are_corrected_for_their_number() -> None:
 def record(path: Path, seconds: float, saccade: str) -> None:
     """Record a simulated run."""
     made = assemble(load_rig("desk"), RunOptions(True, True, 0, "face-to-face", saccade=saccade))
-    rig = made.live.rig
+    rig = made.live_params.rig
     info = RunInfo(
         "desk", rig.profile, params_text(rig), 0, 200.0, "2026-01-31T12:00:00+00:00",
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="face-to-face", mock=True, fast=True,

@@ -136,7 +136,7 @@ def test_hobby_eyes_on_a_neck_that_tells_its_place(tmp_path: Path) -> None:
     assert trace.basis("head") == "measured" and trace.basis("left") == "partly estimated"
     assert {"head_yaw_deg", "head_pitch_deg"} < set(columns(trace.joints))
     assert "head_roll_deg" not in columns(trace.joints)
-    assert rerun(mixed.recording).same
+    assert rerun(mixed.recording).is_same
 
 
 def test_a_run_without_lids_has_no_blinks(maker: Run) -> None:

@@ -194,7 +194,7 @@ def test_the_conditions_of_shipped_studies_move_the_head_differently(name: str) 
     shown = study.design.presentation
     asked = RunOptions(
         mock=True, fast=True, bus="ideal", scene=shown.scene, seconds=6.0, rig=shown.rig
-    ).checked()  # fmt: skip
+    ).check_and_complete()  # fmt: skip
     moved = {
         key: np.degrees(_desired(with_options(rig, asked), asked))
         for key, rig in study.rigs.items()

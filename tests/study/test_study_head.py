@@ -33,7 +33,7 @@ def study() -> LoadedStudy:
 def presenter(study: LoadedStudy, folder: Path, agreed: tuple[bool, bool]) -> HeadPresenter:
     rig, scene = study.design.presentation.rig, study.design.presentation.scene
     slow = at_rate(folder, rig, 100.0)
-    options = RunOptions(mock=True, rig=slow, scene=scene, no_page=True).checked()
+    options = RunOptions(mock=True, rig=slow, scene=scene, no_page=True).check_and_complete()
     return HeadPresenter(study, options, folder, lambda: agreed, RealClock())
 
 

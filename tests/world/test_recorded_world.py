@@ -45,8 +45,8 @@ def recorded(
     file = tmp_path_factory.mktemp("recorded") / "run.mcap"
     composed = compose(replace(ASKED, record=file))
     run(composed, lambda: None, lambda line: None)
-    assert composed.made.room is not None
-    world = composed.made.room.shapes()
+    assert composed.assembly.room is not None
+    world = composed.assembly.room.shapes()
     assert isinstance(world, SpecShapes)
     return RunRecording(file), world
 
@@ -58,7 +58,7 @@ def test_a_recording_has_its_world_and_the_same_room_and_people_come_of_it(
     info = recording.world
     assert info is not None
     assert (info.name, info.seed, info.start_s) == ("living-room", 4, 0.0)
-    again = recorded_shapes(info, recording.info.stands)
+    again = recorded_shapes(info, recording.info.placement)
     for t_s in (0.0, 5.0, 21.3):
         assert again.poses(t_s) == was.poses(t_s)
     before, after = was.parts(), again.parts()
@@ -75,11 +75,11 @@ def test_a_script_is_the_same_after_a_recording(name: str, tmp_path: Path) -> No
 
 def test_another_head_has_the_people_of_the_first_as_from_where_it_stands(tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
-    options = replace(ASKED, world="two-heads", record=file).checked()
+    options = replace(ASKED, world="two-heads", record=file).check_and_complete()
     compose_group(options).run(lambda: None, lambda line: None)
     first, other = RunRecording(file), RunRecording(tmp_path / "run-other.mcap")
     assert first.world == other.world and other.world is not None and other.world.seed == 4
-    shapes = recorded_shapes(other.world, other.info.stands)
+    shapes = recorded_shapes(other.world, other.info.placement)
     assert isinstance(shapes, ShapesFrom)
     assert shapes.frame.p_m == pytest.approx((0.9, 0.0, 0.0))
 
@@ -141,8 +141,8 @@ def test_the_page_shows_the_world_at_the_time_of_what_is_replayed(
 ) -> None:
     _, world = recorded
     feed = LiveFeed()
-    made = compose(ASKED).made
-    feed.take(rig_message(LiveRig(200.0, made.shown(), world=world)))
+    made = compose(ASKED).assembly
+    feed.take(rig_message(LiveRig(200.0, made.shown_rig(), world=world)))
     feed.take(state_message(RunState({}, "", "", "", (None, None, 0), 2.0)))
     assert feed.world() is None
     feed.shown_s = 9.5  # of a snapshot

@@ -16,7 +16,7 @@ from gazerig.features.world.run.poses import RigInState, WorldPoses
 from gazerig.features.world.run.run_world import RunWorld, world_of
 from gazerig.features.world.run.sight import RenderedWorld, WorldCamera, served_pixels
 from gazerig.features.world.served_world import PUBLISH_MS, ServedWorld
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.model.frames import CameraMount
@@ -38,7 +38,7 @@ class Host:
         self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
         for name, line in emulated_lines(RIG).items():
             self.served.device(BusSettings(line, name))
-        joints = RigInState(kinematics_of(RIG), self.served.joints()[0])
+        joints = RigInState(rig_kinematics(RIG), self.served.joints()[0])
         self.poses = WorldPoses(folder / "state", joints)
 
     def serve(self, seconds: float, heard: bool) -> None:

@@ -32,7 +32,7 @@ ASKED = RunOptions(mock=True, fast=True, world="two-heads", seconds=3.0, no_pict
 
 def ran(**more: Any) -> dict[str, Any]:
     """Return the figures of a short run of two heads."""
-    options = RunOptions(**{**vars(ASKED), **more}).checked()
+    options = RunOptions(**{**vars(ASKED), **more}).check_and_complete()
     return compose_group(options).run(lambda: None, lambda line: None)
 
 
@@ -157,7 +157,7 @@ def test_short_gaps_in_a_look_are_bridged_and_short_looks_are_none() -> None:
 def test_two_recordings_report_the_figures_of_the_run(tmp_path: Path) -> None:
     record, page = tmp_path / "run.mcap", tmp_path / "page.html"
     figures = ran(record=record, bus="ideal", seconds=2.0)["mutual_gaze"]["other"]
-    assert RunRecording(record).info.stands[:2] == (0.0, 0.0)
+    assert RunRecording(record).info.placement[:2] == (0.0, 0.0)
     both = str(record), "--with", str(tmp_path / "run-other.mcap"), "--out", str(page)
     assert invoked("report", *both).code == 0
     found = json.loads((tmp_path / "page_measures.json").read_text())[-1]

@@ -47,12 +47,12 @@ def group(tmp_path: Path) -> HeadGroup:
         text.replace("kind: dynamixel,", "kind: dynamixel, dynamixel: {give_up_s: 1.0},")
         + "loop: {rate_hz: 100}\n"
     )
-    return compose_group(replace(ASKED, rig=str(file)).checked())
+    return compose_group(replace(ASKED, rig=str(file)).check_and_complete())
 
 
 @branched
 def test_a_fault_of_one_head_parks_the_other_and_both_let_go(group: HeadGroup) -> None:
-    fault = group.members[0].composed.made.fault
+    fault = group.members[0].composed.assembly.inject_fault
     assert fault is not None
     lines, ticks = list[str](), list[float]()
 
@@ -76,8 +76,8 @@ def test_a_fault_of_one_head_parks_the_other_and_both_let_go(group: HeadGroup) -
 
 @branched
 def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
-    first, other = (member.composed.made.robot for member in group.members)
-    together = RobotGroup(first, group.members[0].composed.made.others)
+    first, other = (member.composed.assembly.robot for member in group.members)
+    together = RobotGroup(first, group.members[0].composed.assembly.other_heads)
     asked, lines = Interrupts(signals=False), list[str]()
     asked_s, seen = list[float](), list[tuple[bool, bool]]()
 
@@ -105,7 +105,7 @@ def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
 
 @branched
 def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
-    made = group.members[0].composed.made
+    made = group.members[0].composed.assembly
     assert made.room is not None
     shapes = pickle.loads(pickle.dumps(made.room.shapes()))  # as to the page's process
     parts = {part.name: part for part in shapes.parts()}
@@ -118,7 +118,7 @@ def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
         seen.append(tick)
         if len(seen) % 10 == 0:
             turned.add(shapes.poses(0.0)[head])
-            [other] = made.others
+            [other] = made.other_heads
             assert other.seen().headline
         if len(seen) == 100:
             asked.request("the test")
@@ -137,7 +137,7 @@ def test_a_head_that_cannot_start_ends_the_other(
     def absent() -> None:
         raise SetupError("no servo 3")
 
-    monkeypatch.setattr(group.members[1].composed.made.robot.body, "start", absent)
+    monkeypatch.setattr(group.members[1].composed.assembly.robot.body, "start", absent)
     lines: list[str] = []
     with pytest.raises(SetupError, match="no servo 3"):
         group.run(lambda: None, lines.append)

@@ -23,10 +23,12 @@ ASKED = RunOptions(mock=True, world="living-room")
 
 
 def test_a_world_is_what_is_looked_at() -> None:
-    found = ASKED.checked()
-    assert (found.world, found.scene, found.looks_through) == ("living-room", None, None)
+    found = ASKED.check_and_complete()
+    assert (found.world, found.scene, found.camera_source) == ("living-room", None, None)
     assert "a world, living-room" in what_runs(found)
-    assert replace(ASKED, fast=True).checked().seconds is None  # a whole round, as of a scene
+    assert (
+        replace(ASKED, fast=True).check_and_complete().seconds is None
+    )  # a whole round, as of a scene
 
 
 @pytest.mark.parametrize(
@@ -43,7 +45,7 @@ def test_a_world_is_what_is_looked_at() -> None:
 )
 def test_what_does_not_fit_is_refused(changes: dict[str, object], why: str) -> None:
     with pytest.raises(SetupError, match=why):
-        replace(ASKED, **changes).checked()  # type: ignore[arg-type]
+        replace(ASKED, **changes).check_and_complete()  # type: ignore[arg-type]
 
 
 def test_a_missing_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,7 +111,7 @@ def test_a_script_is_read_once_until_it_is_changed(
     monkeypatch.setattr("gazerig.features.world.run.run_world.load", counted)
     file.write_text("room: living-room\npeople: {}\n")
     asked = replace(ASKED, world=str(file), no_pictures=True, fast=True, bus="ideal")
-    compose(asked).made.close()
+    compose(asked).assembly.close()
     assert reads == [file]
     file.write_text("room: hall\npeople: {}\n")
     assert world_script(str(file)).room == "hall"

@@ -25,7 +25,7 @@ simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
 
 FAST = RunOptions(
     mock=True, fast=True, seed=3, world="living-room", no_pictures=True, seconds=1.0
-).checked()
+).check_and_complete()
 
 
 def digest(options: RunOptions) -> object:
@@ -60,7 +60,7 @@ def test_the_servos_move_joints_that_weigh_something() -> None:
         assert isinstance(camera, SceneCamera)
         R, _ = camera._head_pose(0.0)
         measured = dict(zip(tick.guard_result.joints, tick.joints.position_rad, strict=True))
-        truly = made.live.parts.kinematics.head_pose(
+        truly = made.live_params.parts.kinematics.head_pose(
             (measured["neck_yaw"], measured["neck_pitch"], measured["neck_roll"]), (0.0, 0.0)
         )[0]
         assert R[0] == pytest.approx(truly[0], abs=0.01)
@@ -92,7 +92,7 @@ def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> N
     recording = RunRecording(file)
     assert recording.info.scene == "living-room" and "no pictures" in recording.info.eyes
     again = rerun(recording)
-    assert again.same and again.tx_same, again.differs
+    assert again.is_same and again.sent_bytes_same, again.difference
     assert again.ticks == figures["ticks"]
 
 

@@ -13,7 +13,7 @@ from gazerig.robot.app import run_bus
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_bus import emulated_lines, place_of
+from gazerig.robot.app.run_bus import emulated_lines, servo_index
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build
 
@@ -49,7 +49,7 @@ class WorldBench:
 
     def _by_joint(self, devices: dict[str, Any]) -> dict[str, Any]:
         servos = {bus: getattr(one, "body", one).servos for bus, one in devices.items()}
-        return {n: servos[self.rig.joints[n].bus][place_of(self.rig, n)] for n in self.rig.names}
+        return {n: servos[self.rig.joints[n].bus][servo_index(self.rig, n)] for n in self.rig.names}
 
     def pass_ms(self, ms: int) -> None:
         """Let time pass for both."""

@@ -113,9 +113,9 @@ def look_at_command(
         loaded = load_rig(rig)
         # Imports vision as well, so only this command does, and before the torque is on: in
         # that time the servos' watchdog would trip.
-        from gazerig.robot.app.gaze_models import gaze_parts
+        from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
 
-        kinematics, oculomotor = gaze_parts(loaded, seed)
+        kinematics, oculomotor = kinematics_and_oculomotor(loaded, seed)
     with _manual_control(loaded, rig, mock, port, yes, 20.0, hold, not no_park) as control:
         looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
         good = looked.error <= 2.0

@@ -14,7 +14,7 @@ from gazerig.drivers.plugins import BUS, find, is_ours
 from gazerig.drivers.serial.list_ports import Host, SerialPort, check_owner, serial_ports, usb_id_of
 from gazerig.drivers.serial.port import BusPort, port_of
 from gazerig.drivers.types import ServoConfig
-from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
+from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.cli.terminal import say, status
 from gazerig.robot.guardian.guardian import Guardian
@@ -114,7 +114,7 @@ def rig_ports(
     if mock and port is not None:
         raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
     if not mock:
-        paths, here = ports_of(rig, port), ports_here()
+        paths, here = bus_ports(rig, port), ports_here()
         for name, path in paths.items():
             check_owner(path, rig.bus_named(name).kind, here)
         yield RigPorts(paths, None)
@@ -133,7 +133,7 @@ def bus_label(rig: Rig, name: str) -> str:
 
 def setups_on(rig: Rig, name: str) -> tuple[ServoConfig, ...]:
     """Return what a bus must know of its servos, in the order of the joints."""
-    every = dict(zip(rig.names, rig_setups(rig), strict=True))
+    every = dict(zip(rig.names, servo_configs(rig), strict=True))
     return tuple(every[joint] for joint in joints_on(rig, name))
 
 

@@ -92,7 +92,7 @@ def report(
                     True, True, seed, scene, scanpath=scanpath, saccade=saccade, bus=bus, rig=rig,
                     character=character, profile=profile, conversation=conversation,
                     seconds=seconds,
-                ).checked()  # fmt: skip
+                ).check_and_complete()  # fmt: skip
                 about, run = _simulate_run(options, tell)
             gaze = None if file is None or other is None else _mutual_gaze(file, other)
             made = report_of(run, about, target, tell, force, gaze)
@@ -168,7 +168,7 @@ def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
         )
     with used(Path(f"{first} or {second}")):
         return mutual_gaze_report(
-            (a.ticks(), b.ticks()), (a.info.stands, b.info.stands), _names(first, second)
+            (a.ticks(), b.ticks()), (a.info.placement, b.info.placement), _names(first, second)
         )
 
 

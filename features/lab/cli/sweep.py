@@ -114,7 +114,7 @@ def sweep(
         asked = RunOptions(
             mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,
             character=character, rules=rules, behaviour=behaviour, conversation=conversation,
-        ).checked()  # fmt: skip
+        ).check_and_complete()  # fmt: skip
         number = samples if samples is not None or not fit else _DEFAULT_POINTS
         spec, points = _plan_runs(asked, setting or (), range(seed, seed + seeds), number, fit)
         folder = out or Path(f"{'fit' if fit else 'sweep'}-{Path(rig).stem}-{scene}")

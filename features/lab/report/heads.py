@@ -103,30 +103,32 @@ class MutualGazeReport(NamedTuple):
 
 def mutual_gaze_report(
     ticks: tuple[Iterable[Tick], Iterable[Tick]],
-    stands: tuple[Sequence[float], Sequence[float]],
+    placements: tuple[Sequence[float], Sequence[float]],
     names: tuple[str, str],
 ) -> MutualGazeReport:
     """Return the report of the mutual gaze of two heads.
 
     Args:
         ticks: of both runs, on one clock.
-        stands: place of each head in their world, as in ``RunInfo.stands``.
+        placements: place of each head in their world, as in ``RunInfo.placement``.
         names: of both.
 
     Raises:
         SetupError: there was only one head, or both had the same place.
     """
-    for name, place in zip(names, stands, strict=True):
+    for name, place in zip(names, placements, strict=True):
         if not place:
             raise SetupError(
                 f"{name} is from a run with one head: --with takes the recordings of two heads of "
                 "one run, for example run.mcap and run-other.mcap"
             )
-    if tuple(stands[0]) == tuple(stands[1]):
+    if tuple(placements[0]) == tuple(placements[1]):
         raise SetupError(
             f"{names[0]} and {names[1]} are from the same head: --with takes the other's"
         )
-    trace = MutualGazeTrace(HeadPlace.from_numbers(stands[0]), HeadPlace.from_numbers(stands[1]))
+    trace = MutualGazeTrace(
+        HeadPlace.from_numbers(placements[0]), HeadPlace.from_numbers(placements[1])
+    )
     both = merge(
         ((tick.t_s, 0, tick) for tick in ticks[0]),
         ((tick.t_s, 1, tick) for tick in ticks[1]),

@@ -9,7 +9,7 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.features.study.cli.design import DataOption, StudyArgument, data_folder, state
-from gazerig.robot.app.options import RunOptions, camera_of, host_port
+from gazerig.robot.app.options import RunOptions, parse_camera, parse_host_port
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import desktop_here, open_page
 from gazerig.robot.cli.progress_bar import progress_bar
@@ -82,13 +82,13 @@ def run(
         asked = RunOptions(
             mock=mock,
             port=port,
-            camera=camera_of(camera),
+            camera=parse_camera(camera),
             oak=oak,
             seed=found.design.presentation.seed,
         )
         head = _head(found, asked)
         films = {} if head is not None else _films(found, folder)
-        plan = SessionPlan(found, folder, participant, host_port(page), films, head)
+        plan = SessionPlan(found, folder, participant, parse_host_port(page), films, head)
         browse = open_page if not no_browser and desktop_here() else None
         with signals() as stopped:
             print(run_session(plan, stopped, say, RealClock(), browse))
@@ -144,8 +144,8 @@ def _head(study: "LoadedStudy", asked: RunOptions) -> RunOptions | None:
                 f"{given[0]}: the study shows films, and no head runs (presentation.on: film)"
             )
         return None
-    looks = {} if asked.looks_through else {"scene": shown.scene, "world": shown.world}
-    return replace(asked, rig=shown.rig, no_page=True, **looks).checked()  # type: ignore[arg-type]
+    looks = {} if asked.camera_source else {"scene": shown.scene, "world": shown.world}
+    return replace(asked, rig=shown.rig, no_page=True, **looks).check_and_complete()  # type: ignore[arg-type]
 
 
 def _films(study: "LoadedStudy", data: "StudyData") -> Mapping[str, Path]:

@@ -183,4 +183,4 @@ def _options(study: LoadedStudy, seconds: float) -> RunOptions:
     return RunOptions(
         mock=True, fast=True, seed=shown.seed, scene=shown.scene, world=shown.world,
         no_pictures=shown.world is not None, seconds=seconds, no_page=True,
-    ).checked()  # fmt: skip
+    ).check_and_complete()  # fmt: skip

@@ -114,17 +114,17 @@ def compose_group(options: RunOptions) -> "HeadGroup":
             members.append(_Member(name, compose(one, room=room), frame))
     except BaseException:
         for member in members:
-            member.composed.made.close()
+            member.composed.assembly.close()
         world.close()
         raise
     pictures = None if options.fast else (found.camera.rate_hz, not options.no_pictures)
     # The others are attached to the first, so that its commands can stop all.
     leader, *rest = members
-    robots = tuple(NamedRobot(one.name, one.composed.made.robot) for one in rest)
-    made = leader.composed.made._replace(others=robots)
+    robots = tuple(NamedRobot(one.name, one.composed.assembly.robot) for one in rest)
+    made = leader.composed.assembly._replace(other_heads=robots)
     # The process has one parameter store and one remote control: those of the first head.
     alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in rest]
-    linked = [leader._replace(composed=leader.composed._replace(made=made)), *alone]
+    linked = [leader._replace(composed=leader.composed._replace(assembly=made)), *alone]
     return HeadGroup(linked, world, pictures)
 
 

@@ -32,7 +32,7 @@ def world_info(options: RunOptions, seed: int) -> WorldInfo | None:
     return WorldInfo(options.world_name, text, seed)
 
 
-def recorded_shapes(info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
+def recorded_shapes(info: WorldInfo, placement: tuple[float, ...]) -> WorldShapes:
     """Return the shapes of the world of a recorded run, in the frame of its head's neck base.
 
     Raises:
@@ -46,7 +46,7 @@ def recorded_shapes(info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
         hint = extra_hint("mujoco", "world", ModuleNotFoundError(name="mujoco"))
         raise SetupError(f"the room is not shown: {hint}")
     shapes = script_shapes(Figures(_script(info), info.seed))
-    return ShapesFrom(shapes, RigFrame(*HeadPlace.from_numbers(stands))) if stands else shapes
+    return ShapesFrom(shapes, RigFrame(*HeadPlace.from_numbers(placement))) if placement else shapes
 
 
 def _script(info: WorldInfo) -> SceneScript:

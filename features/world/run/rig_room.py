@@ -17,11 +17,17 @@ from gazerig.features.world.run.sight import RenderedWorld, world_camera
 from gazerig.features.world.shapes import shapes_of
 from gazerig.features.world.world_spec import state_file
 from gazerig.robot.app.bus_wiring import guarded_rig_bus
-from gazerig.robot.app.camera_factory import locator_of
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.camera_factory import frame_locator
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.app.run_bus import RunBus, Sight, emulated_lines, in_process, without_wires
+from gazerig.robot.app.run_bus import (
+    CameraPoses,
+    RunBus,
+    emulated_lines,
+    ideal_run_bus,
+    in_process_run_bus,
+)
 from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraParams
@@ -39,11 +45,11 @@ class RigRoom:
 
     world: RunWorld
     clock: Clock
-    wires: RunBus
+    run_bus: RunBus
     head: WorldPoses | SimulatedPoses
     heads: OtherHeads | None = None
     info: WorldInfo | None = None
-    stands: tuple[float, ...] = ()
+    placement: tuple[float, ...] = ()
 
     @property
     def scene(self) -> Scene:
@@ -54,7 +60,7 @@ class RigRoom:
         self,
         rig: Rig,
         options: RunOptions,
-        sight: Sight,
+        sight: CameraPoses,
         placed: CameraParams,
         rng: np.random.Generator,
         own: ProgramParts,
@@ -66,7 +72,15 @@ class RigRoom:
             world.spec, world.scene, sight.mount, placed, rng, world.camera, world.number
         )
         return world_camera(
-            rig, options, rendered, self.head, locator_of(placed), self.clock, sight.turns, own, say
+            rig,
+            options,
+            rendered,
+            self.head,
+            frame_locator(placed),
+            self.clock,
+            sight.turns,
+            own,
+            say,
         )
 
     def start_s(self) -> float | None:
@@ -77,7 +91,7 @@ class RigRoom:
         """Return the shapes of the world, with the other heads if another process computes it."""
         return shapes_of(self.world.spec, self.heads)
 
-    def recorded(self) -> WorldInfo | None:
+    def world_info(self) -> WorldInfo | None:
         """Return the recording's entry for the world, None before the people's script began."""
         start_s = self.start_s()
         return None if self.info is None or start_s is None else replace(self.info, start_s=start_s)
@@ -104,18 +118,18 @@ def simulated_room(
     clock: Clock,
     world: RunWorld,
     computed: "World",
-    stands: tuple[float, ...] = (),
+    placement: tuple[float, ...] = (),
 ) -> RigRoom:
     """Return a rig in a world of this process, on the clock of the run."""
     if options.bus == "ideal":
-        wires = without_wires(rig, world_ideal_bus(rig, computed, world.number))
+        run_bus = ideal_run_bus(rig, world_ideal_bus(rig, computed, world.number))
     else:
         lines = emulated_lines(rig).items()
         devices = {name: computed.device(line, name, rig=world.number) for name, line in lines}
-        wires = in_process(rig, devices)
-    joints = RigInState(kinematics_of(rig), computed.model.rigs[world.number].qpos)
+        run_bus = in_process_run_bus(rig, devices)
+    joints = RigInState(rig_kinematics(rig), computed.model.rigs[world.number].qpos)
     head = SimulatedPoses(computed, clock, joints)
-    return RigRoom(world, clock, wires, head, None, _info(options, world), stands)
+    return RigRoom(world, clock, run_bus, head, None, _info(options, world), placement)
 
 
 def served_room(
@@ -124,17 +138,19 @@ def served_room(
     clock: Clock,
     world: RunWorld,
     served: ServedRig,
-    stands: tuple[float, ...] = (),
+    placement: tuple[float, ...] = (),
 ) -> RigRoom:
     """Return a rig in a world of another process."""
     buses, number = served.buses, world.number
-    wires = RunBus(guarded_rig_bus(rig, served.paths), close=served.close, fault=buses.command)
+    run_bus = RunBus(
+        guarded_rig_bus(rig, served.paths), close=served.close, inject_fault=buses.command
+    )
     state = state_file(buses.folder)
-    head = WorldPoses(state, RigInState(kinematics_of(rig), buses.joints[number]))
+    head = WorldPoses(state, RigInState(rig_kinematics(rig), buses.joints[number]))
     # Only the page draws other heads, and the page belongs to the first head.
     heads = map(HeadInState, world.others, buses.joints[1:])
     others = OtherHeads(state, tuple(heads)) if world.others and number == 0 else None
-    return RigRoom(world, clock, wires, head, others, _info(options, world), stands)
+    return RigRoom(world, clock, run_bus, head, others, _info(options, world), placement)
 
 
 def _info(options: RunOptions, world: RunWorld) -> WorldInfo | None:

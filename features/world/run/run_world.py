@@ -13,8 +13,8 @@ from gazerig.features.world.rig_in_world import (
     ServoInWorld,
     Transmission,
 )
-from gazerig.robot.app.bus_wiring import rig_setups
-from gazerig.robot.app.run_bus import STOP_BEYOND_DEG, crooked_rad
+from gazerig.robot.app.bus_wiring import servo_configs
+from gazerig.robot.app.run_bus import STOP_BEYOND_DEG, start_angles_rad
 from gazerig.robot.model.coupling_params import pairs_of
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
 from gazerig.robot.app.run_bus import BOARDS, CHAINS
-from gazerig.robot.app.run_rig import refuse_unruled
+from gazerig.robot.app.run_rig import refuse_missing_rules
 from gazerig.robot.app.scene_files import script_file
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.scenes.script import Fault, SceneScript, WorldCameraParams
@@ -64,7 +64,7 @@ def rig_in_world(
     }
     servos = tuple(_servo(rig, name) for name in rig.names)
     return RigInWorld(
-        partial(_body, rig, looks), stops, crooked_rad(rig), servos, prefix, p_m, yaw_rad
+        partial(_body, rig, looks), stops, start_angles_rad(rig), servos, prefix, p_m, yaw_rad
     )
 
 
@@ -84,7 +84,7 @@ def world_ideal_bus(rig: Rig, world: "World", number: int = 0) -> "WorldIdealBus
     from gazerig.features.world.ideal_bus import WorldIdealBus
 
     measured = [rig.joints[name].facts.measures_position for name in rig.names]
-    return WorldIdealBus(rig_setups(rig), world.ideal_shafts(number), measured, world.now_s)
+    return WorldIdealBus(servo_configs(rig), world.ideal_shafts(number), measured, world.now_s)
 
 
 def _servo(rig: Rig, name: str) -> ServoInWorld:
@@ -163,7 +163,7 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
                 "move: put its joints on one of our kinds, or use --scene"
             )
     scene, mjcf_file = world_scene(asked, options.seed), mjcf_of(asked)
-    refuse_unruled(rig.gaze.top_down, scene, f"--world {asked}")
+    refuse_missing_rules(rig.gaze.top_down, scene, f"--world {asked}")
     script = scene.figures.script
     # Without pictures the looks of the rigs are not needed: the page has its own shapes.
     looks = not options.no_pictures

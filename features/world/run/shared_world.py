@@ -21,7 +21,7 @@ from gazerig.features.world.world_spec import state_file
 from gazerig.gaze.angles import add, rotate, rotation
 from gazerig.gaze.types import Vec3
 from gazerig.robot.analysis.mutual_gaze import HeadPlace
-from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.gaze_models import rig_kinematics
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import emulated_lines
 from gazerig.robot.description.head_shape import HeadMeasures
@@ -136,16 +136,16 @@ class SimulatedWorld:
 
     def face(self, number: int, rig: Rig) -> FacePoseSource:
         """Return a source of the current pose of a head's face."""
-        joints = RigInState(kinematics_of(rig), self._world.model.rigs[number].qpos)
+        joints = RigInState(rig_kinematics(rig), self._world.model.rigs[number].qpos)
         poses = SimulatedPoses(self._world, self._lockstep.clock(number), joints)
         return FacePoseSource(poses, self.frames[number], _nose_m(rig))
 
     def room(self, number: int, rig: Rig, options: RunOptions, before: SceneOfHead) -> RigRoom:
         """Return the world from the view of one of the heads."""
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands = HeadPlace(*self.frames[number]).as_numbers
+        placement = HeadPlace(*self.frames[number]).as_numbers
         return simulated_room(
-            rig, options, self._lockstep.clock(number), world, self._world, stands
+            rig, options, self._lockstep.clock(number), world, self._world, placement
         )
 
     def enter(self, number: int) -> None:
@@ -182,7 +182,7 @@ class RealTimeWorld:
 
     def face(self, number: int, rig: Rig) -> FacePoseSource:
         """Return a source of the current pose of a head's face."""
-        joints = RigInState(kinematics_of(rig), self._buses.joints[number])
+        joints = RigInState(rig_kinematics(rig), self._buses.joints[number])
         return FacePoseSource(
             WorldPoses(state_file(self._buses.folder), joints), self.frames[number], _nose_m(rig)
         )
@@ -192,8 +192,8 @@ class RealTimeWorld:
         # Other heads use the world until ``close`` ends it.
         served = ServedRig(self._buses, self._paths[number], lambda: None)
         world = self._found._replace(scene=before(self._found.scene), number=number)
-        stands = HeadPlace(*self.frames[number]).as_numbers
-        return served_room(rig, options, RealClock(), world, served, stands)
+        placement = HeadPlace(*self.frames[number]).as_numbers
+        return served_room(rig, options, RealClock(), world, served, placement)
 
     def enter(self, number: int) -> None:
         """Return immediately: real time does not wait."""

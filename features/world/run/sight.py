@@ -55,7 +55,7 @@ class WorldCamera:
         poses: the pose of the head, and the start time of the people's script.
 
     Attributes:
-        seeing: the process, or the camera that computes detections; None until one is chosen.
+        wrapped_camera: process, or camera that computes detections; None until one is chosen.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class WorldCamera:
         poses: WorldPoses,
     ) -> None:
         self._process, self._ideal, self._poses = process, ideal, poses
-        self.seeing: CameraProcess | SceneCamera | None = process
+        self.wrapped_camera: CameraProcess | SceneCamera | None = process
         self._events: list[str] = []
 
     @property
@@ -75,27 +75,30 @@ class WorldCamera:
 
     def open(self) -> None:
         """Start the process; without a renderer continue without pictures."""
-        self.seeing = self._process
+        self.wrapped_camera = self._process
         if self._process is not None:
             try:
                 self._process.open()
             except NoRenderer as error:
-                self.seeing = None
+                self.wrapped_camera = None
                 self._events.append(no_pictures_message(error))
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the detections in the newest frame, None before the first."""
-        if self.seeing is None:
+        if self.wrapped_camera is None:
             begin_s = self.start_s
             if begin_s is None:
                 return None
-            self.seeing = self._ideal(begin_s)
-            self.seeing.open()
-        return self.seeing.latest(now_s)
+            self.wrapped_camera = self._ideal(begin_s)
+            self.wrapped_camera.open()
+        return self.wrapped_camera.latest(now_s)
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
-        events, self._events = (*self._events, *(self.seeing.events() if self.seeing else ())), []
+        events, self._events = (
+            (*self._events, *(self.wrapped_camera.events() if self.wrapped_camera else ())),
+            [],
+        )
         return events
 
     def close(self) -> None:

@@ -40,8 +40,8 @@ class WorldSurroundings(Surroundings):
 
         return compose_group(options) if has_other_heads(options) else None
 
-    def replayed(self, info: WorldInfo, stands: tuple[float, ...]) -> WorldShapes:
+    def replay_shapes(self, info: WorldInfo, placement: tuple[float, ...]) -> WorldShapes:
         """Return the shapes of the world of a recorded run."""
         from gazerig.features.world.run.recorded_world import recorded_shapes
 
-        return recorded_shapes(info, stands)
+        return recorded_shapes(info, placement)

@@ -56,7 +56,7 @@ from gazerig.features.bringup.cli.rig_writer import (
 )
 from gazerig.features.bringup.manual_control import JogParams, ManualControl
 from gazerig.gaze.types import Angles3
-from gazerig.robot.app.camera_factory import orientation_of
+from gazerig.robot.app.camera_factory import frame_orientation
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.interrupts import Interrupts
@@ -189,7 +189,7 @@ def _measure_field(
             "(--what lens), or take it out of the rig file"
         )
     clock = RealClock()
-    turned = UprightSource(source, orientation_of(rig.camera))
+    turned = UprightSource(source, frame_orientation(rig.camera))
     thread = CameraThread(turned, face_detector(rig.detector), clock.now_s)
     say(
         f"sit with your face {face_at_m:g} m before the lens (lens to tip of the nose), upright and "
@@ -287,7 +287,7 @@ def _open_camera(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_
             lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated
         )
         return
-    turned = UprightSource(source, orientation_of(job.rig.camera))
+    turned = UprightSource(source, frame_orientation(job.rig.camera))
     thread = CameraThread(turned, _NullDetector(), clock.now_s)
 
     def look() -> Shot | None:
@@ -375,7 +375,7 @@ def _find_lens(
 
 def _read_oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
     """Return the lens of an OAK camera for upright frames, and print its memory."""
-    found = upright_calibration(delivered, orientation_of(job.rig.camera))
+    found = upright_calibration(delivered, frame_orientation(job.rig.camera))
     found = with_frame_lens(found, shot.lens if shot is not None else None)
     print_calibration(found, job.rig.oak)
     camera = replace(job.rig.camera, lens=lens_params(found.lens, found.width_px, found.height_px))

@@ -106,7 +106,7 @@ def calibrate_face(
             port=port,
             page=page,
             no_page=no_page or answers is not None,
-        ).checked()
+        ).check_and_complete()
         try:
             found = _calibrate(options, loaded, lines, answers is not None, stopped)
             values = changes(found)
@@ -158,7 +158,7 @@ def _calibrate(
             with keys:
                 count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
             leaving.cause = count.stopped_by
-            observers.tell("over: the head parks; the terminal asks whether to write it")
+            observers.show_message("over: the head parks; the terminal asks whether to write it")
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
@@ -231,7 +231,7 @@ class _CalibrationSession:
     def _tell(self, what: str | None) -> None:
         if what is not None:
             say(what)
-            self._observers.tell(what)
+            self._observers.show_message(what)
 
 
 def status_text(steering: FaceSteering) -> str:
