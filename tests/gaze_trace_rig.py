@@ -72,7 +72,7 @@ class Rig:
             SaccadeModel(saccade),
             Pursuit(pursuit if pursuit is not None else PursuitParams()),
             HeadModel(head, radians(eye_deg), (neck, neck)),
-            Lids(LidParams(), np.random.default_rng(0)),
+            Lids(LidParams(eye_down_deg=0.0, eye_nasal_deg=0.0), np.random.default_rng(0)),
             breathing,
             None if dice is None else np.random.default_rng(dice),
         )
