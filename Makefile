@@ -13,11 +13,13 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 .PHONY: run test check coverage docs package bench links figures clean
 
 # In a living room with physics, where its pictures can be rendered; else one line says what that needs.
+# OPTIONS="--rate 200" or others of `gazerig run` override what was measured for this computer.
 # In a terminal Ctrl-C goes to the program alone (set -m): it parks, and make ends without an error.
 run: $(VENV)/.installed
 	@if [ -t 0 ]; then set -m; fi; $(BIN)/gazerig run --mock $$(if [ -d features/world ]; \
 	  then $(BIN)/python -m gazerig.features.world.run.first_world; \
-	  else echo "a visitor without a room: features/world is not there" >&2; fi)
+	  else echo "a visitor without a room: features/world is not there" >&2; \
+	  $(BIN)/python -m gazerig.robot.app.computer; fi) $(OPTIONS)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --workers auto

@@ -25,7 +25,7 @@ import sys
 from pathlib import PosixPath
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
-composed = session.compose(RunOptions(mock=True, **{options!r}).checked())
+composed = session.compose(RunOptions(mock=True, **{options!r}).check_and_complete())
 run = session.Session(composed, lambda: None, lambda line: None)
 with run.powered() as loop:
     for _ in range(20):

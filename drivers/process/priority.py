@@ -46,7 +46,7 @@ def request_slice(slice_s: float) -> bool:
     size, nice = struct.calcsize(_ATTRIBUTES), os.getpriority(os.PRIO_PROCESS, 0)
     values = size, policy, _RESET_ON_FORK, nice, 0, round(slice_s * 1e9), 0, 0
     attributes = ctypes.create_string_buffer(struct.pack(_ATTRIBUTES, *values), size)
-    return ctypes.CDLL(None, use_errno=True).syscall(call, 0, attributes, 0) == 0
+    return bool(ctypes.CDLL(None).syscall(call, 0, attributes, 0) == 0)
 
 
 def lower_priority(steps: int, group: Path = Path("/proc/self/autogroup")) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.computer import LEVELS, LoadLevel
 
 DEFAULT_SCENE = "visitor"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
@@ -43,6 +44,8 @@ class RunOptions:
         verbose: print details, too.
         summary: file of the figures, "-" for standard output.
         bus: replacement of the servos, "emulated" (byte-true, the default) or "ideal" (a lag).
+        rate: rate of the loop, Hz, instead of the rig's.
+        computer: what the computer can run, a level of ``gazerig.robot.app.computer``.
     """
 
     mock: bool = False
@@ -80,6 +83,8 @@ class RunOptions:
     summary: str | None = None
     bus: str | None = None
     name: str | None = None
+    rate: float | None = None
+    computer: str | None = None
 
     @property
     def camera_source(self) -> str | None:
@@ -151,7 +156,20 @@ class RunOptions:
                 )
             scene = DEFAULT_SCENE
         self._refuse_clashes(scene)
-        return replace(self, scene=scene)
+        level = self.level
+        bare = level is not None and level.pictures == "none" and self.world is not None
+        return replace(self, scene=scene, no_pictures=self.no_pictures or bare)
+
+    @property
+    def level(self) -> LoadLevel | None:
+        """Return what the computer can run, None if it was not measured.
+
+        Raises:
+            SetupError: there is no such level.
+        """
+        if self.computer is not None and self.computer not in LEVELS:
+            raise SetupError(f"--computer {self.computer}: unknown; there is {', '.join(LEVELS)}")
+        return None if self.computer is None else LEVELS[self.computer]
 
     def _refuse_bus(self) -> None:
         """Refuse a bus that is unknown, or that replaces no servos."""

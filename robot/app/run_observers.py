@@ -15,6 +15,7 @@ from gazerig.drivers.vision.model_files import detector_status
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
+from gazerig.robot.app.computer import level_text
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import LoopCount
@@ -88,6 +89,7 @@ class RunObservers:
         self._emulated = options.mock and steer is None
         computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
         self._detector = "" if computed else str(detector_status(assembly.live_params.rig.detector))
+        self._choice = level_text(options.computer) if options.computer is not None else ""
         self._tuning, self._recorder, self._world_recorded = tuning, recorder, False
         self._commanded = RobotGroup(assembly.robot, assembly.other_heads)
         name = options.name or rig_name(options.rig)
@@ -149,15 +151,19 @@ class RunObservers:
         )
         camera = self._made.robot.camera
         on_picture = camera.take if isinstance(camera, BorrowedCamera) else None
-        return PageProcess(*address, page_requests, on_picture)
+        live = self._live
+        return PageProcess(
+            *address, page_requests, on_picture, lambda: live.path if live is not None else None
+        )
 
     def _live_rig(self) -> LiveRig:
         made = self._made
         picture = ScenePicture(made.scene) if made.scene is not None else None
         shapes = made.room.shapes() if made.room is not None else None
         return LiveRig(
-            made.loop.rate_hz, made.shown_rig(), self._emulated, picture, shapes, self._detector
-        )
+            made.loop.rate_hz, made.shown_rig(), self._emulated, picture, shapes, self._detector,
+            self._choice,
+        )  # fmt: skip
 
     def _run_state(self) -> RunState:
         """Return the values of the page that are not in ticks."""

@@ -49,6 +49,11 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
     if options.saccade is not None:
         saccade = _with_choice(gaze.saccade, "profile", options.saccade, "--saccade")
         gaze = replace(gaze, saccade=saccade)
+    rate_hz, level = options.rate, options.level
+    if rate_hz is None and level is not None and level.rate_hz is not None:
+        rate_hz = min(level.rate_hz, rig.loop.rate_hz)
+    if rate_hz is not None:
+        rig = replace(rig, loop=replace(rig.loop, rate_hz=rate_hz))
     return with_surroundings(replace(rig, gaze=gaze), options)
 
 

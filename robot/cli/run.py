@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from gazerig.drivers.files.file_output import refuse_existing, write_file
+from gazerig.robot.app.computer import level_text
 from gazerig.robot.app.options import RunOptions, parse_camera
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import desktop_here, open_page
@@ -50,6 +51,8 @@ def run(
     seed: options.Seed = 0,
     fast: options.Fast = False,
     bus: options.Bus = None,
+    rate: options.Rate = None,
+    computer: options.Computer = None,
     profile: options.Profile = None,
     character: options.Character = None,
     rules: options.Rules = None,
@@ -133,7 +136,8 @@ def what_runs(asked: RunOptions) -> str:
     sight = f"it looks at {asked.camera_source or f'a simulated scene, {asked.scene}'}"
     if asked.world is not None:
         sight = f"it is in a world, {asked.world}"
-    return f"{asked.rig}: {servos}; {sight}. Ctrl-C parks the head and ends."
+    text = f"{asked.rig}: {servos}; {sight}. Ctrl-C parks the head and ends."
+    return text if asked.computer is None else f"{text}\n{level_text(asked.computer)}"
 
 
 def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:

@@ -30,6 +30,18 @@ World = Annotated[
         autocompletion=complete_world,
     ),
 ]
+Rate = Annotated[
+    float | None,
+    typer.Option(min=20.0, max=1000.0, metavar="HZ", help="Rate of the loop, not the rig's."),
+]
+Computer = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LEVEL",
+        help="What this computer can run: full, small, busy or least. `make run` measures it; "
+        "--rate and --world override it.",
+    ),
+]
 NoPictures = Annotated[
     bool,
     typer.Option(
@@ -105,7 +117,7 @@ Page = Annotated[
         "opens with the token in the address that is printed at start.",
     ),
 ]
-NoPage = Annotated[bool, typer.Option(help="Without the live page.")]
+NoPage = Annotated[bool, typer.Option("--no-page", help="Without the live page.")]
 NoBrowser = Annotated[
     bool,
     typer.Option("--no-browser", help="Leave opening the page to you; else the browser shows it."),

@@ -160,7 +160,7 @@ def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> Non
             news = drain(feed, live)
             if news.ended:
                 return
-            view.emulated = live.emulated
+            view.emulated, view.choice = live.emulated, live.choice
             view.show(news)
             if news.snapshots:
                 pointer.p_world_eyes_m = news.snapshots[-1].p_world_head_m

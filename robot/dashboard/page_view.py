@@ -38,6 +38,7 @@ class PageView:
     """Scene and panels of one server.
 
     emulated: whether the rig's servos are emulated, so that pointer control is on from the start
+    choice: what was chosen for this computer, shown to each new browser; "" shows nothing
     """
 
     def __init__(
@@ -68,6 +69,8 @@ class PageView:
         self._newest: Snapshot | None = None
         self._menus: Mapping[str, Sequence[str]] = {}
         self.emulated = False
+        self.choice = ""
+        widgets.on_join(self._greet)
         self._jpeg: bytes | None = None
         self._image: ImageArray | None = None
         self._world_now: WorldNow | None = None
@@ -81,6 +84,11 @@ class PageView:
     def choices(self) -> OverlayChoices:
         """Return the selected layers; users change them."""
         return self._panel.layers
+
+    def _greet(self, client: str) -> None:
+        """Show a new browser what was chosen for this computer."""
+        if self.choice:
+            self._widgets.notify(self.choice, client)
 
     def watched(self) -> bool:
         """Return whether any browser shows the page."""

@@ -25,7 +25,7 @@ begun = time.process_time()
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
 imported = time.process_time()
-composed = session.compose(RunOptions(mock=True, {options}).checked())
+composed = session.compose(RunOptions(mock=True, {options}).check_and_complete())
 made = time.process_time()
 run = session.Session(composed, lambda: None, lambda line: None, summarised=False)
 with run.powered() as loop:

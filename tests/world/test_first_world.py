@@ -2,9 +2,11 @@
 
 import pytest
 
+from gazerig.drivers.errors import install_command
 from gazerig.features.world.gl_context import NoRenderer
 from gazerig.features.world.run import first_world
 from gazerig.features.world.run.first_world import ROOM, main
+from gazerig.robot.app.computer import ComputerFigures
 
 
 class Free:
@@ -12,13 +14,31 @@ class Free:
         pass
 
 
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    figures = lambda software: ComputerFigures(2, 0.0, 1.0, software)  # noqa: E731
+    monkeypatch.setattr(first_world, "measure", figures)
+
+
+@pytest.mark.parametrize(
+    ("name", "level"), [("llvmpipe (LLVM 15.0.6, 256 bits)", "small"), ("Mesa Intel UHD", "full")]
+)
 def test_the_room_where_it_can_be_rendered(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    name: str, level: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(first_world, "find_spec", lambda name: object())
-    monkeypatch.setattr(first_world, "open_context", lambda make: ("egl", Free(), make()))
+    monkeypatch.setattr(first_world, "open_context", lambda make: ("egl", Free(), name))
     main()
-    assert capsys.readouterr() == (f"{ROOM}\n", "")
+    assert capsys.readouterr() == (f"--computer {level} {ROOM}\n", "")
+
+
+def test_no_room_on_a_computer_that_is_too_busy_for_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(first_world, "measure", lambda _: ComputerFigures(2, 0.0, 0.3, True))
+    monkeypatch.setattr(first_world, "renderer_name", lambda: ("llvmpipe", ""))
+    main()
+    assert capsys.readouterr() == ("--computer least\n", "")
 
 
 def test_one_line_says_what_is_missing(
@@ -27,7 +47,7 @@ def test_one_line_says_what_is_missing(
     monkeypatch.setattr(first_world, "find_spec", lambda name: None)
     main()
     out, err = capsys.readouterr()
-    assert out == "" and "pip install 'gazerig[world]'" in err and err.count("\n") == 1
+    assert out == "" and install_command("world") in err and err.count("\n") == 1
 
     def none(make: object) -> object:
         raise NoRenderer("no pictures of a world: egl: it is missing")
@@ -36,4 +56,4 @@ def test_one_line_says_what_is_missing(
     monkeypatch.setattr(first_world, "open_context", none)
     main()
     out, err = capsys.readouterr()
-    assert out == "" and "egl: it is missing" in err and err.count("\n") == 1
+    assert out == "--computer small\n" and "egl: it is missing" in err and err.count("\n") == 1

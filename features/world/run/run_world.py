@@ -98,6 +98,8 @@ def _servo(rig: Rig, name: str) -> ServoInWorld:
     return ServoInWorld(name, joint.bus, joint.id, joints, transmission, joint.facts.steps_per_turn)
 
 
+COARSE_HZ = 15.0
+"""Coarse pictures per second; without samples a picture of 320x240 takes 5 ms instead of 9."""
 MJCF = (".xml", ".mjcf")
 """Suffixes of MuJoCo's own world files."""
 
@@ -170,7 +172,10 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld:
     others = other_rigs(rig, script)
     rigs = (rig_in_world(rig, looks=looks), *placed_rigs(others, script, looks))
     spec = WorldSpec(None if mjcf_file else scene.figures, rigs, mjcf_file)
-    return RunWorld(spec, scene, script.camera, others=placed_rigs(others, script, looks=True))
+    camera, level = script.camera, options.level
+    if level is not None and level.pictures == "coarse":
+        camera = replace(camera, rate_hz=min(COARSE_HZ, camera.rate_hz), samples=0)
+    return RunWorld(spec, scene, camera, others=placed_rigs(others, script, looks=True))
 
 
 def other_rigs(rig: Rig, script: SceneScript) -> dict[str, Rig]:

@@ -134,7 +134,7 @@ VIEW = "/view"
 MOST_TABS = 16
 """Largest number of tabs that show the page."""
 
-_STYLE_TAG = b'<link rel="stylesheet" href="/rig/view.css">'
+_OWN_TAGS = b'<link rel="stylesheet" href="/rig/view.css"><script src="/rig/view.js"></script>'
 _HEAD_END = b"</head>"
 _TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each receives the whole state, which takes a moment
 # Headers of a single connection, which a proxy must not forward (RFC 9110, 7.6.1).
@@ -199,13 +199,13 @@ class ViewProxy:
         self._tab_rate = TokenBucket(_TABS_PER_S, _TABS_BURST)
 
     async def get(self, request: web.Request) -> web.StreamResponse:
-        """Return a file of viser; its document gets the page's style for the view."""
+        """Return a file of viser; its document gets the page's style and script for the view."""
         async with self._client.get(_address("http", request), headers=_PLAIN) as inside:
             body = await inside.read()
             headers = {k: v for k, v in inside.headers.items() if k.lower() not in _ONE_LEG}
             status = inside.status
         if headers.get("Content-Type", "").startswith("text/html"):
-            body = body.replace(_HEAD_END, _STYLE_TAG + _HEAD_END, 1)
+            body = body.replace(_HEAD_END, _OWN_TAGS + _HEAD_END, 1)
         return web.Response(status=status, body=body, headers={**headers, **self._headers})
 
     async def relay(

@@ -65,6 +65,7 @@ class LiveRig(NamedTuple):
     picture: draws the image of a simulated camera; None without one, or if it returns images
     world: how the simulated world about the rig looks; None without one
     detector: what finds faces and people, and what it lacks; "" if none runs
+    choice: what was chosen for this computer, in one line; "" if nothing was measured
     """
 
     rate_hz: float
@@ -73,6 +74,7 @@ class LiveRig(NamedTuple):
     picture: SceneView | None = None
     world: WorldShapes | None = None
     detector: str = ""
+    choice: str = ""
 
 
 class WorldNow(NamedTuple):
@@ -173,6 +175,7 @@ class LiveFeed:
     """Receives the rig's messages; returns the data to show.
 
     emulated: whether the servos are emulated; False before the first message
+    choice: see ``LiveRig``
     choices: what is wanted in the camera's image
     watched: someone sees the images; otherwise none is drawn
     shown_s: the time of what is shown: of the newest tick, or of a recording's snapshot
@@ -180,6 +183,7 @@ class LiveFeed:
 
     def __init__(self) -> None:
         self.emulated = False
+        self.choice = ""
         self.choices = OverlayChoices()
         self.watched = True
         self.shown_s: float | None = None
@@ -213,7 +217,7 @@ class LiveFeed:
                 self._poses = PoseHistory(rig.shown.kinematics)
             self._builder.rig = rig.shown
             self._builder.retune(rig.rate_hz)
-            self.emulated = rig.emulated
+            self.emulated, self.choice = rig.emulated, rig.choice
             self._picture, self._detector = rig.picture, rig.detector
             # Sent again with every change of the rig; what is equal stays, for it is drawn already.
             if pickle.dumps(rig.world) != pickle.dumps(self._world):

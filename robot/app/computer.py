@@ -1,0 +1,106 @@
+"""What a computer can run: its figures are measured in a second, and a load level is chosen.
+
+``python -m gazerig.robot.app.computer`` prints the option of ``gazerig run``.
+"""
+
+import os
+import sys
+import time
+from typing import NamedTuple
+
+from gazerig.robot.model.clock import RealClock
+
+_WAITS, _WAIT_S, _LATE_S = 80, 0.005, 0.002
+_BUSY_S = 0.3
+
+
+class ComputerFigures(NamedTuple):
+    """Measured figures of a computer.
+
+    Attributes:
+        cores: processors that this process may use.
+        late_share: share of short waits that ended 2 ms or more late.
+        core_share: processor time of a busy thread, as a share of the time that passed.
+        software: whether the processor draws the pictures; None: nothing can draw a world.
+    """
+
+    cores: int
+    late_share: float
+    core_share: float
+    software: bool | None
+
+
+class LoadLevel(NamedTuple):
+    """What a computer runs.
+
+    Attributes:
+        rate_hz: highest rate of the loop, None for the rig's.
+        pictures: of the camera in a world: "full", "coarse" (15 a second, without smoothed edges)
+            or "none" (detections are computed).
+        room: whether ``make run`` is in a room with physics.
+        text: the choice in words.
+    """
+
+    rate_hz: float | None
+    pictures: str
+    room: bool
+    text: str
+
+
+LEVELS = {
+    "full": LoadLevel(None, "full", True, "the rig's loop rate, full pictures"),
+    "small": LoadLevel(100.0, "coarse", True, "a loop of 100 Hz, 15 coarse pictures a second"),
+    "busy": LoadLevel(100.0, "none", True, "a loop of 100 Hz, a room without rendered pictures"),
+    "least": LoadLevel(50.0, "none", False, "a loop of 50 Hz, a scene instead of a room"),
+}
+"""Level -> what it runs, from the most to the least."""
+
+
+def load_level(figures: ComputerFigures) -> str:
+    """Return the name of the level that a computer can run.
+
+    A software renderer and a browser with another one take a core and a half, which two processors
+    have only beside a slower loop.
+    """
+    cores, late, share, software = figures
+    if share < 0.5 or late >= 0.4 or (cores == 1 and software is not False):
+        return "least"
+    weak = cores == 1 or (cores == 2 and software is not False)
+    if share < 0.75 or late >= 0.15:
+        return "busy" if weak or late >= 0.25 else "small"
+    return "small" if weak or late >= 0.05 else "full"
+
+
+def level_text(name: str) -> str:
+    """Return a level in one line, with the options that override it."""
+    return (
+        f"measured for this computer ({name}): {LEVELS[name].text}; --rate and --world override it"
+    )
+
+
+def measure(software: bool | None) -> ComputerFigures:
+    """Measure this computer, in less than a second.
+
+    Args:
+        software: see ``ComputerFigures``.
+    """
+    from gazerig.drivers.process.priority import SHORT_S, request_slice  # a run has measured
+
+    request_slice(SHORT_S)
+    clock, late = RealClock(), 0
+    for _ in range(_WAITS):
+        due_s = clock.now_s() + _WAIT_S
+        clock.sleep_until(due_s)
+        late += clock.now_s() - due_s >= _LATE_S
+    request_slice(0.0)
+    began_s, cpu_s = clock.now_s(), time.thread_time()
+    while (passed_s := clock.now_s() - began_s) < _BUSY_S:
+        pass
+    share = (time.thread_time() - cpu_s) / passed_s
+    allowed = getattr(os, "sched_getaffinity", None)
+    cores = len(allowed(0)) if allowed is not None else os.cpu_count() or 1
+    return ComputerFigures(cores, late / _WAITS, share, software)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(f"--computer {load_level(measure(None))}\n")
