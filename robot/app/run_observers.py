@@ -244,14 +244,15 @@ class RunObservers:
         with self._report_errors("the recording"):
             if self._recorder is not None:
                 self._recorder.begin()
+        with self._report_errors("the remote control"):
+            # Before the page, which relays to it.
+            if self._live is not None:
+                self._live.open()
         with self._report_errors("the page"):
             if self._page is not None:
                 self._page.open()
                 steps = None if self._steer is None else {STEER: self._steer.keys}
                 self._page.offer(steps or self._made.robot.menus())
-        with self._report_errors("the remote control"):
-            if self._live is not None:
-                self._live.open()
 
     @contextlib.contextmanager
     def _report_errors(self, name: str) -> Iterator[None]:

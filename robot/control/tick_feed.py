@@ -18,6 +18,7 @@ class TickFeed:
     Attributes:
         newest: The newest tick, None before the first.
         ticks: Number of ticks.
+        number: Number of the newest event, 0 before the first.
     """
 
     def __init__(self) -> None:
@@ -26,7 +27,7 @@ class TickFeed:
         self._messages: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
         self._others: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)  # many: they push out none
         self._changes = GazeEvents()
-        self._number = 0
+        self.number = 0
         self._joining: deque[Callable[[Progress], bool]] = deque()
         self._followers: list[Callable[[Progress], bool]] = []
 
@@ -35,11 +36,11 @@ class TickFeed:
         self.newest = tick
         self.ticks += 1
         for text in tick.events:
-            self._number += 1
-            self._messages.append(HeadEvent(self._number, tick.t_s, text))
+            self.number += 1
+            self._messages.append(HeadEvent(self.number, tick.t_s, text))
         for change in self._changes.update(tick):
-            self._number += 1
-            self._others.append(HeadEvent(self._number, tick.t_s, *change))
+            self.number += 1
+            self._others.append(HeadEvent(self.number, tick.t_s, *change))
         while self._joining:
             self._followers.append(self._joining.popleft())
         if self._followers:
@@ -57,10 +58,9 @@ class TickFeed:
 
     def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
         """Return the stored events with numbers above ``after``, the oldest first."""
-        found = [
-            *_later(self._messages, after),
-            *_later(self._others, after),
-        ]
+        newest = self.number  # an event that comes meanwhile must not hide an earlier one
+        found = [*_later(self._messages, after), *_later(self._others, after)]
+        found = [event for event in found if event.number <= newest]
         return tuple(sorted(found, key=lambda event: event.number))
 
     def messages(self) -> tuple[HeadEvent, ...]:

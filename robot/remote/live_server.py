@@ -224,6 +224,11 @@ class LiveServer:
         self._watch.start()
 
     @property
+    def path(self) -> Path | None:
+        """Return the path of the socket while it listens, else None."""
+        return self._server.path
+
+    @property
     def update(self) -> Callable[[Tick], None]:
         """Return the function that stores the newest tick, for the loop."""
         return self._pulse.update

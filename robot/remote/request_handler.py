@@ -89,7 +89,8 @@ class Pulse:
         """Return the newest tick, None before the first, and events numbered above ``after``."""
         tick = self._feed.newest
         events = [asdict(one) for one in self._feed.events(after)]
-        return {"state": state_as_json(head_state(tick)) if tick else None, "events": events}
+        state = state_as_json(head_state(tick)) if tick else None
+        return {"state": state, "events": events, "number": self._feed.number}
 
     def as_json(self) -> dict[str, object]:
         """Return the newest tick as plain values: degrees, seconds, text."""

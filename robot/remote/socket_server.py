@@ -77,14 +77,18 @@ _NAMING = threading.Lock()
 
 
 class RemoteServer:
-    """Server that listens while a rig runs."""
+    """Server that listens while a rig runs.
+
+    Attributes:
+        path: Path of the socket, None before ``open``.
+    """
 
     def __init__(self, requests: RequestHandler, say: Callable[[str], None]) -> None:
         self._requests = requests
         self._say = say
         self._clock = RealClock()
         self._budget = Budget(ALL, self._clock.now_s())
-        self._path: Path | None = None
+        self.path: Path | None = None
         self._listener: Listener | None = None
         self._lock = threading.Lock()
         self._wires: dict[Wire, None] = {}  # the least recently active first
@@ -101,16 +105,16 @@ class RemoteServer:
         remote_socket.make_private(folder, uid)
         remote_socket.clear_dead(folder)
         with _NAMING:
-            self._path = remote_socket.free_name(folder, os.getpid())
-            self._listener = remote_socket.listen(self._path)
+            self.path = remote_socket.free_name(folder, os.getpid())
+            self._listener = remote_socket.listen(self.path)
         self._start(self._accept, self._listener)
-        return self._path
+        return self.path
 
     def close(self) -> None:
         """Close all connections and remove the socket."""
-        if self._listener is None or self._path is None:
+        if self._listener is None or self.path is None:
             return
-        self._path.unlink(missing_ok=True)
+        self.path.unlink(missing_ok=True)
         listener, self._listener = self._listener, None
         listener.close()
         with self._lock:

@@ -41,6 +41,22 @@ def hostname(host: str) -> str | None:
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
+API = "/api/"
+"""Beginning of the paths for programs, which show the token with each request."""
+
+
+_SHOW = (
+    "show the token of the page's address as ?token=... or as a header, Authorization: Bearer ...; "
+    "there is a new one each time the rig is started (gazerig ctl rigs)"
+)
+
+
+def _bearer(request: web.Request) -> str:
+    """Return the token in the header Authorization, "" without one."""
+    kind, _, token = request.headers.get("Authorization", "").partition(" ")
+    return token.strip() if kind.lower() == "bearer" else ""
+
+
 class Admission:
     """Accepts or refuses requests by one token.
 
@@ -66,19 +82,29 @@ class Admission:
         """Return the reason why a request is refused, None if it is accepted."""
         sends = request.method not in ("GET", "HEAD") or "upgrade" in request.headers
         origin = request.headers.get("Origin")
-        if origin is None and sends:
+        shown = request.query.get("token") or _bearer(request)
+        program = request.path.startswith(API)
+        if program and sends and origin is None and not shown:
+            return f"refused: {_SHOW}"
+        if program and origin == "null" and shown:
+            origin = None  # a page from a file of a user, who gave it the token
+        if origin is None and sends and not program:
             return "refused: no Origin; only a browser with this page open may ask for anything"
         if origin is not None and netloc(origin) != request.host:
             return "refused: a page of another origin may not look or ask"
         if self._host in LOOPBACK and hostname(request.host) not in LOOPBACK:
             return f"refused: on this machine the page is at http://{self._host}:{self._port}"
-        given = request.query.get("token") or request.cookies.get(self._cookie) or ""
+        given = shown or request.cookies.get(self._cookie) or ""
         if hmac.compare_digest(given.encode(errors="replace"), self._token.encode()):
             return None
-        if self.once and hmac.compare_digest(given.encode(errors="replace"), self.once.encode()):
+        if (
+            self.once
+            and not program
+            and hmac.compare_digest(given.encode(errors="replace"), self.once.encode())
+        ):
             self.once = ""
             return None
-        return f"refused: {self._otherwise}"
+        return f"refused: {_SHOW if program else self._otherwise}"
 
     def with_cookie(self, request: web.Request, headers: Mapping[str, str]) -> web.Response:
         """Move the token from the address to a cookie, which is not shown, stored or forwarded."""

@@ -15,14 +15,16 @@ import secrets
 import threading
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
 
 import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from gazerig.robot.dashboard.door.admission import Admission
+from gazerig.robot.dashboard.door.admission import API, Admission
 from gazerig.robot.dashboard.door.browsers import Browsers, Connections, TabLimits
 from gazerig.robot.dashboard.door.page_files import PageFiles
+from gazerig.robot.dashboard.door.programs import Programs
 from gazerig.robot.dashboard.door.sockets import (
     TAKES_S,
     TakePicture,
@@ -39,6 +41,7 @@ from gazerig.robot.dashboard.requests.outbox import (
     from_browser,
     leads,
 )
+from gazerig.robot.dashboard.requests.rig_relay import RigRelay
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES, Widgets
 
@@ -88,6 +91,7 @@ class AuthProxy:
         widgets: Widgets,
         point: Point,
         picture: TakePicture,
+        rig: Path | None = None,
     ) -> None:
         """Prepare to listen.
 
@@ -102,6 +106,7 @@ class AuthProxy:
             widgets: of the panels
             point: receives positions of a browser's pointer, without an answer
             picture: receives pictures of browsers' own cameras; False: it does not take them
+            rig: the rig's command socket, for programs; None without one
         """
         self._host = host
         self._port = port
@@ -123,6 +128,8 @@ class AuthProxy:
         self._loop = asyncio.SelectorEventLoop()  # that of Windows cannot wait for sockets
         self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
+        self._relay = RigRelay(rig)
+        self._programs = Programs(self._relay, stop, self._over, _HEADERS)
         self._opened = threading.Event()
         self._failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="page door", daemon=True)
@@ -176,6 +183,7 @@ class AuthProxy:
         app.router.add_get("/rig/webcam", self._webcam)
         app.router.add_post("/rig/ask", self._handle_post)
         PageFiles(_HEADERS).add_to(app.router)
+        self._programs.add_to(app.router, lambda: self._connections)
         app.router.add_get(VIEW, self._relay_view)
         app.router.add_get(f"{VIEW}/{{path:.*}}", self._relay_view)
         app.router.add_get("/{path:.*}", self._nothing)
@@ -201,7 +209,11 @@ class AuthProxy:
             finally:
                 self._opened.set()
             self._stop.attach(self._loop)
-            await until_one_ends(self._over.wait(), self._connections.watch())
+            await until_one_ends(
+                self._over.wait(), self._connections.watch(), self._programs.feed.run()
+            )
+            self._over.set()
+            self._relay.close()
             self._wake()
             listener.close()
             await runner.cleanup()
@@ -215,9 +227,12 @@ class AuthProxy:
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
             with self._connections.busy(request):
                 why_not = self.admission.refusal(request)
+                is_program = request.path.startswith(API)
+                if why_not is not None and is_program:
+                    return self._programs.refuse(why_not.removeprefix("refused: "))
                 if why_not is not None:
                     return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
-                if "token" in request.query:
+                if "token" in request.query and not is_program:
                     answer = self.admission.with_cookie(request, _HEADERS)
                     if self._name_cookie not in request.cookies:
                         answer.set_cookie(

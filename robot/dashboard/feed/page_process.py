@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from math import nan
 from operator import attrgetter
+from pathlib import Path
 from typing import BinaryIO
 from urllib.parse import urlsplit
 
@@ -50,6 +51,8 @@ ONCE_VARIABLE = "GAZERIG_PAGE_ONCE"
 """Environment variable with a token that opens the page once, "" for none."""
 FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
 """Environment variable with a folder of this user only, for its server's socket."""
+COMMANDS_VARIABLE = "GAZERIG_PAGE_COMMANDS"
+"""Environment variable with the path of the rig's command socket, "" for none."""
 CANNOT_OPEN = 3
 """Exit code of a page that cannot open its address; a restart would not help."""
 ALL_USERS = "*"
@@ -123,12 +126,15 @@ class PageProcess:
         port: int,
         on_request: OnRequest | None = None,
         on_picture: Callable[[bytes], None] | None = None,
+        commands: Callable[[], Path | None] = lambda: None,
     ) -> None:
         """Prepare a page for an address and port; if the port is busy, the next one is used.
 
         on_request: called with each request of a user of the page; None: requests are dropped
         on_picture: called with each picture of a browser's own camera; None: they are dropped
+        commands: returns the path of the rig's command socket, to which programs are relayed
         """
+        self._commands = commands
         self._on_picture = on_picture
         self._host = host
         self._port = port
@@ -180,6 +186,7 @@ class PageProcess:
                     TOKEN_VARIABLE: self._token,
                     ONCE_VARIABLE: self._once if self.started == 0 else "",
                     FOLDER_VARIABLE: self._folder,
+                    COMMANDS_VARIABLE: str(self._commands() or ""),
                     **links.variables,
                 },
             )

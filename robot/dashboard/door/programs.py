@@ -1,0 +1,471 @@
+"""Programs of the network: the messages of the command socket over HTTP and a websocket.
+
+GET  /api/v1/state          newest state
+POST /api/v1/do             one message; an order's answer has its outcome
+GET  /api/v1/socket         websocket: messages in both directions, states, events
+GET  /api/v1/openapi.json   description; /api/v1/ shows it as a page
+"""
+
+import asyncio
+import html
+import json
+import os
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from typing import Any
+
+import aiohttp
+from aiohttp import web
+
+from gazerig.robot.control.command_handler import ORDERS
+from gazerig.robot.dashboard.door.admission import API
+from gazerig.robot.dashboard.door.browsers import Connections, TabLimits
+from gazerig.robot.dashboard.door.sockets import TAKES_S, close_socket, until_one_ends
+from gazerig.robot.dashboard.requests.outbox import TokenBucket, leads
+from gazerig.robot.dashboard.requests.rig_relay import (
+    BUSY,
+    BUSY_WORDS,
+    NEWEST,
+    Answer,
+    HeadNews,
+    RigRelay,
+    StateFeed,
+)
+from gazerig.robot.dashboard.requests.stop_sender import StopSender
+from gazerig.robot.model.commands import HEARTBEAT_S, REPEATED
+from gazerig.robot.model.outcome import outcome_of
+from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.remote.openapi import api_description
+from gazerig.robot.remote.socket_io import REQUEST_BYTES, VERSION, parse_json
+
+BASE = f"{API}v{VERSION}"
+MOST_RATE_HZ = 60.0
+MOST_PROGRAMS = 32
+"""Largest number of websockets of programs, as of tabs of the page."""
+MOST_WAIT_S = 15.0
+"""Longest wait of an HTTP request for an outcome."""
+_EVENTS_HZ = 20.0
+"""Rate at which the head is read for events and outcomes."""
+_PER_S, _BURST = 50.0, 100.0
+_ALL_PER_S, _ALL_BURST = 100.0, 200.0
+_FLOOD_PAUSE_S = 0.01
+_READ_S = 5.0
+_MOST_QUEUED = 16
+_MOST_OUT = 256
+_MOST_OPEN = 64
+"""Largest number of orders of one program without an outcome."""
+_WHO_CHARACTERS = 60
+_TAG_CHARACTERS = 100
+_NO_OUTCOME = {name for name, kind in ORDERS.items() if kind in REPEATED}
+_STATUS = {"ok": 200, "refused": 409, "failed": 503}
+
+
+class MessageRefused(ValueError):
+    """A message that is not sent to the rig; the text names the reason.
+
+    Attributes:
+        status: of an HTTP answer.
+    """
+
+    def __init__(self, text: str, status: int = 400) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+def message_of(data: str | bytes) -> dict[str, Any]:
+    """Return a message that came as text.
+
+    Raises:
+        MessageRefused: it is too long, or not a JSON object.
+    """
+    if len(data) > REQUEST_BYTES:
+        raise MessageRefused(f"longer than {REQUEST_BYTES} bytes", 413)
+    try:
+        found = parse_json(data)
+    except RecursionError:
+        raise MessageRefused("nested too deep") from None
+    except ValueError as error:
+        raise MessageRefused(f"not JSON: {error}") from None
+    if not isinstance(found, dict):
+        raise MessageRefused('not a JSON object like {"do": "status"}')
+    tag = found.get("tag", 0)
+    if not isinstance(tag, str | int) or len(str(tag)) > _TAG_CHARACTERS:
+        raise MessageRefused(f"tag: a whole number or text of at most {_TAG_CHARACTERS} characters")
+    return found
+
+
+def rate_of(text: str, name: str, least: float, most: float) -> float:
+    """Return a number of a query.
+
+    Raises:
+        MessageRefused: it is not within the bounds.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not least <= value <= most:
+        raise MessageRefused(f"{name}={text:.20}: a number {least:g}..{most:g}")
+    return value
+
+
+class Program:
+    """One program's websocket: what waits to be sent, and what it controls.
+
+    States that it does not read in time are replaced by newer ones; of events and answers the
+    oldest are dropped.
+
+    Args:
+        rate_hz: rate of states, 0 for none.
+        events: whether it receives events.
+
+    Attributes:
+        news: set when there is something to send; alive: when the program has answered a ping.
+        leading: name under which it controls the head, "" if it does not.
+    """
+
+    def __init__(self, rate_hz: float, events: bool) -> None:
+        self._rate_hz, self._events = rate_hz, events
+        self._due_s = 0.0
+        self._state = ""
+        self._out: deque[str] = deque(maxlen=_MOST_OUT)
+        self._open: deque[tuple[object, CommandReply]] = deque(maxlen=_MOST_OPEN)
+        self.news, self.alive = asyncio.Event(), asyncio.Event()
+        self.leading = ""
+
+    def wanted_hz(self) -> float:
+        """Return the rate at which it needs the state of the head."""
+        return max(self._rate_hz, _EVENTS_HZ if self._events or self._open else 0.0)
+
+    def take(self, news: HeadNews, now_s: float) -> None:
+        """Take news that it wants."""
+        if self._rate_hz and now_s >= self._due_s:
+            # Half a period early is closer than half a period late.
+            self._due_s = max(self._due_s + 1.0 / self._rate_hz, now_s + 0.5 / self._rate_hz)
+            self._state = news.state
+            self.news.set()
+        if self._events and news.events:
+            self._out.extend(news.events)
+            self.news.set()
+        for _ in range(len(self._open)):
+            tag, reply = self._open.popleft()
+            if (end := outcome_of(reply, news.progress)) is None:
+                self._open.append((tag, reply))
+            else:
+                self.say({"outcome": end[0], "why": end[1], "tag": tag})
+
+    def follow(self, tag: object, reply: CommandReply) -> None:
+        """Send the outcome of an order when it is known."""
+        self._open.append((tag, reply))
+
+    def say(self, message: Mapping[str, object]) -> None:
+        """Send a message as soon as the program reads it."""
+        self._out.append(json.dumps(message, separators=(",", ":")))
+        self.news.set()
+
+    def outgoing(self) -> str:
+        """Return the next message to send, answers and events first, "" if there is none."""
+        if self._out:
+            return self._out.popleft()
+        state, self._state = self._state, ""
+        return state
+
+
+_Handler = Callable[["Programs", web.Request], Awaitable[web.StreamResponse]]
+
+
+def _refusing(handler: _Handler) -> _Handler:
+    """Return a handler that answers a bad message with its reason."""
+
+    async def answer(programs: "Programs", request: web.Request) -> web.StreamResponse:
+        try:
+            return await handler(programs, request)
+        except MessageRefused as error:
+            return programs.refuse(str(error), error.status)
+
+    return answer
+
+
+class Programs:
+    """Routes for programs; used in the door's event loop.
+
+    Args:
+        relay: to the rig.
+        stop: receives stops, before all other requests.
+        over: set when the page closes.
+        headers: of all answers.
+    """
+
+    def __init__(
+        self,
+        relay: RigRelay,
+        stop: StopSender,
+        over: asyncio.Event,
+        headers: Mapping[str, str],
+    ) -> None:
+        self._relay, self._stop, self._over, self._headers = relay, stop, over, headers
+        self.feed = StateFeed(relay.ask)
+        self._rate = TokenBucket(_ALL_PER_S, _ALL_BURST)
+        self._limits = TabLimits(MOST_PROGRAMS)
+
+    def add_to(self, router: web.UrlDispatcher, connections: Callable[[], Connections]) -> None:
+        """Add the routes; ``connections`` are those of the door, once it is open."""
+        self._connections = connections
+        router.add_get(f"{BASE}/state", self._state)
+        router.add_post(f"{BASE}/do", self._post)
+        router.add_get(f"{BASE}/socket", self._socket)
+        router.add_get(f"{BASE}/openapi.json", self._openapi)
+        router.add_get(f"{BASE}/", self._page)
+        router.add_route("*", API + "{path:.*}", self._nothing)
+
+    def refuse(self, text: str, status: int = 403) -> web.Response:
+        """Return an answer that refuses a request."""
+        return self._answer({"refused": text}, status)
+
+    # --- HTTP ---------------------------------------------------------------------------
+
+    @_refusing
+    async def _state(self, request: web.Request) -> web.StreamResponse:
+        after = int(rate_of(request.query.get("after", f"{NEWEST}"), "after", 0, NEWEST))
+        return await self._asked({"do": "state", "after": after})
+
+    @_refusing
+    async def _post(self, request: web.Request) -> web.StreamResponse:
+        wait_s = rate_of(request.query.get("wait_s", "10"), "wait_s", 0.0, MOST_WAIT_S)
+        data = b""
+        async with asyncio.timeout(_READ_S):
+            while len(data) <= REQUEST_BYTES and (more := await request.content.readany()):
+                data += more
+        message = _signed(message_of(data), request)
+        if message.get("do") != "stop" and not self._takes():
+            raise MessageRefused(BUSY, 429)
+        if leads(message) and message.get("for_s") is not None:
+            message["stay"] = True  # it ends by its time; a request has no connection to lose
+        return await self._asked(message, wait_s)
+
+    async def _asked(self, message: dict[str, Any], wait_s: float = 0.0) -> web.Response:
+        answer = await self._do(message)
+        match answer:
+            case {"ok": {"reply": dict(reply)}} if wait_s and message["do"] not in _NO_OUTCOME:
+                answer |= await self._outcome(message, CommandReply.from_json(reply), wait_s)
+        status = _STATUS[next(key for key in _STATUS if key in answer)]
+        return self._answer(answer, 429 if answer.get("refused") == BUSY else status)
+
+    async def _outcome(
+        self, message: Mapping[str, Any], reply: CommandReply, wait_s: float
+    ) -> dict[str, object]:
+        """Wait for the outcome of an order, and renew its control meanwhile."""
+        loop = asyncio.get_running_loop()
+        found: asyncio.Future[tuple[str, str]] = loop.create_future()
+
+        def take(news: HeadNews, now_s: float) -> None:
+            end = outcome_of(reply, news.progress)
+            if end is not None and not found.done():
+                found.set_result(end)
+
+        self.feed.add(take, lambda: _EVENTS_HZ)
+        renewing = reply.lead and not message.get("stay")
+        end_s = loop.time() + wait_s
+        try:
+            while (left_s := end_s - loop.time()) > 0.0:
+                done, _ = await asyncio.wait([found], timeout=min(0.25 * HEARTBEAT_S, left_s))
+                if done:
+                    outcome, why = found.result()
+                    return {"outcome": outcome, "why": why}
+                if renewing:
+                    await self._relay.ask({"do": "renew", "who": message["who"]})
+        finally:
+            self.feed.remove(take)
+        return {"outcome": "timed out", "why": ""}
+
+    async def _openapi(self, request: web.Request) -> web.Response:
+        return self._answer(api_description(BASE), 200)
+
+    async def _page(self, request: web.Request) -> web.Response:
+        policy = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
+        page = description_page(api_description(BASE))
+        headers = {**self._headers, **policy}
+        return web.Response(text=page, content_type="text/html", headers=headers)
+
+    async def _nothing(self, request: web.Request) -> web.Response:
+        text = f"{request.method} {request.path:.60} is not here: version {VERSION} is at {BASE}/"
+        return self.refuse(text, 404)
+
+    def _answer(self, answer: Mapping[str, object], status: int) -> web.Response:
+        return web.json_response(answer, status=status, headers=self._headers)
+
+    # --- the websocket ------------------------------------------------------------------
+
+    @_refusing
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        if "upgrade" not in request.headers:
+            raise MessageRefused("this is a websocket", 426)
+        events = request.query.get("events", "false")
+        if events not in ("true", "false"):
+            raise MessageRefused(f"events={events:.20}: true or false")
+        rate_hz = 0.0
+        if (text := request.query.get("rate_hz")) is not None:
+            rate_hz = rate_of(text, "rate_hz", 1.0, MOST_RATE_HZ)
+        program = Program(rate_hz, events == "true")
+        socket = web.WebSocketResponse(
+            max_msg_size=4 * REQUEST_BYTES, compress=False, autoping=False
+        )
+        await socket.prepare(request)
+        self._connections().lasting(request)
+        orders: asyncio.Queue[dict[str, Any]] = asyncio.Queue(_MOST_QUEUED)
+        orders.put_nowait({"do": "hello", "version": VERSION, "tag": "hello"})
+        self.feed.add(program.take, program.wanted_hz)
+        try:
+            with self._limits.take(request.remote or "") as leave:
+                await until_one_ends(
+                    self._send(socket, program),
+                    self._receive(socket, program, orders, request),
+                    self._carry_out(program, orders),
+                    self._renew(socket, program),
+                    self._over.wait(),
+                    leave.wait(),
+                )
+        finally:
+            self.feed.remove(program.take)
+        await close_socket(socket, request)
+        return socket
+
+    async def _send(self, socket: web.WebSocketResponse, program: Program) -> None:
+        while not socket.closed:
+            await program.news.wait()
+            program.news.clear()
+            while text := program.outgoing():
+                async with asyncio.timeout(TAKES_S):
+                    await socket.send_str(text)
+
+    async def _receive(
+        self,
+        socket: web.WebSocketResponse,
+        program: Program,
+        orders: "asyncio.Queue[dict[str, Any]]",
+        request: web.Request,
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        rate = TokenBucket(_PER_S, _BURST)
+        async for frame in socket:
+            if frame.type is aiohttp.WSMsgType.PING:
+                async with asyncio.timeout(TAKES_S):
+                    await socket.pong(frame.data)
+                continue
+            if frame.type is aiohttp.WSMsgType.PONG:
+                program.alive.set()
+                continue
+            if frame.type is not aiohttp.WSMsgType.TEXT:
+                program.say({"refused": "not text: one JSON object in each message"})
+                continue
+            late = not rate.take(loop.time())
+            if late and '"stop"' not in frame.data[:REQUEST_BYTES]:
+                program.say({"refused": BUSY})
+                await asyncio.sleep(_FLOOD_PAUSE_S)
+                continue
+            try:
+                message = _signed(message_of(frame.data), request)
+                if message.get("do") == "stop":
+                    program.say(await self._do(message))
+                elif late or orders.full() or not self._takes():
+                    program.say({"refused": BUSY, **_tag(message)})
+                else:
+                    orders.put_nowait(message)
+            except MessageRefused as error:
+                program.say({"refused": str(error)})
+
+    async def _carry_out(self, program: Program, orders: "asyncio.Queue[dict[str, Any]]") -> None:
+        """Send a program's messages to the rig, in their order."""
+        while True:
+            message = await orders.get()
+            answer = await self._do(message)
+            program.say(answer)
+            match answer:
+                case {"ok": {"reply": dict(reply)}}:
+                    found = CommandReply.from_json(reply)
+                    if leads(message):
+                        held = found.lead and not message.get("stay")
+                        program.leading = message["who"] if held else ""
+                    if "tag" in message and message["do"] not in _NO_OUTCOME:
+                        program.follow(message["tag"], found)
+                        self.feed.wake()
+
+    async def _renew(self, socket: web.WebSocketResponse, program: Program) -> None:
+        """Ping a program in control; each answer renews its control.
+
+        One that hangs or does not read loses it within a second, as one that has gone.
+        """
+        while True:
+            await asyncio.sleep(0.25 * HEARTBEAT_S)
+            if not (who := program.leading):
+                continue
+            program.alive.clear()
+            async with asyncio.timeout(TAKES_S):
+                await socket.ping()
+                await program.alive.wait()
+            answer = await self._relay.ask({"do": "renew", "who": who})
+            if "refused" in answer and BUSY_WORDS not in answer["refused"]:
+                program.leading = ""  # another client is in control, or none
+
+    # --- the rig ------------------------------------------------------------------------
+
+    def _takes(self) -> bool:
+        return self._rate.take(asyncio.get_running_loop().time())
+
+    async def _do(self, message: Mapping[str, Any]) -> Answer:
+        """Send a message to the rig, a stop by its own channel; return the answer."""
+        if message.get("do") != "stop":
+            return await self._relay.ask(message)
+        # The command socket adds the process to the name; whoever stopped may resume.
+        who = f"{message['who']} (process {os.getpid()})"
+        try:
+            text = await self._stop.send(f"{message.get('why', '')!s:.100}", who)
+        except OSError as error:
+            text = str(error)
+        answer: Answer = {"failed": text} if text else {"ok": {"notes": []}}
+        return answer | _tag(message)
+
+
+def _signed(message: dict[str, Any], request: web.Request) -> dict[str, Any]:
+    """Return a message with the name of its program, which it may choose, and the address."""
+    kind = ORDERS.get(str(message.get("do")))
+    if kind is None or "who" not in kind._fields:
+        return message
+    name = "".join(filter(str.isprintable, str(message.get("who") or "a program")))
+    return {**message, "who": f"{name[:_WHO_CHARACTERS]} at {request.remote}"}
+
+
+def _tag(message: Mapping[str, object]) -> dict[str, object]:
+    return {"tag": message["tag"]} if "tag" in message else {}
+
+
+def description_page(description: Mapping[str, Any]) -> str:
+    """Return the description of the interface as a page."""
+    rows = [
+        (f"{method.upper()} {path}", what["summary"])
+        for path, methods in description["paths"].items()
+        for method, what in methods.items()
+    ]
+    messages = [
+        (name, ", ".join(key for key in one["properties"] if key not in ("do", "tag", "who")),
+         one["description"].partition("\n")[0])
+        for name, one in description["components"]["schemas"].items()
+        if "do" in one.get("properties", {})
+    ]  # fmt: skip
+    info = description["info"]
+    return (
+        f"<!doctype html><meta charset=utf-8><title>{_escaped(info['title'])}</title>"
+        "<style>body{font:16px sans-serif;margin:2em;max-width:60em}td{padding:.2em 1em .2em 0;"
+        "vertical-align:top}</style>"
+        f"<h1>{_escaped(info['title'])}</h1><p>{_escaped(info['description'])} "
+        "<a href=openapi.json>openapi.json</a></p>"
+        f"<table>{_rows(rows)}</table><h2>Messages</h2><table>{_rows(messages)}</table>"
+    )
+
+
+def _rows(rows: Iterable[Iterable[str]]) -> str:
+    return "".join(f"<tr>{''.join(f'<td>{_escaped(cell)}' for cell in row)}" for row in rows)
+
+
+def _escaped(text: str) -> str:
+    return html.escape(text)

@@ -1,0 +1,193 @@
+"""OpenAPI 3.1 description of the interface for programs, derived from the types of its values."""
+
+import inspect
+import types
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
+from importlib.metadata import version
+from typing import Any, ForwardRef, Literal, Union, get_args, get_origin, get_type_hints
+
+from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
+from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.model.outcome import Outcome
+from gazerig.robot.remote.socket_io import VERSION
+
+Schema = dict[str, Any]
+_PLAIN = {bool: "boolean", int: "integer", float: "number", str: "string", type(None): "null"}
+_REQUESTS = QUESTIONS | CHANGES
+
+
+class Schemas:
+    """JSON Schemas of types; those with names are collected.
+
+    Attributes:
+        named: name -> schema of each class.
+    """
+
+    def __init__(self) -> None:
+        self.named: dict[str, Schema] = {}
+
+    def of(self, kind: Any) -> Schema:
+        """Return the schema of a type; values of a rig file may be anything."""
+        origin, inner = get_origin(kind), get_args(kind)
+        if kind in _PLAIN:
+            return {"type": _PLAIN[kind]}
+        if is_dataclass(kind) or hasattr(kind, "_fields"):
+            return self._reference(kind)
+        if origin is Literal:
+            return {"enum": list(inner)}
+        if origin in (Union, types.UnionType):
+            return {"anyOf": [self.of(one) for one in inner]}
+        if origin is tuple and inner[-1] is not ...:
+            each = [self.of(one) for one in inner]
+            return {"type": "array", "prefixItems": each, "minItems": len(each), "items": False}
+        if origin is tuple:
+            return {"type": "array", "items": self.of(inner[0])}
+        if inner and issubclass(origin, Mapping):
+            return {"type": "object", "additionalProperties": self.of(inner[1])}
+        if isinstance(kind, ForwardRef | str):  # the recursive Value
+            return {}
+        raise TypeError(f"no schema for {kind}")
+
+    def _reference(self, kind: Any) -> Schema:
+        if kind.__name__ not in self.named:
+            self.named[kind.__name__] = {}  # for a type within itself
+            properties, needed = self.fields(kind)
+            self.named[kind.__name__] = {
+                "type": "object",
+                "description": inspect.getdoc(kind) or "",
+                "properties": properties,
+                "required": needed,
+            }
+        return {"$ref": f"#/components/schemas/{kind.__name__}"}
+
+    def fields(self, kind: Any) -> tuple[Schema, list[str]]:
+        """Return the schemas of a class's fields, and the names of those without defaults."""
+        hints = get_type_hints(kind)
+        if is_dataclass(kind):
+            optional = {f.name for f in fields(kind) if f.default is not MISSING}
+            names = [f.name for f in fields(kind)]
+        else:
+            optional, names = set(kind._field_defaults), list(kind._fields)
+        found = {name: self.of(hints[name]) for name in names}
+        return found, [name for name in names if name not in optional]
+
+
+def _message(name: str, description: str, properties: Schema, needed: list[str]) -> Schema:
+    tag = {"type": ["string", "integer"], "description": "comes back with the answer"}
+    return {
+        "title": name,
+        "type": "object",
+        "description": description,
+        "properties": {"do": {"const": name}, **properties, "tag": tag},
+        "required": ["do", *needed],
+        "additionalProperties": False,
+    }
+
+
+def messages(schemas: Schemas) -> dict[str, Schema]:
+    """Return the schema of each message of a program, by its verb."""
+    found = {}
+    for name, (text, kinds) in _REQUESTS.items():
+        properties = {field: schemas.of(kind) for field, kind in kinds.items()}
+        found[name] = _message(name, text, properties, list(properties))
+    for name, kind in ORDERS.items():
+        found[name] = _message(name, inspect.getdoc(kind) or "", *schemas.fields(kind))
+    return found
+
+
+@cache
+def api_description(base: str) -> dict[str, Any]:
+    """Return the OpenAPI description; ``base`` is the beginning of the paths."""
+    schemas = Schemas()
+    state, event, outcome = schemas.of(HeadState), schemas.of(HeadEvent), schemas.of(Outcome)
+    requests = messages(schemas)
+    text = {"type": "string"}
+    answer: Schema = {
+        "type": "object",
+        "properties": {
+            "ok": {}, "refused": text, "failed": text, "outcome": outcome, "why": text,
+            "tag": {"type": ["string", "integer"]},
+        },
+    }  # fmt: skip
+    named = {**schemas.named, **requests, "Answer": answer}
+    of_answer = {"$ref": "#/components/schemas/Answer"}
+    refusals = {
+        code: _answer(what, of_answer)
+        for code, what in {
+            "400": "Not a message", "403": "Wrong token or another site", "409": "Refused",
+            "413": "Too long", "429": "Too many requests", "503": "No head takes requests",
+        }.items()
+    }  # fmt: skip
+    bad = {code: refusals[code] for code in ("400", "403", "429", "503")}
+    body = {"oneOf": [{"$ref": f"#/components/schemas/{name}"} for name in requests]}
+    now = {
+        "type": "object",
+        "properties": {
+            "state": {"anyOf": [state, {"type": "null"}]},
+            "events": {"type": "array", "items": event},
+            "number": {"type": "integer", "description": "number of the newest event"},
+        },
+    }
+    operations: dict[str, tuple[str, str, list[Schema], Schema]] = {
+        "state": (
+            "get",
+            "Newest state of the head; events numbered above after",
+            [_query("after", {"type": "integer", "minimum": 0})],
+            {"200": _answer("State", {"type": "object", "properties": {"ok": now}}), **bad},
+        ),
+        "do": (
+            "post",
+            "Send one message; the answer to an order has its outcome",
+            [_query("wait_s", {"type": "number", "minimum": 0, "maximum": 15, "default": 10})],
+            {"200": _answer("Done", of_answer), **refusals},
+        ),
+        "socket": (
+            "get",
+            "Websocket: messages as of do, answers and outcomes; states at rate_hz; events",
+            [
+                _query("rate_hz", {"type": "number", "minimum": 1, "maximum": 60}),
+                _query("events", {"type": "boolean", "default": False}),
+            ],
+            {"101": {"description": "Open"}, **bad},
+        ),
+        "openapi.json": (
+            "get", "This description", [], {"200": _answer("OpenAPI 3.1", {"type": "object"})},
+        ),
+    }  # fmt: skip
+    paths: dict[str, Schema] = {
+        f"{base}/{name}": {method: {"summary": text, "parameters": queries, "responses": answers}}
+        for name, (method, text, queries, answers) in operations.items()
+    }
+    paths[f"{base}/do"]["post"]["requestBody"] = {"required": True, **_json(body)}
+    return {
+        "openapi": "3.1.0",
+        "info": {
+            "title": "gazerig",
+            "version": f"{VERSION}.0.0",
+            "summary": f"gazerig {version('gazerig')}",
+            "description": "Control of a running head by programs in any language.",
+        },
+        "paths": paths,
+        "components": {
+            "schemas": named,
+            "securitySchemes": {
+                "bearer": {"type": "http", "scheme": "bearer"},
+                "token": {"type": "apiKey", "in": "query", "name": "token"},
+            },
+        },
+        "security": [{"bearer": []}, {"token": []}],
+    }
+
+
+def _json(schema: Schema) -> Schema:
+    return {"content": {"application/json": {"schema": schema}}}
+
+
+def _answer(description: str, schema: Schema) -> Schema:
+    return {"description": description, **_json(schema)}
+
+
+def _query(name: str, schema: Schema) -> Schema:
+    return {"name": name, "in": "query", "required": False, "schema": schema}

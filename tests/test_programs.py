@@ -1,0 +1,492 @@
+"""Programs of the network command a running head: real bytes through HTTP and a websocket."""
+
+import contextlib
+import json
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import urlsplit
+
+import jsonschema
+import pytest
+from branch import Branch, gazerig
+from page_visitor import fetch
+from shown_page import free_port
+from slow_rigs import at_rate
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from gazerig.drivers.errors import DriverError
+from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
+from gazerig.robot.control.gaze_events import EVENT_KINDS
+from gazerig.robot.dashboard.door import programs
+from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.remote.openapi import api_description
+
+PATIENCE_S = 60.0
+ROOT = Path(__file__).parents[1]
+
+
+class Rig(NamedTuple):
+    """A head in another process, with a page."""
+
+    url: str
+    token: str
+    client: RobotClient
+
+    @property
+    def base(self) -> str:
+        return f"{self.url}/api/v1"
+
+    def get(self, path: str, **headers: str) -> tuple[int, Any]:
+        status, _, text = fetch(f"{self.base}{path}", {**self.shown, **headers})
+        return status, json.loads(text)
+
+    def post(self, body: object, query: str = "", **headers: str) -> tuple[int, Any]:
+        data = body if isinstance(body, bytes) else json.dumps(body).encode()
+        status, _, text = fetch(f"{self.base}/do{query}", {**self.shown, **headers}, data)
+        return status, json.loads(text)
+
+    @property
+    def shown(self) -> dict[str, str]:
+        return {"Authorization": f"Bearer {self.token}"}
+
+    def dial(self, query: str = "", origin: str | None = None, token: str = "") -> ClientConnection:
+        address = self.base.replace("http", "ws", 1)
+        return connect(
+            f"{address}/socket?token={token or self.token}{query}",
+            origin=Origin(origin) if origin is not None else None,
+            compression=None,
+            max_size=None,
+            open_timeout=PATIENCE_S,
+            close_timeout=1.0,
+        )
+
+    def ticks(self) -> int:
+        return int(self.client.status()["ticks"])
+
+    def until(self, right: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
+        """Wait until the status is as it should be."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not right(now := self.client.status()):
+            assert time.monotonic() < end_s, now
+            time.sleep(0.02)
+        return now
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[Rig]:
+    folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
+    file = at_rate(folder, "desk", 80.0)
+    address = f"127.0.0.1:{free_port()}"
+    with pytest.MonkeyPatch.context() as patch, (folder / "log").open("w") as log:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        words = ("run", file, "--mock", "--name", "eva", "--no-browser", "--page", address)
+        process = Branch(gazerig(*words), stdout=log, stderr=log, env=dict(os.environ), cwd=folder)
+        try:
+            client = reached(process)
+            end_s = time.monotonic() + PATIENCE_S
+            while not (page := client.status()["page"]) or not client.status()["ticks"]:
+                assert time.monotonic() < end_s, (folder / "log").read_text()
+                time.sleep(0.1)
+            parts = urlsplit(page)
+            url = f"{parts.scheme}://{parts.netloc}"
+            yield Rig(url, parts.query.removeprefix("token="), client)
+            client.close()
+        finally:
+            process.terminate()
+            process.wait(PATIENCE_S)
+            shutil.rmtree(folder)
+
+
+def reached(process: subprocess.Popen[Any]) -> RobotClient:
+    end_s = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            return RobotClient.connect("eva", "the test")
+        except DriverError:
+            assert time.monotonic() < end_s and process.poll() is None
+            time.sleep(0.1)
+
+
+@pytest.fixture(autouse=True)
+def free(rig: Rig) -> Iterator[None]:
+    """Leave each test with a head that moves and chooses by itself."""
+    yield
+    time.sleep(0.5)  # the limits of rates fill again
+    if rig.client.status()["stopped"]:
+        time.sleep(2.1)
+        rig.client.resume(confirmed=True)
+    rig.client.look_freely()
+    rig.client.jog_free()
+
+
+def heard(end: ClientConnection, key: str, value: object = None) -> dict[str, Any]:
+    """Return the next message with a key, and a value if one is given."""
+    stop_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < stop_s:
+        message: dict[str, Any] = json.loads(end.recv(timeout=PATIENCE_S))
+        if key in message and value in (None, message[key]):
+            return message
+    raise TimeoutError(key)
+
+
+def ask(end: ClientConnection, **message: object) -> None:
+    end.send(json.dumps(message))
+
+
+LEFT, RIGHT = [1.0, 0.3, 0.3], [1.0, -0.3, 0.3]
+
+
+# What they are for
+
+
+def test_state_is_that_of_the_socket(rig: Rig) -> None:
+    status, answer = rig.get("/state")
+    assert status == 200 and answer["ok"]["events"] == []
+    state = answer["ok"]["state"]
+    mine, _ = rig.client.state()
+    assert mine is not None and state["joints"].keys() == mine.joints.keys()
+    assert set(state["lead"]) == set(mine.lead._fields)
+    _, answer = rig.get("/state?after=0")
+    assert {event["kind"] for event in answer["ok"]["events"]} <= set(EVENT_KINDS)
+
+
+def test_orders_have_outcomes(rig: Rig) -> None:
+    status, answer = rig.post({"do": "look_at", "p_world_m": LEFT, "tag": "a"}, "?wait_s=15")
+    assert status == 200 and answer["tag"] == "a" and answer["outcome"] == "arrived"
+    assert rig.post({"do": "look_at", "p_world_m": [-1, 0.1, 0.3]})[1]["outcome"] == "out of reach"
+    assert rig.post({"do": "play", "gesture": "nod"}, "?wait_s=15")[1]["outcome"] == "arrived"
+    status, answer = rig.post({"do": "look_at_person", "id": 99})
+    assert status == 409 and "99" in answer["refused"] and answer["reply"]["refused"]
+    assert "outcome" not in rig.post({"do": "play", "gesture": "nod"}, "?wait_s=0")[1]
+    assert "neck_yaw" in rig.post({"do": "status"})[1]["ok"]["joints_deg"]
+
+
+def test_orders_over_the_websocket_have_outcomes_by_tag(rig: Rig) -> None:
+    with rig.dial() as end:
+        assert heard(end, "tag", "hello")["ok"] == {
+            "version": 1, "rig": rig.client.status()["rig"], "name": "eva", "pid": rig.client.pid,
+        }  # fmt: skip
+        ask(end, do="look_at", p_world_m=LEFT, who="a show", tag=1)
+        assert heard(end, "tag", 1)["ok"]["reply"]["lead"] > 0
+        assert heard(end, "outcome") == {"outcome": "arrived", "why": "", "tag": 1}
+        led = rig.client.status()["led"]
+        assert led.startswith("a show at 127.0.0.1 (process ")
+        time.sleep(1.5)  # renewed as long as it is there
+        assert rig.client.status()["led"] == led
+        ask(end, do="look_at", p_world_m=RIGHT, tag=2)
+        ask(end, do="look_at", p_world_m=LEFT, tag=3)
+        outcomes = [heard(end, "outcome") for _ in range(2)]
+        assert {one["tag"]: one["outcome"] for one in outcomes} in (
+            {2: "taken over", 3: "arrived"},
+            {2: "arrived", 3: "arrived"},
+        )
+
+
+def test_states_come_at_the_rate_that_was_asked_for(rig: Rig) -> None:
+    with rig.dial("&rate_hz=5") as slow, rig.dial("&rate_hz=30&events=true") as quick:
+        for end, rate_hz in ((slow, 5.0), (quick, 30.0)):
+            heard(end, "state")
+            began_s, count = time.monotonic(), 10
+            times = [heard(end, "state")["state"]["t_s"] for _ in range(count)]
+            assert times == sorted(times) and len(set(times)) == count
+            if end is slow:
+                assert time.monotonic() - began_s > 0.7 * count / rate_hz
+        kinds: set[str] = set()
+        while not {"saccade_start", "saccade_landing", "target"} <= kinds:
+            event = heard(quick, "event")["event"]
+            assert set(event) == {"number", "t_s", "text", "kind", "subject"}
+            kinds.add(event["kind"])
+
+
+# Leaving
+
+
+@pytest.mark.parametrize("leave", ["closed", "killed"])
+def test_who_leaves_while_leading_gives_control_back(rig: Rig, leave: str) -> None:
+    end = rig.dial()
+    ask(end, do="jog", angles_rad=[["neck_yaw", 0.1]], tag=1)
+    heard(end, "tag", 1)
+    rig.until(lambda now: now["led"])
+    if leave == "closed":
+        end.close()
+    else:  # its computer is gone: no more packets, no farewell
+        end.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
+        end.socket.close()
+    rig.until(lambda now: not now["led"])
+
+
+def test_who_hangs_while_leading_gives_control_back(rig: Rig) -> None:
+    """A suspended program answers no ping, though its connection stays open."""
+    parts = urlsplit(rig.url)
+    with socket.create_connection((parts.hostname or "", parts.port or 0)) as end:
+        end.sendall(
+            f"GET /api/v1/socket?token={rig.token} HTTP/1.1\r\nHost: {parts.netloc}\r\n"
+            "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode()
+        )
+        text = json.dumps({"do": "look_at", "p_world_m": LEFT}).encode()
+        end.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
+        rig.until(lambda now: now["led"])
+        rig.until(lambda now: not now["led"])
+
+
+def test_a_posted_order_ends_by_its_time_or_after_its_request(rig: Rig) -> None:
+    began_s = time.monotonic()
+    rig.post({"do": "look_at", "p_world_m": LEFT, "for_s": 2.5}, "?wait_s=0")
+    rig.until(lambda now: not now["led"])
+    assert time.monotonic() - began_s > 2.0
+    rig.post({"do": "look_at", "p_world_m": RIGHT}, "?wait_s=0")
+    rig.until(lambda now: not now["led"])
+
+
+def test_levels_and_locals_stay_as_they_are_for_others(rig: Rig) -> None:
+    """Who leads on this computer is not disturbed by the leaving of a program of the network."""
+    with rig.dial() as end:
+        ask(end, do="look_at", p_world_m=LEFT, tag=1)
+        heard(end, "tag", 1)
+        rig.client.look_at(*RIGHT)
+    time.sleep(1.5)
+    assert rig.client.status()["led"].startswith("the test")
+
+
+def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig) -> None:
+    with rig.dial() as end:
+        ask(end, do="stop", why="a hand", who="a show", tag="s")
+        assert heard(end, "tag", "s") == {"ok": {"notes": []}, "tag": "s"}
+        assert rig.until(lambda now: now["stopped"])["stopped"] == "a hand"
+        time.sleep(2.1)
+        ask(end, do="resume", who="another", tag="r")
+        assert "no hand" in heard(end, "tag", "r")["refused"]
+        ask(end, do="resume", who="a show", tag="q")
+        assert "ok" in heard(end, "tag", "q")
+    rig.until(lambda now: not now["stopped"])
+    assert rig.post({"do": "stop"})[0] == 200
+    rig.until(lambda now: now["stopped"])
+
+
+# Bad input
+
+
+DEEP = b'{"do":' + b"[" * 20000 + b"]" * 20000 + b"}"
+BAD = (
+    (b"", 400, "not JSON"),
+    (b"{", 400, "not JSON"),
+    (b"\xff\xfe", 400, "not JSON"),
+    (b"7", 400, "not a JSON object"),
+    (DEEP, 400, "nested too deep"),
+    (b'{"do": "status", "tag": [1]}', 400, "tag: a whole number or text"),
+    (b'{"do": "look_at", "p_world_m": [NaN, 0, 0]}', 400, "NaN is not a number"),
+    (b'{"do": "look_at", "p_world_m": [1e999, 0, 0]}', 409, "not finite numbers"),
+    (b'{"do": "look_at", "p_world_m": [1, 0]}', 409, "three finite numbers"),
+    (b'{"do": "look_at", "p_world_m": [1, 0, 0], "x": 1}', 409, "look_at takes p_world_m, who"),
+    (b'{"do": "dance"}', 409, "there is hello"),
+    (b'{"do": 7}', 409, "there is hello"),
+    (b'{"do": "tune", "changes": []}', 409, "request set"),
+    (b'{"do": "hello", "version": 2}', 409, "version 2 of the messages: this rig has 1"),
+    (b'{"do": "save", "path": "/etc/passwd.yaml"}', 409, "from the page only files in"),
+    (b'{"do": "character", "name": "/etc/passwd"}', 409, "and below can be named"),
+    (b" " * 70_000, 413, "longer than 65536 bytes"),
+)
+
+
+@pytest.mark.parametrize(("body", "status", "text"), BAD, ids=[text for _, _, text in BAD])
+def test_a_bad_message_gets_one_clear_error(rig: Rig, body: bytes, status: int, text: str) -> None:
+    found, answer = rig.post(body)
+    assert found == status and list(answer) in (["refused"], ["refused", "tag"]), answer
+    assert text in answer["refused"] and "\n" not in answer["refused"]
+    with rig.dial() as end:
+        heard(end, "tag", "hello")
+        with contextlib.suppress(UnicodeDecodeError):
+            end.send(body.decode())
+            assert json.loads(end.recv(timeout=PATIENCE_S)) == answer
+        ask(end, do="characters", tag=1)  # the connection goes on
+        assert "shy" in heard(end, "tag", 1)["ok"]
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("/socket?rate_hz=0", "rate_hz=0: a number 1..60"),
+        ("/socket?rate_hz=61", "1..60"),
+        ("/socket?rate_hz=nan", "1..60"),
+        ("/socket?events=1", "true or false"),
+        ("/state?after=-1", "after=-1"),
+    ],
+)
+def test_a_wrong_query_gets_one_clear_error(rig: Rig, path: str, text: str) -> None:
+    status, answer = rig.get(path, Upgrade="websocket", Connection="Upgrade")
+    assert status == 400 and text in answer["refused"]
+
+
+def test_other_methods_paths_and_versions_are_named(rig: Rig) -> None:
+    for path in ("/../v2/state", "/nothing", "/do"):
+        status, answer = rig.get(path)
+        assert status == 404 and "version 1 is at /api/v1/" in answer["refused"]
+    assert rig.get("/socket")[0] == 426
+
+
+def test_binary_and_huge_frames(rig: Rig) -> None:
+    with rig.dial() as end:
+        heard(end, "tag", "hello")
+        end.send(b"\x00\x01")
+        assert "not text" in heard(end, "refused")["refused"]
+        end.send(" " * 1_000_000)
+        with pytest.raises(ConnectionClosed) as closed:
+            end.recv(timeout=PATIENCE_S)
+        assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
+    assert rig.get("/state")[0] == 200
+
+
+# Who may come in
+
+
+def test_without_the_token_nothing_is_answered(rig: Rig) -> None:
+    for headers in ({"Authorization": "Bearer wrong"}, {"Authorization": "nonsense"}):
+        status, answer = rig.get("/state", **headers)
+        assert status == 403 and "show the token" in answer["refused"]
+        status, answer = rig.post({"do": "status"}, **headers)
+        assert status == 403 and "gazerig ctl rigs" in answer["refused"]
+    with pytest.raises(InvalidStatus) as refused:
+        rig.dial(token="wrong")
+    assert refused.value.response.status_code == 403
+
+
+def test_a_page_of_another_site_is_refused_even_with_the_token(rig: Rig) -> None:
+    status, answer = rig.post({"do": "status"}, Origin="http://elsewhere.example")
+    assert status == 403 and "another origin" in answer["refused"]
+    for origin in ("http://elsewhere.example", "http://localhost:1"):
+        with pytest.raises(InvalidStatus):
+            rig.dial(origin=origin)
+    with rig.dial(origin="null") as own:  # a file that its user has opened and given the token
+        heard(own, "tag", "hello")
+    with pytest.raises(InvalidStatus):
+        rig.dial(origin="null", token="wrong")
+    status, _, _ = fetch(f"{rig.base}/state", {**rig.shown, "Host": "elsewhere.example"})
+    assert status == 403
+
+
+# Floods and slow readers
+
+
+def test_a_flood_is_refused_and_costs_the_loop_nothing(rig: Rig) -> None:
+    ticks, began_s = rig.ticks(), time.monotonic()
+    with rig.dial() as flood:
+        heard(flood, "tag", "hello")
+        for _ in range(1500):
+            flood.send('{"do": "look_at", "p_world_m": [1, 0, 0.3]}')
+        assert "too many requests" in heard(flood, "refused")["refused"]
+        ask(flood, do="stop", why="in the flood", tag="s")
+        with rig.dial() as other:
+            ask(other, do="stop", why="another", tag=1)
+            assert "ok" in heard(other, "tag", 1)
+        assert "ok" in heard(flood, "tag", "s")
+    rig.until(lambda now: now["stopped"])
+    rate_hz = (rig.ticks() - ticks) / (time.monotonic() - began_s)
+    assert rate_hz > 60.0  # of 80
+
+
+def test_a_slow_reader_loses_states_and_delays_nobody(rig: Rig) -> None:
+    parts = urlsplit(rig.url)
+    with socket.socket() as lazy:
+        lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        lazy.connect((parts.hostname, parts.port))
+        lazy.sendall(
+            f"GET /api/v1/socket?rate_hz=60&events=true&token={rig.token} HTTP/1.1\r\n"
+            f"Host: {parts.netloc}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "Sec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode()
+        )
+        with rig.dial("&rate_hz=20") as quick:
+            times = [heard(quick, "state")["state"]["t_s"] for _ in range(60)]
+        assert times[-1] - times[0] < 6.0
+        now_s = rig.client.state()[0].t_s  # type: ignore[union-attr]
+        assert now_s - times[-1] < 1.0
+    assert rig.get("/state")[0] == 200
+
+
+def test_a_program_too_many_takes_the_place_of_the_oldest(rig: Rig) -> None:
+    with contextlib.ExitStack() as stack:
+        first = stack.enter_context(rig.dial())
+        for _ in range(programs.MOST_PROGRAMS):
+            stack.enter_context(rig.dial())
+        with pytest.raises(ConnectionClosed):
+            while True:
+                first.recv(timeout=PATIENCE_S)
+        assert rig.get("/state")[0] == 200
+
+
+def test_what_waits_for_a_program_is_bounded() -> None:
+    async def fill() -> None:
+        program = programs.Program(60.0, True)
+        for number in range(1000):
+            program.say({"number": number})
+        sent = []
+        while text := program.outgoing():
+            sent.append(json.loads(text)["number"])
+        assert sent == list(range(1000 - 256, 1000))
+
+    import asyncio
+
+    asyncio.run(fill())
+
+
+# The description
+
+
+def test_the_description_describes_what_is_sent(rig: Rig) -> None:
+    status, described = rig.get("/openapi.json")
+    assert status == 200 and described == json.loads(json.dumps(api_description("/api/v1")))
+    schemas = described["components"]["schemas"]
+    verbs = {*QUESTIONS, *CHANGES, *ORDERS}
+    assert verbs == {one["title"] for one in schemas.values() if "do" in one.get("properties", {})}
+    for schema in schemas.values():
+        jsonschema.Draft202012Validator.check_schema(schema)
+
+    def check(value: object, name: str) -> None:
+        whole = {"$ref": f"#/components/schemas/{name}", "components": described["components"]}
+        jsonschema.Draft202012Validator(whole).validate(value)
+
+    _, answer = rig.get("/state?after=0")
+    check(answer["ok"]["state"], "HeadState")
+    for event in answer["ok"]["events"]:
+        check(event, "HeadEvent")
+    check({"do": "look_at", "p_world_m": LEFT, "for_s": 2.0, "tag": 1}, "look_at")
+    check({"do": "look_at", "p_world_m": None}, "look_at")
+    for wrong in ({"do": "look_at"}, {"do": "look_at", "p_world_m": [1, 2]}):
+        with pytest.raises(jsonschema.ValidationError):
+            check(wrong, "look_at")
+
+
+def test_the_page_lists_every_message(rig: Rig) -> None:
+    status, headers, text = fetch(f"{rig.base}/?token={rig.token}")
+    assert status == 200 and headers["Content-Type"].startswith("text/html")
+    assert all(f"<td>{verb}<td>" in text for verb in (*QUESTIONS, *CHANGES, *ORDERS))
+
+
+# Examples
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+def test_the_node_example_follows_a_person(rig: Rig) -> None:
+    node = shutil.which("node")
+    assert node is not None
+    file = ROOT / "examples" / "follow.mjs"
+    process = subprocess.Popen(
+        [node, str(file), f"{rig.url}/?token={rig.token}"], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        rig.until(lambda now: "look at person" in now["led"])
+        assert process.stdout is not None and "person" in process.stdout.readline()
+    finally:
+        process.kill()
+        process.communicate()
+    rig.until(lambda now: not now["led"])
