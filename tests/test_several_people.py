@@ -43,8 +43,8 @@ def test_surpluses_are_bounded_fade_and_are_forgotten() -> None:
     shared = SharedAttention()
     for k in range(100):
         surpluses = shared.step([1, 2, 3], [1.0, 1.0, 1.0], 1, 0.5 * k)
-    assert surpluses == [5.0, 0.0, 0.0]
-    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 60.0)[0] < 2.0
+    assert surpluses == [8.0, 0.0, 0.0]
+    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 60.0)[0] < 3.0
     for t_s in (130.0, 131.0):
         shared.step([5, 6], [1.0, 1.0], -1, t_s)
     assert sorted(shared._surpluses) == [5, 6]

@@ -35,6 +35,8 @@ class Stay(NamedTuple):
 
 
 NO_STAY = Stay(-1, 0.0)
+_FEW = 3
+"""Number of people up to which looks have an additional time."""
 
 
 class Habituation:
@@ -102,7 +104,8 @@ class Habituation:
         if rate == 0.0 or floor == 1.0:
             return [1.0] * len(ids)
         surpluses = self._shared.step(ids, weights, attended_id, t_s)
-        extra = [stays.extra_s if id == stays.id else 0.0 for id in ids]
+        extra_s = stays.extra_s if len(ids) <= _FEW else 0.0  # everyone of a crowd has turns
+        extra = [extra_s if id == stays.id else 0.0 for id in ids]
         return [
             floor + (1.0 - floor) * exp(-rate * max(0.0, one - more))
             for one, more in zip(surpluses, extra, strict=True)

@@ -17,7 +17,7 @@ class HabituationParams:
     rule_floor: Annotated[float, Bounds(0, 1),
         "lowest salience factor of one of several targets of a rule; lower: the gaze changes sooner between people"] = 0.0
     stay_s: Annotated[float, Bounds(0, 60),
-        "mean of the time, drawn for each look at one of several people, by which it lasts longer than a balance between them asks "
+        "mean of the time, drawn for each look at one of two or three people, by which it lasts longer than a balance between them asks "
         "for; 0: none"] = 2.0
     stay_spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of that time; larger: more long looks among short ones"] = 1.2
     rhythm_ratio: Annotated[float, Bounds(0, 1),
