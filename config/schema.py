@@ -175,7 +175,7 @@ def _channel(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
     if not isinstance(params, HobbyBoardParams):
         return
     try:
-        params.check(_setup(name, rig))
+        params.check_servo(_setup(name, rig))
     except ValueError as error:
         what = str(error).removeprefix(f"channel {joint.id}: ")
         yield f"joints.{name}{'' if what.startswith('its range') else '.id'}", what

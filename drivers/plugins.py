@@ -233,7 +233,7 @@ class Registration:
     version: str = ""
 
     @property
-    def ours(self) -> bool:
+    def is_ours(self) -> bool:
         """Return whether it comes with gazerig."""
         return self.package == OUR_PACKAGE
 

@@ -36,7 +36,7 @@ def test_answers_after_the_end_lengthen_patience():
     for _ in range(2 * WINDOW):
         timeout.update(0.0)
     for expected in (0.001, 0.001, 0.002, 0.002, 0.002, 0.004):
-        timeout.missed()
+        timeout.record_late_answer()
         assert timeout.seconds == expected or expected == 0.004
 
 
@@ -58,10 +58,10 @@ def settled(least_s=0.001, most_s=0.02):
 
 def test_the_reserve_covers_a_pause_and_a_success_costs_nothing_of_it():
     timeout = settled()
-    assert timeout.with_reserve(5.0) == pytest.approx(0.001 + RESERVE_S)
+    assert timeout.reserve_timeout_s(5.0) == pytest.approx(0.001 + RESERVE_S)
     timeout.update(0.009)
     assert timeout.seconds == 0.001
-    assert timeout.with_reserve(5.0) == pytest.approx(0.001 + RESERVE_S)
+    assert timeout.reserve_timeout_s(5.0) == pytest.approx(0.001 + RESERVE_S)
 
 
 def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
@@ -69,26 +69,26 @@ def test_waiting_in_vain_costs_one_hundredth_of_the_time_at_most():
     now_s, waited_s = 100.0, 0.0
     for _ in range(20_000):
         now_s += 0.005
-        beyond_s = timeout.with_reserve(now_s) - timeout.seconds
+        beyond_s = timeout.reserve_timeout_s(now_s) - timeout.seconds
         now_s += beyond_s
         waited_s += beyond_s
         timeout.consume_reserve(beyond_s, now_s)
     assert waited_s <= RESERVE_S + 1.02 * REFILL * (now_s - 100.0)
     # Half a second later there is some of it again, and after a while all.
-    assert timeout.with_reserve(now_s + 0.5) == pytest.approx(0.001 + 0.5 * REFILL, rel=0.05)
-    assert timeout.with_reserve(now_s + 5.0) == pytest.approx(0.001 + RESERVE_S)
+    assert timeout.reserve_timeout_s(now_s + 0.5) == pytest.approx(0.001 + 0.5 * REFILL, rel=0.05)
+    assert timeout.reserve_timeout_s(now_s + 5.0) == pytest.approx(0.001 + RESERVE_S)
 
 
 def test_a_reserve_never_goes_beyond_the_longest_time_out():
     timeout = AdaptiveTimeout(0.02, 0.02)
-    assert timeout.with_reserve(1.0) == 0.02
+    assert timeout.reserve_timeout_s(1.0) == 0.02
     timeout.consume_reserve(-0.01, 1.0)
-    assert timeout.with_reserve(1.0) == 0.02
+    assert timeout.reserve_timeout_s(1.0) == 0.02
 
 
 def test_no_two_views_that_may_follow_each_other_have_the_same_length():
     block = indirect_blocks(MODELS["xl330-m077"], 53)[0]
-    one_by_one = DYNAMIXEL.read_plan([], DynamixelParams(), None).alone
+    one_by_one = DYNAMIXEL.read_plan([], DynamixelParams(), None).single_windows
     alone = {view.length for view in one_by_one._spare}
     assert len(alone) == len(one_by_one._spare)
     for turns in (direct_windows(), indirect_windows(block)):
@@ -99,17 +99,17 @@ def test_no_two_views_that_may_follow_each_other_have_the_same_length():
 
 def test_after_trouble_views_differ_until_it_has_been_calm_for_a_while():
     turns = direct_windows()
-    assert turns.next().length == 10
+    assert turns.next_window().length == 10
     seen = []
     for k in range(4):
         turns.record_trouble(5.0 + k)
-        seen.append(turns.next().length)
+        seen.append(turns.next_window().length)
     assert len(set(seen)) == 4
     assert not {10, 11}.intersection(seen)
     turns.end_trouble(8.0 + 0.9 * CALM_S)
-    assert turns.next().length not in (10, 11)
+    assert turns.next_window().length not in (10, 11)
     turns.end_trouble(8.0 + CALM_S)
-    assert turns.next().length in (10, 11)
+    assert turns.next_window().length in (10, 11)
 
 
 def test_the_indirect_map_fits_every_window():
@@ -125,7 +125,7 @@ def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
     tries, now_s = [], 10.0
     while now_s < 16.0:
         now_s = round(now_s + 0.0625, 4)
-        if link.due(now_s):
+        if link.is_due(now_s):
             tries.append(now_s - 10.0)
             link.record_failed(now_s)
     waits = [b - a for a, b in zip([0.0, *tries], tries, strict=False)]
@@ -139,11 +139,11 @@ def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
 def test_the_fourth_restart_within_ten_seconds_is_one_too_many():
     health = ServoHealth({3: ServoConfig(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, EventLog())
     for t_s in (0.0, 4.0, 8.0):
-        assert not health.exhausted(3, t_s)
+        assert not health.has_exhausted_restarts(3, t_s)
         health.record_restarted(3, t_s)
-    assert not health.exhausted(3, 10.1)
+    assert not health.has_exhausted_restarts(3, 10.1)
     health.record_restarted(3, 10.1)
-    assert health.exhausted(3, 11.0)
+    assert health.has_exhausted_restarts(3, 11.0)
     assert health.faults == {3: AGAIN_AND_AGAIN}
 
 

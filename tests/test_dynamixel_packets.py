@@ -9,7 +9,7 @@ from gazerig.drivers.dynamixel.protocol import (
     SyncWrite,
     bytes_missing,
     instruction,
-    statuses,
+    parse_statuses,
     sync_read,
 )
 from gazerig.sim_mock.dynamixel.packets import status
@@ -55,28 +55,28 @@ def test_what_looks_like_a_header_is_stuffed():
 
 
 def test_the_everyday_stuffed_status_is_understood():
-    (found,) = statuses(EVERYDAY)
+    (found,) = parse_statuses(EVERYDAY)
     assert (found.id, found.error, found.intact) == (1, 0, True)
     assert struct.unpack("<hii", found.params) == (-1, -3, 2048)
 
 
 def test_echo_and_noise_are_passed_over():
     request = sync_read((1,), 126, 10)
-    found = statuses(request + b"\xff\xff\xfd" + EVERYDAY + b"\x00")
+    found = parse_statuses(request + b"\xff\xff\xfd" + EVERYDAY + b"\x00")
     assert [(s.id, s.intact) for s in found] == [(1, True)]
 
 
 def test_a_damaged_length_hides_only_its_own_status():
     bad = bytearray(status(1, 0, bytes(10)))
     bad[5] = 200
-    found = statuses(bytes(bad) + status(2, 0, bytes(10)))
+    found = parse_statuses(bytes(bad) + status(2, 0, bytes(10)))
     assert [s.id for s in found if s.intact] == [2]
 
 
 @given(st.lists(st.tuples(st.integers(0, 252), st.integers(0, 255), st.binary(max_size=12))))
 def test_every_status_comes_back_as_it_was(rows):
     raw = b"".join(status(i, error, params) for i, error, params in rows)
-    assert [(s.id, s.error, s.params, s.intact) for s in statuses(raw)] == [
+    assert [(s.id, s.error, s.params, s.intact) for s in parse_statuses(raw)] == [
         (*r, True) for r in rows
     ]
 

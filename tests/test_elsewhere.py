@@ -153,7 +153,7 @@ def links(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[MessageLink, Messag
     """Both ends of a link over the loopback, as parent and child have them."""
     monkeypatch.setattr(message_link, "HAS_PAIRS", False)
     offered = message_link.create_links(1)
-    [ours], [word] = offered.ours, offered.words
+    [ours], [word] = offered.parent_ends, offered.arguments
     ours.setblocking(False)
     theirs = message_link.open_link(word, offered.variables[message_link.TOKEN_VARIABLE])
     yield ours, theirs
@@ -209,7 +209,7 @@ def test_a_link_that_is_not_read_refuses_and_never_waits(
 def test_a_stranger_is_not_let_in_and_keeps_nobody_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(message_link, "HAS_PAIRS", False)
     offered = message_link.create_links(1)
-    [ours], [word] = offered.ours, offered.words
+    [ours], [word] = offered.parent_ends, offered.arguments
     with socket.create_connection(("127.0.0.1", int(word[5:]))) as stranger:
         stranger.sendall(b"0" * 32)
         child = message_link.open_link(word, offered.variables[message_link.TOKEN_VARIABLE])

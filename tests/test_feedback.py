@@ -59,7 +59,7 @@ def test_an_exchange_begins_with_nobody_and_takes_servo_by_servo(columns):
 
 def test_what_is_read_in_turn_stays_from_one_exchange_to_the_next(columns):
     columns.set_torque(2, True)
-    columns.name_fault(0, "overload")
+    columns.record_fault(0, "overload")
     columns.begin()
     for slot in range(3):
         columns._apply_one(slot, 1 + slot, 0.0, 0.0, 9.0)

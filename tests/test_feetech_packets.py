@@ -17,9 +17,9 @@ from gazerig.drivers.feetech.protocol import (
     bytes_missing,
     checksum,
     instruction,
+    parse_statuses,
     read,
     reg_write,
-    statuses,
     sync_read,
     sync_write,
     write,
@@ -75,7 +75,7 @@ params = st.binary(max_size=40)
 def test_statuses_come_out_as_they_went_in(sent, noise):
     noise = noise.replace(b"\xff", b"\x00")
     raw = noise + b"".join(status(i, p, e) for i, p, e in sent)
-    found = [s._replace(at=0) for s in statuses(raw) if s.intact]
+    found = [s._replace(offset=0) for s in parse_statuses(raw) if s.intact]
     wanted = [Status(i, e, p, True) for i, p, e in sent]
     # Data may look like a status inside or across others by chance: such are not believed.
     assert all(s in wanted for s in found)
@@ -88,7 +88,9 @@ def test_statuses_come_out_as_they_went_in(sent, noise):
 def test_one_flipped_bit_is_always_found(at, bit, data):
     raw = bytearray(status(3, data))
     raw[at] ^= 1 << bit
-    assert not any(s.intact and s.id == 3 and len(s.params) == 15 for s in statuses(bytes(raw)))
+    assert not any(
+        s.intact and s.id == 3 and len(s.params) == 15 for s in parse_statuses(bytes(raw))
+    )
 
 
 @given(st.integers(0, 20), st.binary(min_size=15, max_size=15), st.binary(min_size=15, max_size=15))
@@ -96,7 +98,7 @@ def test_a_lost_byte_is_never_made_up_by_the_next_header(at, first, second):
     """The next header's FF as checksum would be right once in 256 times."""
     whole = status(1, first)
     raw = whole[:at] + whole[at + 1 :] + status(2, second)
-    believed = [s for s in statuses(raw) if s.intact and s.id == 1 and len(s.params) == 15]
+    believed = [s for s in parse_statuses(raw) if s.intact and s.id == 1 and len(s.params) == 15]
     assert all(s.params == first for s in believed)
 
 
@@ -105,12 +107,12 @@ def test_a_lost_byte_whose_sum_fits_the_next_header():
     data = bytes((0xEE, *[0] * 13))
     raw = b"\xff\xff\x01\x11\x00" + data + b"\x00" + status(2, bytes(15))
     assert checksum(raw[2:20]) == raw[20] == 0xFF
-    assert [s.intact for s in statuses(raw)] == [False, False]
+    assert [s.intact for s in parse_statuses(raw)] == [False, False]
 
 
 def test_the_echo_of_a_question_is_not_an_answer_of_the_length_asked_for():
     for question, length in ((read(1, 56, 15), 15), (write(1, 41, b"\x05"), 0)):
-        assert all(len(s.params) != length for s in statuses(question))
+        assert all(len(s.params) != length for s in parse_statuses(question))
 
 
 @given(st.integers(1, 4), st.integers(0, 20), st.integers(0, 200))
@@ -122,7 +124,7 @@ def test_bytes_missing_is_exact_on_the_way(count, length, cut):
 
 @given(st.binary(max_size=200), st.integers(1, 5), st.integers(0, 31))
 def test_noise_never_raises_and_always_gets_an_end(raw, count, length):
-    statuses(raw)
+    parse_statuses(raw)
     assert 0 <= bytes_missing(raw, count, length) <= count * (length + 6)
 
 
@@ -139,7 +141,7 @@ def test_checksums_of_many_are_right_where_each_is(bodies):
 def test_a_stray_ff_before_an_answer_makes_it_no_other_servos(stray: bytes) -> None:
     """FF FF FF 01 ...: the header is the last two of them, and 255 is no servo."""
     answer = b"\xff\xff\x01\x02\x00\xfc"
-    (found,) = statuses(stray + answer)
+    (found,) = parse_statuses(stray + answer)
     assert found.id == 1 and found.intact
 
 

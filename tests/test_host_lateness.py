@@ -25,10 +25,10 @@ def test_few_late_answers_are_no_busy_computer():
     lateness = HostLateness()
     for k in range(BUSY - 1):
         lateness.record_late_answer(5.0 + 0.01 * k)
-    assert lateness.busy(5.1) == 0
+    assert lateness.late_answers(5.1) == 0
     lateness.record_late_answer(5.1)
-    assert lateness.busy(5.1) == BUSY
-    assert lateness.busy(5.2 + WITHIN_S) == 0
+    assert lateness.late_answers(5.1) == BUSY
+    assert lateness.late_answers(5.2 + WITHIN_S) == 0
 
 
 def test_what_servos_do_soon_after_a_late_computer_is_put_down_to_it():

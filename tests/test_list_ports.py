@@ -20,10 +20,10 @@ def test_access_and_holders(tmp_path):
     assert not access(str(device)).exists
     device.write_text("")
     found = access(str(device))
-    assert found.exists and not found.serial and found.group
+    assert found.exists and not found.is_device and found.group
     master, slave = os.openpty()
     try:
-        assert access(os.ttyname(slave)).serial
+        assert access(os.ttyname(slave)).is_device
     finally:
         os.close(master)
         os.close(slave)

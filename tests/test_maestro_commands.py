@@ -6,11 +6,11 @@ from hypothesis import strategies as st
 
 from gazerig.drivers.maestro.commands import (
     MaestroCodec,
+    adjacent_runs,
     crc7,
     decode_words,
     name_errors,
-    runs,
-    split,
+    seven_bit_bytes,
 )
 
 COMPACT = MaestroCodec()
@@ -66,8 +66,8 @@ def test_neighbours_share_a_command_where_the_board_has_it():
 
 
 def test_runs():
-    assert runs([]) == []
-    assert runs([0, 1, 3, 7, 8, 9]) == [[0, 1], [3], [7, 8, 9]]
+    assert adjacent_runs([]) == []
+    assert adjacent_runs([0, 1, 3, 7, 8, 9]) == [[0, 1], [3], [7, 8, 9]]
 
 
 def test_positions_are_two_full_bytes_low_byte_first():
@@ -89,7 +89,7 @@ def test_error_names():
 @pytest.mark.parametrize("number", [-1, 16384])
 def test_what_does_not_fit_is_refused(number):
     with pytest.raises(ValueError, match="does not fit"):
-        split(number)
+        seven_bit_bytes(number)
     with pytest.raises(ValueError, match="data bytes"):
         COMPACT.command(0x90, 128)
 

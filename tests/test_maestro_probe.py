@@ -30,7 +30,12 @@ def test_a_board_as_from_the_shop():
     found = probe(port, MaestroParams())
     assert found is not None
     assert found.forms == ("compact", "pololu")
-    assert (found.crc, found.errors, found.script, found.channels) == (False, (), False, None)
+    assert (found.expects_crc, found.errors, found.is_script_running, found.channels) == (
+        False,
+        (),
+        False,
+        None,
+    )
     assert found.pulses == (0,) * 6
 
 
@@ -65,7 +70,7 @@ def test_a_running_script_is_seen_and_goes_on():
     board, port = make()
     board.faults.command("script on")
     found = probe(port, MaestroParams())
-    assert found is not None and found.script is True
+    assert found is not None and found.is_script_running is True
     assert board.faults.board()["script"]
 
 
@@ -74,7 +79,7 @@ def test_a_running_script_is_seen_and_goes_on():
 def test_the_check_byte_is_found_out(wanted, real):
     _, port = make(crc=real)
     found = probe(port, MaestroParams(crc=wanted))
-    assert found is not None and found.crc is real
+    assert found is not None and found.expects_crc is real
 
 
 def test_another_device_number_answers_the_compact_form_only():

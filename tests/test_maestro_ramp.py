@@ -12,7 +12,7 @@ from gazerig.drivers.maestro.commands import accel_units, speed_units
 
 def moved(ramp, goal, seconds, tick_s=0.01):
     for _ in range(round(seconds / tick_s)):
-        ramp.move(goal, tick_s)
+        ramp.advance(goal, tick_s)
     return ramp
 
 
@@ -44,7 +44,7 @@ def test_a_limit_is_never_below_what_is_needed_nor_a_whole_unit_above(speed, acc
 
 def test_without_limits_the_pulse_jumps_and_the_shaft_follows_at_its_own_speed():
     ramp = Ramp(6000.0, 2000.0)
-    ramp.move(7000.0, 0.1)
+    ramp.advance(7000.0, 0.1)
     assert ramp.pulse_steps == 7000.0
     assert ramp.shaft_steps == pytest.approx(6200.0)
     assert ramp.shaft_steps_s == pytest.approx(2000.0)
@@ -64,7 +64,7 @@ def test_an_acceleration_limit_takes_as_long_as_a_trapezoid():
     ramp.speed_steps_s, ramp.accel_steps_s2 = 4000.0, 5000.0
     seconds = 0.0
     while ramp.pulse_steps < 8000.0:
-        ramp.move(8000.0, 0.01)
+        ramp.advance(8000.0, 0.01)
         seconds += 0.01
     # 4000 steps are too short a way to reach 4000 steps/s: a triangle.
     assert seconds == pytest.approx(2.0 * sqrt(4000.0 / 5000.0), rel=0.05)
@@ -73,13 +73,13 @@ def test_an_acceleration_limit_takes_as_long_as_a_trapezoid():
 def test_a_long_pause_ends_at_the_goal():
     ramp = Ramp(4000.0, 100.0)
     ramp.speed_steps_s = 100.0
-    ramp.move(8000.0, 3600.0)
+    ramp.advance(8000.0, 3600.0)
     assert (ramp.pulse_steps, ramp.shaft_steps) == (8000.0, 8000.0)
 
 
 def test_without_pulses_the_shaft_is_taken_to_stay():
     ramp = Ramp(6000.0, 1000.0)
-    ramp.move(7000.0, 0.2)
+    ramp.advance(7000.0, 0.2)
     ramp.stop()
     assert (ramp.pulse_steps, ramp.shaft_steps, ramp.shaft_steps_s) == (6200.0, 6200.0, 0.0)
 
@@ -95,6 +95,6 @@ def test_it_never_leaves_the_range_of_its_goals(moves, speed, accel):
     low = high = 6000.0
     for goal, seconds in moves:
         low, high = min(low, goal), max(high, goal)
-        ramp.move(goal, seconds)
+        ramp.advance(goal, seconds)
         assert low - 1e-6 <= ramp.pulse_steps <= high + 1e-6
         assert low - 1e-6 <= ramp.shaft_steps <= high + 1e-6

@@ -13,7 +13,14 @@ from gazerig.drivers.hobby_board.release import stop_pulses
 from gazerig.drivers.i2c.bridge import READ_STATUS, I2cMessage, commands, read, write
 from gazerig.drivers.pca9685.board import Pca9685Board, Pca9685Bus, Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
-from gazerig.drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
+from gazerig.drivers.pca9685.registers import (
+    AWAKE,
+    MODE1,
+    PRESCALE,
+    counts_of,
+    prescale_of,
+    pulse_registers,
+)
 from gazerig.drivers.servo_bus.torque import disable_torque
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
 
@@ -39,8 +46,8 @@ def test_transfers_are_commands_of_the_bridge_and_come_back_as_they_were():
 
 
 def test_pulses_are_registers_and_back():
-    assert all(counts_of(pulse(counts)) == counts for counts in range(4096))
-    assert pulse(0)[3] == 0x10
+    assert all(counts_of(pulse_registers(counts)) == counts for counts in range(4096))
+    assert pulse_registers(0)[3] == 0x10
     assert [prescale_of(f, 25e6) for f in (50.0, 60.0, 200.0, 1526.0, 9e9)] == [121, 101, 30, 3, 3]
 
 
@@ -233,7 +240,7 @@ def test_pulses_that_noise_has_made_are_put_right_while_the_board_is_not_heard(w
     world.held().run(0.2, [6000] * 3)
     world.command("lose all")
     world.run(0.02, [6000] * 3)
-    EmulatedSMBus(world.device.body).i2c_rdwr(i2c_msg.write(0x40, [6, *pulse(4000)]))
+    EmulatedSMBus(world.device.body).i2c_rdwr(i2c_msg.write(0x40, [6, *pulse_registers(4000)]))
     assert world.widths()[0] > 70_000
     world.run(0.01, [7600] * 3)
     assert world.widths() == pytest.approx([6000] * 3, abs=GRAIN)
@@ -267,7 +274,7 @@ def test_a_board_on_an_external_clock_is_refused(world):
 def test_only_own_channels_stop_unless_they_do_not(world):
     world.held()
     other = EmulatedSMBus(world.device.body)
-    other.i2c_rdwr(i2c_msg.write(0x40, [6 + 4 * 9, *pulse(300)]))
+    other.i2c_rdwr(i2c_msg.write(0x40, [6 + 4 * 9, *pulse_registers(300)]))
     world.bus.disable_torque()
     assert world.widths() == [0, 0, 0]
     assert world.chip().counts(9) == 300

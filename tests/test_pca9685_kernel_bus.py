@@ -10,10 +10,10 @@ from pca9685_world import GRAIN, QUICK, World
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.i2c import port as i2c_port
-from gazerig.drivers.i2c.port import I2cPort, explain
+from gazerig.drivers.i2c.port import I2cPort, open_failure_text
 from gazerig.drivers.pca9685.board import Pca9685Bus
 from gazerig.drivers.serial.list_ports import check_owner
-from gazerig.drivers.serial.port import BlockingPort, port_of
+from gazerig.drivers.serial.port import BlockingPort, port_at_path
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
@@ -104,12 +104,12 @@ def test_a_bus_that_cannot_be_opened_is_named_with_its_cure(kernel, code, report
 
 
 def test_a_path_says_what_kind_of_port_it_is(tmp_path):
-    assert isinstance(port_of("/dev/i2c-1"), I2cPort)
-    assert isinstance(port_of("/dev/ttyUSB0"), BlockingPort)
+    assert isinstance(port_at_path("/dev/i2c-1"), I2cPort)
+    assert isinstance(port_at_path("/dev/ttyUSB0"), BlockingPort)
     link = tmp_path / "servos"
     link.symlink_to("/dev/i2c-3")
-    assert isinstance(port_of(str(link)), I2cPort)
-    assert "no I2C bus" in explain("/dev/i2c-99", errno.ENOENT)
+    assert isinstance(port_at_path(str(link)), I2cPort)
+    assert "no I2C bus" in open_failure_text("/dev/i2c-99", errno.ENOENT)
 
 
 def test_a_maestros_yaml_on_an_i2c_bus_is_refused():

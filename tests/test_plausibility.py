@@ -113,5 +113,5 @@ def test_a_temperature_or_voltage_that_two_answers_differ_on_is_not_taken(
         ServoReply(Sample(0, 2000, temperature=warm, voltage=tenths), at_s)
         for (warm, tenths), at_s in (((30, 74), 1.0), (second, 1.002))
     ]
-    both = columns.confirmed(0, *answers)
+    both = columns.confirm(0, *answers)
     assert both is not None and (both.sample.temperature, both.sample.voltage) == kept

@@ -96,7 +96,7 @@ def fault(path):
 def test_ours_are_found_and_loaded_by_the_same_code(group, name):
     found = plugins.find(group, name)
     skip_without_part(found.value)
-    assert found.ours
+    assert found.is_ours
     assert replace(found, version=plugins._version()) in plugins.registrations(group)
     part = found.load()
     if group in (RIGS, GESTURES):
@@ -112,7 +112,7 @@ def test_ours_are_found_and_loaded_by_the_same_code(group, name):
 
 def test_a_package_is_imported_when_its_part_is_used_and_no_sooner(folder):
     install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
-    (found,) = [one for one in plugins.registrations(ATTENTION) if not one.ours]
+    (found,) = [one for one in plugins.registrations(ATTENTION) if not one.is_ours]
     assert (found.name, found.maker) == ("tallest", "tall-rule 1.2")
     assert found.label == "attention 'tallest' of tall-rule 1.2"
     assert "tall_rule" not in sys.modules
@@ -142,7 +142,7 @@ def test_a_name_that_is_taken_is_named_with_both_packages(folder):
         PluginError, match="^detector 'eyes' comes with one 1.2 and two 3.0: uninstall one of them$"
     ):
         plugins.find(DETECTOR, "eyes")
-    assert plugins.find(DETECTOR, "mtcnn").ours
+    assert plugins.find(DETECTOR, "mtcnn").is_ours
     assert [line.replace(plugins._version(), "V") for line in plugins.name_conflicts(DETECTOR)] == [
         "detector 'mtcnn' of one 1.2 is left out: gazerig V has that name",
         "detector 'eyes' of two 3.0 is left out: one 1.2 has that name",

@@ -14,7 +14,7 @@ import pytest
 from recorded_run import info_for
 
 from gazerig.drivers.files.file_input import MAGIC
-from gazerig.drivers.process.passed_image import copied, receive
+from gazerig.drivers.process.passed_image import copy_image, receive
 from gazerig.robot.control.tick_stream import encode
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.recording import run_format as fmt
@@ -150,7 +150,7 @@ def test_images_that_wait_are_bounded_and_none_stays_open(
         client.post(writer.TICKS, bytes(50_000))
 
     def post() -> bool:
-        image = copied(picture)
+        image = copy_image(picture)
         about = encode((0.0, image.shape, image.dtype))
         return client.post_image(about, image.fd, picture.nbytes)
 

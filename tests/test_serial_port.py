@@ -13,7 +13,7 @@ from serial.tools import list_ports
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
-from gazerig.drivers.serial.list_ports import explain
+from gazerig.drivers.serial.list_ports import open_failure_text
 from gazerig.drivers.serial.port import BlockingPort
 
 
@@ -203,7 +203,7 @@ def test_a_busy_port_is_named(line):
 
 
 def test_a_forbidden_port_tells_the_group():
-    assert "dialout" in explain("/dev/ttyUSB0", errno.EACCES)
+    assert "dialout" in open_failure_text("/dev/ttyUSB0", errno.EACCES)
 
 
 def test_what_is_not_a_serial_port_is_named(tmp_path):

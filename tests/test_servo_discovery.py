@@ -90,7 +90,7 @@ def test_all_servos_are_found_at_their_own_rate_and_no_other(family):
     assert [one.baud for one in rounds] == list(family.usual_rates)
     assert sorted(family.usual_rates) == sorted(family.baud_rates)
     assert {one.baud: one.found for one in rounds if one.found} == {57_600: tuple(bench.names)}
-    assert all(one.possible and not one.shared and not one.junk for one in rounds)
+    assert all(one.is_supported and not one.shared_ids and not one.junk_bytes for one in rounds)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_two_servos_with_one_id_are_seen(family):
     assert bench.corrupt(1) >= 2
     assert bench.corrupt(2) == 0
     (one,) = scan(bench.port, family, (57_600,), ids=range(5))
-    assert one.shared == (1,)
+    assert one.shared_ids == (1,)
 
 
 def test_a_rate_the_adaptor_cannot_run_at_is_passed_over(family):
@@ -138,7 +138,7 @@ def test_a_rate_the_adaptor_cannot_run_at_is_passed_over(family):
     real = bench.port.setBaudRate
     bench.port.setBaudRate = lambda baud: baud != 115_200 and real(baud)  # type: ignore[assignment, method-assign]
     rounds = list(scan(bench.port, family, (115_200, 57_600), ids=range(3)))
-    assert [(one.possible, len(one.found)) for one in rounds] == [(False, 0), (True, 1)]
+    assert [(one.is_supported, len(one.found)) for one in rounds] == [(False, 0), (True, 1)]
 
 
 # --- what differs
@@ -195,7 +195,7 @@ def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():
     # Unless thorough only where a servo answers at all.
     list(scan(bench.port, FEETECH, **reported))
     assert asked == [(500_000, servo_id) for servo_id in range(254)]
-    assert FEETECH.version(353) == "3.53"
+    assert FEETECH.format_firmware(353) == "3.53"
 
 
 class ScriptedPort(StandIn):
@@ -232,7 +232,7 @@ def test_the_old_protocol_is_noticed():
     assert protocol_1_ids(b"\xff\xff\xfe\x02\x01\xfe") == ()  # the question, echoed
     assert protocol_1_ids(b"\xff\xff\x05\x02") == ()
     (one,) = scan(ScriptedPort(b"", b"\xff\xff\x05\x02\x00\xf8"), DYNAMIXEL, (57_600,))
-    assert one.found == () and one.protocol_1 == (5,)
+    assert one.found == () and one.protocol_1_ids == (5,)
 
 
 def test_listening_ends_on_a_line_that_never_falls_silent():

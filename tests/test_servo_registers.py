@@ -8,7 +8,7 @@ import pytest
 from sts_rig import Rig as StsRig
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.protocol import ALERT, instruction, statuses
+from gazerig.drivers.dynamixel.protocol import ALERT, instruction, parse_statuses
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.discovery import reboot
@@ -198,7 +198,7 @@ def test_the_bytes_sent_are_the_protocols(rig):
         assert before[:4] == after[:4] == HEADER
     assert rig.sent[0] == instruction(2, 2, struct.pack("<HH", 132, 4))
     assert rig.sent[1] == instruction(2, 3, struct.pack("<Hi", 116, -3))
-    assert statuses(b"".join(rig.sent)) == []
+    assert parse_statuses(b"".join(rig.sent)) == []
 
 
 # --- a family with a lock, and answers that echoes look like
@@ -217,7 +217,7 @@ def test_registers_behind_a_lock(sts):
     assert registers.identify(4) == Identity(777, 353)
     assert registers.identify(5) is None and registers.read(5, "id") is None
     assert registers.read(4, "present_position") == 1928
-    assert registers.settle(4, "torque_limit", 600)
+    assert registers.write_if_different(4, "torque_limit", 600)
     assert registers.read(4, "torque_limit") == 600
     assert registers.write_persistent(4, "position_offset", -85)
     sts.chain[4].restart()

@@ -64,9 +64,9 @@ def test_a_whole_answer_is_taken_at_once(kind):
     for number in range(len(kind.windows)):
         group, raw = kind.asked(number)
         assert len(raw) == group.reply_length
-        assert group.whole(raw, {})[group.columns.position] == (1000, 2000, 3000)
-        assert group.missing(raw) == 0
-        assert {i: a.position for i, a in group.pieces(raw).samples.items()} == PLACES
+        assert group.parse_whole(raw, {})[group.columns.position] == (1000, 2000, 3000)
+        assert group.bytes_missing(raw) == 0
+        assert {i: a.position for i, a in group.verified_parts(raw).samples.items()} == PLACES
 
 
 def test_any_single_damaged_byte_is_found_and_costs_little(kind):
@@ -75,8 +75,8 @@ def test_any_single_damaged_byte_is_found_and_costs_little(kind):
     for at in range(len(raw)):
         for flip in (0x01, 0x80, 0xFF):
             bad = raw[:at] + bytes([raw[at] ^ flip]) + raw[at + 1 :]
-            assert group.whole(bad, {}) is None
-            answers = group.pieces(bad).samples
+            assert group.parse_whole(bad, {}) is None
+            answers = group.verified_parts(bad).samples
             assert all(answer.position == PLACES[i] for i, answer in answers.items())
             # A damaged CRC of a fast block is also the start of the next block's proof.
             assert len(answers) >= (1 if at >= head else 0)
@@ -90,29 +90,29 @@ def test_any_lost_or_added_byte_never_makes_a_wrong_value(kind):
         for bad in (raw[:at] + raw[at + 1 :], raw[:at] + b"\xff" + raw[at:], raw[:at]):
             if bad == raw:
                 continue
-            answers = group.pieces(bad).samples
+            answers = group.verified_parts(bad).samples
             assert all(answer.position == PLACES[i] for i, answer in answers.items())
 
 
 def test_a_short_answer_gives_what_it_has(kind):
     group, raw = kind.asked()
     cut = raw[: len(raw) - 5]
-    assert group.whole(cut, {}) is None
-    assert group.missing(cut) == 5
-    assert set(group.pieces(cut).samples) == {4, 1}
+    assert group.parse_whole(cut, {}) is None
+    assert group.bytes_missing(cut) == 5
+    assert set(group.verified_parts(cut).samples) == {4, 1}
 
 
 def test_an_answer_of_another_reading_is_not_taken(kind):
     _, raw = kind.asked()
     now, _ = kind.asked(1)
-    assert now.whole(raw, {}) is None
-    assert now.pieces(raw).samples == {}
+    assert now.parse_whole(raw, {}) is None
+    assert now.verified_parts(raw).samples == {}
 
 
 def test_noise_before_the_answer_does_no_harm(kind):
     group, raw = kind.asked()
     noisy = b"\xff\xff\xfd\x00" + raw
-    assert {i: a.position for i, a in group.pieces(noisy).samples.items()} == PLACES
+    assert {i: a.position for i, a in group.verified_parts(noisy).samples.items()} == PLACES
 
 
 def test_a_proved_block_in_the_place_of_another_s_makes_its_id_doubtful():
@@ -121,9 +121,9 @@ def test_a_proved_block_in_the_place_of_another_s_makes_its_id_doubtful():
         kind.chain.faults.command(command)
     group, raw = kind.asked()
     # Two servos say they are 4, and which of them is in its place is not known.
-    pieces = group.pieces(raw)
-    assert {i: a.position for i, a in pieces.samples.items()} == {1: PLACES[1]}
-    assert 4 in pieces.damaged
+    verified_parts = group.verified_parts(raw)
+    assert {i: a.position for i, a in verified_parts.samples.items()} == {1: PLACES[1]}
+    assert 4 in verified_parts.damaged
 
 
 def test_stuffed_answers_are_longer_and_understood():
@@ -131,16 +131,16 @@ def test_stuffed_answers_are_longer_and_understood():
     group = dynamixel_read(IDS, DIRECT)
     raw = b"".join(status(i, 0, everyday if i == 1 else bytes(10)) for i in IDS)
     assert everyday[:3] + b"\xfd" in raw
-    assert group.whole(raw, {}) is None
-    assert group.missing(raw[: group.reply_length]) == 1
-    sample = group.pieces(raw).samples[1]
+    assert group.parse_whole(raw, {}) is None
+    assert group.bytes_missing(raw[: group.reply_length]) == 1
+    sample = group.verified_parts(raw).samples[1]
     assert (sample.effort, sample.velocity, sample.position) == (-1, -3, 2000)
 
 
 def test_a_refusal_without_bytes_is_an_answer_with_its_error():
     group = dynamixel_read((1,), DIRECT)
-    assert group.pieces(status(1, 0x87, b"")).samples[1].error == 0x87
-    assert group.pieces(status(1, 0x80, b"")).samples == {}
+    assert group.verified_parts(status(1, 0x87, b"")).samples[1].error == 0x87
+    assert group.verified_parts(status(1, 0x80, b"")).samples == {}
 
 
 # --- numbers with a sign of their own, windows that tell more
@@ -178,20 +178,20 @@ def test_wherever_a_reading_begins_it_says_the_same(address):
 
 def test_after_trouble_no_reading_has_the_length_of_the_one_before():
     plan = FEETECH.read_plan([], FeetechParams(torque_every=8), None)
-    together, alone = plan.together, plan.alone
-    tells = ["torque" in together.next().fields for _ in range(16)]
+    together, alone = plan.group_windows, plan.single_windows
+    tells = ["torque" in together.next_window().fields for _ in range(16)]
     assert tells == ([True] + [False] * 7) * 2
     lengths = []
     for k in range(5):
         together.record_trouble(0.01 * k)
-        lengths.append(together.next().length)
+        lengths.append(together.next_window().length)
     usual = {SENSED.length, ARMED.length}
     assert len(set(lengths)) == 5 and not usual & set(lengths)
     together.end_trouble(0.28)
-    assert together.next().length not in usual
+    assert together.next_window().length not in usual
     together.end_trouble(0.30)
-    assert together.next().length in usual
-    others = {alone.next().length for _ in range(10)}
+    assert together.next_window().length in usual
+    others = {alone.next_window().length for _ in range(10)}
     assert len(others) == 10 and not others & (usual | set(lengths))
 
 
@@ -199,9 +199,9 @@ def test_after_trouble_no_reading_has_the_length_of_the_one_before():
 def test_any_single_damaged_byte_of_a_whole_answer_is_found(at):
     group = feetech_read((2, 5), SENSED)
     raw = sts_status(2, CALM) + sts_status(5, CALM)
-    assert group.whole(raw, {}) is not None
-    assert group.whole(raw[:at] + bytes([raw[at] ^ 0x40]) + raw[at + 1 :], {}) is None
-    assert group.whole(sts_status(5, CALM) + sts_status(2, CALM), {}) is None
+    assert group.parse_whole(raw, {}) is not None
+    assert group.parse_whole(raw[:at] + bytes([raw[at] ^ 0x40]) + raw[at + 1 :], {}) is None
+    assert group.parse_whole(sts_status(5, CALM) + sts_status(2, CALM), {}) is None
 
 
 @pytest.mark.parametrize("header", [b"\xff\x00", b"\xff\xff"])
@@ -209,33 +209,33 @@ def test_an_answer_in_the_place_of_another_servo_s_is_not_believed_where_one_is_
     """Servo 2 answers as its neighbour 5, whose own answer arrives damaged."""
     group = feetech_read((2, 5, 9), SENSED)
     lost, last = sts_status(5, bytes(15)), sts_status(9, BLOCK)
-    some = group.pieces(sts_status(5, BLOCK) + header + lost[2:-1] + b"\x01" + last)
-    assert set(some.samples) == {9} and some.stray
-    assert 5 in some.damaged | some.unproved
+    some = group.verified_parts(sts_status(5, BLOCK) + header + lost[2:-1] + b"\x01" + last)
+    assert set(some.samples) == {9} and some.has_stray_bytes
+    assert 5 in some.damaged | some.unverifiable
     # The same behind an echo of the question; whole answers may come in any order.
-    assert set(group.pieces(group.request + sts_status(2, BLOCK)).samples) == {2}
-    whole = group.pieces(last + sts_status(5, BLOCK) + sts_status(2, BLOCK))
-    assert set(whole.samples) == {2, 5, 9} and not whole.stray
+    assert set(group.verified_parts(group.request + sts_status(2, BLOCK)).samples) == {2}
+    whole = group.verified_parts(last + sts_status(5, BLOCK) + sts_status(2, BLOCK))
+    assert set(whole.samples) == {2, 5, 9} and not whole.has_stray_bytes
 
 
 def test_bytes_of_no_right_answer_are_stray_and_silence_is_not():
     group = feetech_read((2, 5), SENSED)
-    assert group.pieces(sts_status(2, BLOCK) + sts_status(5, BLOCK)[:11]).stray
-    assert not group.pieces(sts_status(2, BLOCK)).stray
+    assert group.verified_parts(sts_status(2, BLOCK) + sts_status(5, BLOCK)[:11]).has_stray_bytes
+    assert not group.verified_parts(sts_status(2, BLOCK)).has_stray_bytes
 
 
 def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():
     group = feetech_read((2, 5), SENSED)
     other = bytes(15)
-    twice = group.pieces(sts_status(2, BLOCK) * 2 + sts_status(5, BLOCK))
+    twice = group.verified_parts(sts_status(2, BLOCK) * 2 + sts_status(5, BLOCK))
     assert set(twice.samples) == {2, 5} and not twice.damaged
-    mixed = group.pieces(sts_status(2, BLOCK) + sts_status(2, other) + sts_status(5, BLOCK))
+    mixed = group.verified_parts(sts_status(2, BLOCK) + sts_status(2, other) + sts_status(5, BLOCK))
     assert (set(mixed.samples), mixed.damaged) == ({5}, {2})
 
 
 def test_an_answer_of_another_length_is_not_the_one_asked_for():
-    pieces = feetech_read((2,), SENSED).pieces(sts_status(2, BLOCK + b"\x00"))
-    assert (pieces.samples, pieces.damaged) == ({}, {2})
+    verified_parts = feetech_read((2,), SENSED).verified_parts(sts_status(2, BLOCK + b"\x00"))
+    assert (verified_parts.samples, verified_parts.damaged) == ({}, {2})
 
 
 # --- what values become, and which are believed
@@ -256,9 +256,9 @@ def both_ways(group, raw, *columns):
         for slot in range(len(group.ids)):
             each.places.record(slot, 900, 0.99)
             assert each.places.is_plausible(slot, 900, 1.0)
-    taken, each = one.apply_whole(group, raw, 1.01), group.pieces(raw).samples
+    taken, each = one.apply_whole(group, raw, 1.01), group.verified_parts(raw).samples
     for slot, servo_id in enumerate(group.ids):
-        other.take(slot, ServoReply(each[servo_id], 1.01))
+        other.apply_reply(slot, ServoReply(each[servo_id], 1.01))
     return taken
 
 
@@ -355,17 +355,17 @@ def test_a_silent_servo_is_asked_at_once_then_ever_more_seldom():
     polled = PollList(IDS)
     now_s = 10.0
     polled.record_silent(1, now_s)
-    assert (polled.group, polled.due(now_s)) == ((4, 9), 1)
+    assert (polled.group, polled.next_due(now_s)) == ((4, 9), 1)
     waits = []
     for _ in range(6):
         polled.record_silent(1, now_s)
         start_s = now_s
-        while polled.due(now_s) is None:
+        while polled.next_due(now_s) is None:
             now_s += AGAIN_FIRST_S / 4
         waits.append(now_s - start_s)
     assert waits == [0.0625, 0.125, 0.25, 0.5, 0.5, AGAIN_LAST_S]
     assert polled.record_answer(1)
-    assert (polled.group, polled.troubled) == (IDS, False)
+    assert (polled.group, polled.is_troubled) == (IDS, False)
     assert not polled.record_answer(1)
 
 
@@ -375,11 +375,11 @@ def test_where_all_are_out_somebody_is_always_asked_and_one_answer_calls_all_bac
         polled.record_silent(servo_id, 1.0)
         polled.record_silent(servo_id, 1.0)
     assert polled.group == ()
-    assert polled.due(1.0) == 4
+    assert polled.next_due(1.0) == 4
     polled.record_silent(4, 1.0)
-    assert polled.due(1.0) == 1
+    assert polled.next_due(1.0) == 1
     assert polled.record_answer(1)
-    assert (polled.group, polled.due(1.0)) == (IDS, None)
+    assert (polled.group, polled.next_due(1.0)) == (IDS, None)
 
 
 def test_damage_three_times_in_a_row_takes_a_servo_out():
@@ -398,6 +398,6 @@ def test_several_out_take_turns():
     polled = PollList(IDS)
     polled.record_silent(4, 1.0)
     polled.record_silent(9, 1.1)
-    assert polled.due(2.0) == 4
+    assert polled.next_due(2.0) == 4
     polled.record_silent(4, 2.0)
-    assert polled.due(2.0) == 9
+    assert polled.next_due(2.0) == 9

@@ -370,11 +370,11 @@ def test_a_call_that_catches_everything_is_met_again_and_told(
     call.close()
     report, lines = OverdueReport(), list[str]()
     while len(caught) < 2:
-        lines += report.lines()
+        lines += report.due_lines()
     gate.set()
     wait_for(lambda: not OVERDUE_SOURCES)
     assert lines and lines[0].startswith("a rule was given up 0 s ago and does not end")
-    assert len(lines) < 20 and report.lines() == () and overdue_text() == ""
+    assert len(lines) < 20 and report.due_lines() == () and overdue_text() == ""
 
 
 def test_a_call_that_waits_outside_python_is_told_as_long_as_it_lasts() -> None:
@@ -382,7 +382,7 @@ def test_a_call_that_waits_outside_python_is_told_as_long_as_it_lasts() -> None:
     call = BoundedCall("a rule", 0.001)
     assert call(gate.wait) is None
     call.close()
-    wait_for(lambda: call.lasts()[0] > 0.3)
+    wait_for(lambda: call.overdue_call()[0] > 0.3)
     assert call in OVERDUE_SOURCES
     gate.set()
     wait_for(lambda: call not in OVERDUE_SOURCES)

@@ -64,7 +64,7 @@ class CheckedBus:
         if isinstance(outcome.error, DriverError):
             raise outcome.error
         if (error := outcome.error) is not None:
-            raise PluginError(f"{self._label} cannot be opened: {outcome.why}") from error
+            raise PluginError(f"{self._label} cannot be opened: {outcome.error_text}") from error
 
     def read(self, now_s: float) -> Feedback:
         """Read all servos.
@@ -192,7 +192,7 @@ class CheckedBus:
         if outcome is None:
             self._log.add(f"{self._label} does not close: it is abandoned")
         elif outcome.error is not None:
-            self._log.add(f"{self._label} failed while it was closed ({outcome.why})")
+            self._log.add(f"{self._label} failed while it was closed ({outcome.error_text})")
         self._call.close()
         self._call, self._blocked = BoundedCall(self._label, _USUAL_S), False
 
@@ -204,7 +204,7 @@ class CheckedBus:
         if isinstance(outcome.error, DriverError):
             raise outcome.error
         if (error := outcome.error) is not None:
-            raise BusLost(f"{self._label}: {name} failed ({outcome.why}){hint}") from error
+            raise BusLost(f"{self._label}: {name} failed ({outcome.error_text}){hint}") from error
         value: T = outcome.value
         return value
 

@@ -148,7 +148,7 @@ class PortBus(ABC):
             self._record_loss(lost)
             self._link.record_failed_release()
             raise BusLost(self._cannot_release()) from lost
-        self._link.released()
+        self._link.record_release()
         self._line.errors["refused"] += len(released.holding_ids)
         for ids, what in (
             (released.holding_ids, self.holding_text),

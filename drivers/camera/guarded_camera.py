@@ -85,7 +85,7 @@ class GuardedCamera:
             raise outcome.error
         if outcome.error is not None:
             error = outcome.error
-            raise PluginError(f"{self._label} cannot be opened: {outcome.why}") from error
+            raise PluginError(f"{self._label} cannot be opened: {outcome.error_text}") from error
         self._newest, self._failed, self._asked_s, self._late = None, False, None, False
 
     def latest(self, now_s: float) -> Detections | None:
@@ -110,7 +110,7 @@ class GuardedCamera:
             self._log.add(f"{self._label} answers again")
         self._asked_s, self._late = None, False
         if outcome.error is not None:
-            self._fail(f"failed ({outcome.why})")
+            self._fail(f"failed ({outcome.error_text})")
             return None
         found, wrong, events = outcome.value
         for line in events:
@@ -139,7 +139,7 @@ class GuardedCamera:
         if outcome is None:
             self._log.add(f"{self._label} does not close: it is abandoned")
         elif outcome.error is not None:
-            self._log.add(f"{self._label} failed while it was closed ({outcome.why})")
+            self._log.add(f"{self._label} failed while it was closed ({outcome.error_text})")
 
     def _fail(self, why: str) -> None:
         self._failed, self._newest = True, None

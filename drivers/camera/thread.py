@@ -119,7 +119,7 @@ class CameraThread:
         """Stop detection, by force if needed, and free the source; safe to call twice."""
         self._stop.set()
         if self._watching is not None:
-            stopped = self._watching.idle(_LONGEST_WAIT_S)
+            stopped = self._watching.wait_idle(_LONGEST_WAIT_S)
             self._watching.close()
             if stopped:
                 self._watching = None

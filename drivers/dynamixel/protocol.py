@@ -58,11 +58,11 @@ def ping(servo_id: int) -> bytes:
     return instruction(servo_id, PING)
 
 
-identify = ping
+identity_request = ping
 """The answer to a ping contains model and firmware."""
 
 
-def identity(status: Status) -> Identity | None:
+def parse_identity(status: Status) -> Identity | None:
     """Return model and firmware from the answer to a ping, None if it is not one."""
     if len(status.params) != IDENTITY_LENGTH or status.error & ERROR_NUMBER:
         return None
@@ -117,7 +117,7 @@ class SyncWrite:
         return packet + _CRC.pack(umts(packet))
 
 
-def statuses(raw: bytes) -> list[Status]:
+def parse_statuses(raw: bytes) -> list[Status]:
     """Return every complete status packet in received bytes; skip noise, echoes and fragments."""
     found = []
     at = raw.find(HEADER)

@@ -58,10 +58,10 @@ class FastSyncRead:
         first = len(self._head) + self._block - 2
         parts = f"{first}s" + f"{self._block}s" * (len(ids) - 1) + "2x"
         answer = WholeAnswer(self._head, heads, window, CHECK, parts, _all_intact)
-        self.whole, self.columns = answer.values, answer.columns
+        self.parse_whole, self.columns = answer.values, answer.columns
         self.reply_length, self.covers_torque = answer.length, "torque" in window.fields
 
-    def missing(self, raw: bytes) -> int:
+    def bytes_missing(self, raw: bytes) -> int:
         """Return how many bytes have not arrived yet."""
         at = raw.find(self._head)
         if at < 0:
@@ -72,7 +72,7 @@ class FastSyncRead:
                 at = 7 + length if length <= _LONGEST else 0
         return max(0, at + self.reply_length - len(raw))
 
-    def pieces(self, raw: bytes) -> PartialReply:
+    def verified_parts(self, raw: bytes) -> PartialReply:
         """Return the blocks with a correct CRC.
 
         Every block's CRC continues from the previous CRC as sent, so a damaged block does not
@@ -173,11 +173,11 @@ def read_plan(
     # All servos must have the indirect block at the same address.
     same = len({(one.address_base, one.data_base) for one in blocks}) == 1
     if not params.indirect_block or not same:
-        return ReadPlan(direct_windows(), alone, alone, packets, covered=False)
+        return ReadPlan(direct_windows(), alone, alone, packets, covers_torque=False)
     block = blocks[0]
     data = struct.pack(f"<{len(INDIRECT_MAP)}H", *INDIRECT_MAP)
     layout = AddressMap(block.address_base, data)
-    return ReadPlan(indirect_windows(block), alone, alone, packets, block=layout)
+    return ReadPlan(indirect_windows(block), alone, alone, packets, indirect_block=layout)
 
 
 def direct_windows() -> WindowSchedule:

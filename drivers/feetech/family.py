@@ -84,10 +84,10 @@ def read_plan(
     Torque and the armed limits precede them, so at intervals the read begins at 40 and includes
     them.
     """
-    return plan_of(window, params.torque_every)
+    return series_read_plan(window, params.torque_every)
 
 
-def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
+def series_read_plan(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
     """Return the read plan of a series of servos.
 
     Args:
@@ -106,7 +106,7 @@ def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
         WindowSchedule(usual, spare),
         WindowSchedule(alone, alone),
         WindowSchedule(second, second),
-        armed=armed,
+        armed_window=armed,
     )
 
 
@@ -128,24 +128,24 @@ FEETECH = Family(
     sign_bits=SIGN_BITS,
     speed_units=speed_units,
     acceleration_units=acceleration_units,
-    goals=GoalWrite,
+    create_goal_packets=GoalWrite,
     sync_read=True,
     baud_rates=BAUD_RATES,
-    usual_rates=BAUD_RATES,
+    scan_rates=BAUD_RATES,
     factory_baud=1_000_000,
     highest_id=HIGHEST_ID,
-    version=lambda firmware: f"{firmware // 100}.{firmware % 100}",
+    format_firmware=lambda firmware: f"{firmware // 100}.{firmware % 100}",
     read_plan=read_plan,
     effort_register="present_load",
-    armed=armed_limits,
+    armed_values=armed_limits,
     weak_check=True,
-    spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
-    wanted=wanted_settings,
+    read_spans=(("return_delay_time", "operating_mode"), ("torque_limit", "lock")),
+    wanted_settings=wanted_settings,
     # Of Phase only one bit is changed, the others stay as set.
-    target=lambda name, found, wanted: found & ~MULTI_TURN if name == "phase" else wanted,
-    passes=1,
+    corrected_value=lambda name, found, wanted: found & ~MULTI_TURN if name == "phase" else wanted,
+    correction_passes=1,
     answer_level=1,
-    lock="lock",
+    lock_register="lock",
     error_register="status",
     faults_latch=False,
     torque_faults=REGISTERS["unloading_condition"].initial or 0,
@@ -156,10 +156,10 @@ FEETECH = Family(
     quiet_s=0.004,
     thorough_s=0.004,
     duplicate_id_registers=("present_position", "present_current"),
-    protocol_1=None,
-    arming=Arming("acceleration", speed=False),
+    find_protocol_1_ids=None,
+    arming=Arming("acceleration", limits_speed=False),
     most_goals=MOST_GOALS,
-    usual_bauds="115200 or 1000000",
+    recommended_bauds="115200 or 1000000",
     fault_cure="check its supply",
     jump_cure="restart the servo power",
 )

@@ -75,12 +75,12 @@ def reboot(servo_id: int) -> bytes:
     return instruction(servo_id, REBOOT)
 
 
-def identify(servo_id: int) -> bytes:
+def identity_request(servo_id: int) -> bytes:
     """Build a read of the first registers, which contain model and firmware."""
     return read(servo_id, 0, IDENTITY_LENGTH)
 
 
-def identity(status: Status) -> Identity | None:
+def parse_identity(status: Status) -> Identity | None:
     """Return model and firmware from the first registers, None if the status contains others.
 
     The firmware is 100 times the major version plus the minor version, 310 for 3.10. The model
@@ -142,7 +142,7 @@ class GoalWrite:
         return b"%b%b%c" % (HEADER, body, ~sum(body) & 0xFF)
 
 
-def statuses(raw: bytes) -> list[Status]:
+def parse_statuses(raw: bytes) -> list[Status]:
     """Return every complete status packet in received bytes; skip noise, echoes and fragments.
 
     If two statuses with correct checksums overlap, both are returned as not intact.

@@ -16,7 +16,7 @@ from gazerig.drivers.feetech.family import (
     FEETECH,
     SENSED_AT,
     SIGN_BITS,
-    plan_of,
+    series_read_plan,
     wanted_settings,
 )
 from gazerig.drivers.feetech.memory_table import (
@@ -84,7 +84,7 @@ def read_plan(
     setups: "Sequence[ServoConfig]", params: FeetechParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
     """Return the read plan: as for STS servos, but one by one."""
-    return plan_of(window, params.torque_every)
+    return series_read_plan(window, params.torque_every)
 
 
 def scs_settings(setup: "ServoConfig") -> dict[str, int]:
@@ -102,16 +102,16 @@ FEETECH_SCS = replace(
     models=SCS_MODELS,
     steps_per_turn=SCS_MODELS["scs0009"].steps_per_turn,
     acceleration_units=lambda accel_steps_s2: 0,  # [A]: 41 is not documented
-    goals=ScsGoalWrite,
+    create_goal_packets=ScsGoalWrite,
     sync_read=False,
     baud_rates=SCS_BAUD_RATES,
-    usual_rates=SCS_BAUD_RATES,
+    scan_rates=SCS_BAUD_RATES,
     read_plan=read_plan,
-    armed=lambda setup: {},
-    spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
-    wanted=scs_settings,
+    armed_values=lambda setup: {},
+    read_spans=(("return_delay_time", "position_i_gain"), ("lock", "lock")),
+    wanted_settings=scs_settings,
     torque_faults=0x24,
     single_turn=False,
     duplicate_id_registers=("present_position", "moving"),
-    arming=Arming("acceleration", speed=False),
+    arming=Arming("acceleration", limits_speed=False),
 )

@@ -33,18 +33,19 @@ class BoardTexts(NamedTuple):
     """Texts of messages about a kind of board.
 
     name: name of the board, with its number or address
-    no_pulses, other_pulse: remedies if a channel outputs no pulses, or other ones than commanded
-    noise: remedy for a disturbed line
-    no_answer: remedy if it does not answer
-    left_alone: behaviour of the servos when the board cannot be reached any more
+    no_pulses_remedy, other_pulse_remedy: remedies if a channel outputs no pulses, or other ones
+        than commanded
+    noise_remedy: remedy for a disturbed line
+    no_answer_remedy: remedy if it does not answer
+    unreachable_behaviour: behaviour of the servos when the board cannot be reached any more
     """
 
     name: str
-    no_pulses: str
-    other_pulse: str
-    noise: str
-    no_answer: str
-    left_alone: str
+    no_pulses_remedy: str
+    other_pulse_remedy: str
+    noise_remedy: str
+    no_answer_remedy: str
+    unreachable_behaviour: str
 
 
 class ChannelStatus(NamedTuple):
@@ -58,7 +59,7 @@ class ChannelStatus(NamedTuple):
     errors: tuple[str, ...] = ()
 
 
-class Timing(NamedTuple):
+class BoardTiming(NamedTuple):
     """Times and rates of a board.
 
     baud: baud rate of its port, bit/s
@@ -80,7 +81,7 @@ class Board(Protocol):
     """One board, or several on one line; all methods may raise BusLost.
 
     line: line to the board; texts: texts of messages
-    damage: kinds of errors that noise causes
+    noise_errors: kinds of errors that noise causes
     """
 
     @property
@@ -92,11 +93,11 @@ class Board(Protocol):
         """Return the texts of messages about the board."""
 
     @property
-    def timing(self) -> Timing:
+    def timing(self) -> BoardTiming:
         """Return the board's time limits."""
 
     @property
-    def damage(self) -> Sequence[str]:
+    def noise_errors(self) -> Sequence[str]:
         """Return the kinds of errors that noise causes."""
 
     @property
@@ -117,13 +118,13 @@ class Board(Protocol):
             ServoMissing: it does not answer.
         """
 
-    def look(self, channel: Channel) -> ChannelStatus | None:
+    def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read one channel's pulse and the board's errors; None without an answer."""
 
-    def wake(self) -> tuple[str, ...] | None:
+    def read_waking_errors(self) -> tuple[str, ...] | None:
         """Read the errors of a board after a long silence; None without an answer."""
 
-    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Return the confirmed present pulses of channels; None after a failure."""
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
@@ -135,7 +136,7 @@ class Board(Protocol):
     def resend_pulses(self, channels: Sequence[Channel]) -> None:
         """Hold the pulses while the board does not answer, if that is safe."""
 
-    def lead(self, channels: Sequence[Channel]) -> None:
+    def advance_pulses(self, channels: Sequence[Channel]) -> None:
         """Advance pulses towards their goals if the board does not do so itself."""
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:

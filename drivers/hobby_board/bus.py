@@ -59,9 +59,9 @@ class HobbyBoardBus(PortBus):
         self._loads, self._unmeasured = (0.0,) * len(self._ids), (False,) * len(self._ids)
         self._apply_limits()
         self._reported = False
-        self._begin()
+        self._create_parts()
 
-    def _begin(self) -> None:
+    def _create_parts(self) -> None:
         """Create the stateful parts in their initial state."""
         timing = self._board.timing
         self._channels = tuple(Channel(setup, timing.longest_ramp_s) for setup in self._setups)
@@ -88,7 +88,7 @@ class HobbyBoardBus(PortBus):
         """
         self._setups = self._target_setups
         self._apply_limits()
-        self._begin()
+        self._create_parts()
         baud = self._board.timing.baud
         if not self._port.setBaudRate(baud):
             raise PortError(f"{self._port.port_name} cannot run at {baud} bit/s: choose 115200")
@@ -96,7 +96,7 @@ class HobbyBoardBus(PortBus):
             self._port.clearPort()
             pulses = self._board.find(self._setups, self._log)
             for channel, pulse in zip(self._channels, pulses, strict=True):
-                channel.settle(pulse)
+                channel.adopt_position(pulse)
         except (ServoMissing, BusLost):
             self._port.closePort()
             raise
@@ -117,13 +117,13 @@ class HobbyBoardBus(PortBus):
         if (link.down or link.release_due) and not self._reopen_if_needed(now_s):
             return self._nothing
         try:
-            answered = self._watch(now_s)
+            answered = self._check_board(now_s)
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
         if not answered:
             # If any byte arrives the board is present, and noise spoils its answers.
-            silent_s = min(self._silence.seconds(now_s), now_s - self._byte_s)
+            silent_s = min(self._silence.silent_for_s(now_s), now_s - self._byte_s)
             if silent_s >= self._board.timing.give_up_s:
                 raise BusLost(
                     f"{self._port.port_name}: the board has not answered for {silent_s:.1f} s: "
@@ -203,12 +203,12 @@ class HobbyBoardBus(PortBus):
             return
         now_s = self._port.now_s()
         try:
-            if not self._supervisor.sure:
+            if not self._supervisor.may_send_goals:
                 self._board.resend_pulses(held)
                 return
             for channel, goal in zip(self._channels, goals, strict=True):
                 if channel.held:
-                    channel.aim(goal, now_s)
+                    channel.record_goal(goal, now_s)
             self._board.send_goals(held)
         except BusLost as lost:
             self._record_loss(lost)
@@ -221,7 +221,7 @@ class HobbyBoardBus(PortBus):
 
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         for setup in setups:
-            self._board.params.check(setup)
+            self._board.params.check_servo(setup)
 
     # --- holding
 
@@ -232,30 +232,30 @@ class HobbyBoardBus(PortBus):
 
     # --- reading
 
-    def _watch(self, now_s: float) -> bool:
+    def _check_board(self, now_s: float) -> bool:
         """Read the board's status if it is due; return whether the board is known to be alive."""
-        if self._supervisor.sure and now_s - self._heard_s < self._board.timing.watch_s:
+        if self._supervisor.may_send_goals and now_s - self._heard_s < self._board.timing.watch_s:
             self._supervisor.advance(self._port.now_s())
-            self._supervisor.lead()
+            self._supervisor.advance_pulses()
             return True
-        if not self._silence.due(now_s):
+        if not self._silence.is_due(now_s):
             return False
         if self._silence.missed > TRIES:
             # After a long silence a board may have to detect its baud rate again.
-            errors = self._board.wake()
+            errors = self._board.read_waking_errors()
             if errors is None:
-                self._silence.miss(now_s, self._any_byte_s(now_s))
+                self._silence.record_miss(now_s, self._last_byte_s(now_s))
                 return False
             self._supervisor.record_errors(errors, self._port.now_s())
-        if not self._supervisor.watch():
-            self._silence.miss(now_s, self._any_byte_s(now_s))
+        if not self._supervisor.check_status():
+            self._silence.record_miss(now_s, self._last_byte_s(now_s))
             return False
         self._heard_s = self._port.now_s()
         self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
-        self._silence.answer(now_s)
+        self._silence.record_answer(now_s)
         return True
 
-    def _any_byte_s(self, now_s: float) -> float:
+    def _last_byte_s(self, now_s: float) -> float:
         """Return the time of the last received byte, damaged or not."""
         if self._board.line.rx_bytes != self._rx_bytes:
             self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
@@ -267,7 +267,7 @@ class HobbyBoardBus(PortBus):
         released = switch_off(self._board, self._ids)
         for channel in self._channels:
             if channel.id not in (*released.holding_ids, *released.unconfirmed_ids):
-                channel.stop()
+                channel.record_stop()
         return released
 
     def _servo_label(self, servo_id: int) -> str:
@@ -277,5 +277,5 @@ class HobbyBoardBus(PortBus):
         """Return the text about servos whose pulses cannot be switched off."""
         return (
             f"{self._port.port_name} is gone: pulses could not be stopped; "
-            f"{self._board.texts.left_alone}: {CUT} to free them"
+            f"{self._board.texts.unreachable_behaviour}: {CUT} to free them"
         )

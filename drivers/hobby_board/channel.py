@@ -42,7 +42,7 @@ class Ramp:
         """Record that there are no pulses: the shaft is assumed not to move."""
         self.begin(self.shaft_steps)
 
-    def found(self, pulse_steps: float) -> None:
+    def set_pulse(self, pulse_steps: float) -> None:
         """Record the width that the board reports."""
         self.pulse_steps = pulse_steps
 
@@ -52,7 +52,7 @@ class Ramp:
         cruise_s = way_steps / speed if speed else 0.0
         return cruise_s + (2.0 * sqrt(way_steps / accel) if accel else 0.0)
 
-    def move(self, goal_steps: float, for_s: float) -> None:
+    def advance(self, goal_steps: float, for_s: float) -> None:
         """Advance the pulse and the shaft towards a goal."""
         if for_s <= 0.0:
             return
@@ -117,9 +117,9 @@ class Channel:
         self.id = setup.id
         self.on = self.held = self.entering = self.rearmed = self.off_goal_reported = False
         self.fault = ""
-        self.goal_steps = self.clip(_rest(setup))
-        self.ramp = Ramp(self.goal_steps, _own_speed(setup))
-        self._placed = False
+        self.goal_steps = self.clip(_rest_steps(setup))
+        self.ramp = Ramp(self.goal_steps, _own_speed_steps_s(setup))
+        self._is_position_known = False
         self._at_s = -inf
         self._settled_s = inf
         self._recent: deque[tuple[float, int]] = deque()
@@ -130,9 +130,9 @@ class Channel:
     def set_target(self, setup: ServoConfig) -> None:
         """Apply a changed setup of the same servo."""
         self.setup = setup
-        self.ramp.shaft_speed_steps_s = _own_speed(setup)
-        if not self._placed:
-            self.goal_steps = self.clip(_rest(setup))
+        self.ramp.shaft_speed_steps_s = _own_speed_steps_s(setup)
+        if not self._is_position_known:
+            self.goal_steps = self.clip(_rest_steps(setup))
             self.ramp.shaft_steps = self.goal_steps
 
     def clip(self, steps: float) -> int:
@@ -171,21 +171,21 @@ class Channel:
         self._bottom, self._top = -inf, inf
         return self.goal_steps
 
-    def hold(self) -> None:
+    def record_hold(self) -> None:
         """Record that it holds its goal and follows new ones."""
-        self.held = self._placed = True
+        self.held = self._is_position_known = True
 
-    def release(self) -> None:
+    def record_release(self) -> None:
         """Record that it follows no goals any more; its pulses may continue."""
         self.held = self.entering = self.rearmed = False
 
-    def stop(self) -> None:
+    def record_stop(self) -> None:
         """Record that it outputs no pulses: its servo has no torque."""
-        self.release()
+        self.record_release()
         self.on = False
         self.ramp.stop()
 
-    def aim(self, goal_steps: int, now_s: float) -> None:
+    def record_goal(self, goal_steps: int, now_s: float) -> None:
         """Record a goal that was sent."""
         self.advance(now_s)
         recent = self._recent
@@ -205,15 +205,15 @@ class Channel:
         if self.on and 0.0 < spent_s < inf:
             if spent_s > self._longest_lead_s:
                 # The ramp was paused, so it begins from rest.
-                self.ramp.move(self.ramp.pulse_steps, spent_s - self._longest_lead_s)
+                self.ramp.advance(self.ramp.pulse_steps, spent_s - self._longest_lead_s)
                 spent_s = self._longest_lead_s
             goal = self.goal_steps
-            self.ramp.move(
-                goal if self._bottom <= goal <= self._top else self._reached(goal), spent_s
+            self.ramp.advance(
+                goal if self._bottom <= goal <= self._top else self._reachable_pulse(goal), spent_s
             )
         self._at_s = now_s
 
-    def implausible(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
+    def is_implausible(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
         """Return whether a pulse cannot result from recent goals.
 
         led_away: whether an error or a restart has briefly moved it towards its home
@@ -228,11 +228,11 @@ class Channel:
         room: float = FINE_STEPS
         if led_away or now_s < self._settled_s:
             places.append(round(self.ramp.pulse_steps))
-            room = self.room_steps()
-        low, high = self._reached(min(places)), self._reached(max(places))
+            room = self.pulse_tolerance_steps()
+        low, high = self._reachable_pulse(min(places)), self._reachable_pulse(max(places))
         return not low - room <= pulse_steps <= high + room
 
-    def _reached(self, steps: float) -> float:
+    def _reachable_pulse(self, steps: float) -> float:
         """Return the pulse that a goal ends at, as far as the board's own range is known."""
         return min(self._top, max(self._bottom, steps))
 
@@ -240,42 +240,42 @@ class Channel:
         while self._recent and self._recent[0][0] < now_s - RECENT_S:
             self._recent.popleft()
 
-    def room_steps(self) -> float:
+    def pulse_tolerance_steps(self) -> float:
         """Return the tolerance of an expected pulse, steps."""
         return FINE_STEPS + self.ramp.speed_steps_s * BEHIND_S
 
-    def found(self, pulse_steps: int) -> None:
+    def adopt_pulse(self, pulse_steps: int) -> None:
         """Adopt the pulse width that the board reports."""
         if pulse_steps and not self.held:
             self.goal_steps = pulse_steps
         if pulse_steps and self.held and not self.entering:
             # No goal is outside, so a byte was damaged; answers have no checksum.
             pulse_steps = self.clip(pulse_steps)
-        self.gives(pulse_steps)
+        self.record_pulse(pulse_steps)
 
-    def confirmed(self, pulse_steps: int) -> None:
+    def record_expected_pulse(self, pulse_steps: int) -> None:
         """Record that its pulse is as expected.
 
         A pulse that the driver ramps is by now beyond the last one sent.
         """
         if self._longest_lead_s == inf:
-            self.found(pulse_steps)
+            self.adopt_pulse(pulse_steps)
 
-    def gives(self, pulse_steps: int) -> None:
+    def record_pulse(self, pulse_steps: int) -> None:
         """Record its pulse, whatever its goal is."""
         self.on = pulse_steps > 0
         if self.on:
-            self.ramp.found(pulse_steps)
+            self.ramp.set_pulse(pulse_steps)
         else:
             self.ramp.stop()
 
-    def off_goal(self, pulse_steps: int) -> bool:
+    def is_off_goal(self, pulse_steps: int) -> bool:
         """Record the end of a move; return whether it ended off goal twice at the same pulse."""
         before, self._end_steps = self._end_steps, pulse_steps
         short = self.goal_steps - pulse_steps
         self._bottom = -inf
         self._top = inf
-        self.ramp.found(pulse_steps)
+        self.ramp.set_pulse(pulse_steps)
         if before != pulse_steps or abs(short) <= FINE_STEPS:
             return False
         if short > 0:
@@ -284,22 +284,22 @@ class Channel:
             self._bottom = pulse_steps
         return True
 
-    def settle(self, pulse_steps: int) -> None:
+    def adopt_position(self, pulse_steps: int) -> None:
         """Adopt a pulse as the servo's position, as it has been unchanged for a long time."""
-        self.found(pulse_steps)
+        self.adopt_pulse(pulse_steps)
         if pulse_steps:
             self.ramp.shaft_steps = pulse_steps
-            self._placed = True
+            self._is_position_known = True
 
-    def inside(self) -> bool:
+    def is_within_limits(self) -> bool:
         """Return whether the pulse is within the limits."""
-        return self.fits(self.ramp.pulse_steps)
+        return self.is_pulse_allowed(self.ramp.pulse_steps)
 
-    def fits(self, pulse_steps: float) -> bool:
+    def is_pulse_allowed(self, pulse_steps: float) -> bool:
         """Return whether a pulse is within the limits."""
         return self.setup.min_steps <= pulse_steps <= self.setup.max_steps
 
-    def rearm(self) -> None:
+    def record_rearm(self) -> None:
         """Record that it was enabled again: plans must begin at its pulse."""
         self.rearmed = True
         self.ramp.shaft_steps = self.ramp.pulse_steps
@@ -310,10 +310,10 @@ class Channel:
         return rearmed or self.entering
 
 
-def _rest(setup: ServoConfig) -> float:
+def _rest_steps(setup: ServoConfig) -> float:
     middle = (setup.min_steps + setup.max_steps) // 2
     return middle if setup.rest_steps is None else setup.rest_steps
 
 
-def _own_speed(setup: ServoConfig) -> float:
+def _own_speed_steps_s(setup: ServoConfig) -> float:
     return setup.own_speed_steps_s or setup.max_speed_steps_s

@@ -54,10 +54,10 @@ class HobbyBoardParams(ABC):
         """Return the number of channels."""
 
     @abstractmethod
-    def ends_us(self) -> tuple[float, float, str]:
+    def pulse_range_us(self) -> tuple[float, float, str]:
         """Return the shortest and longest pulse that may be sent, us, and the origin of both."""
 
-    def check(self, setup: "ServoConfig") -> None:
+    def check_servo(self, setup: "ServoConfig") -> None:
         """Reject a servo that no channel can have.
 
         Raises:
@@ -66,7 +66,7 @@ class HobbyBoardParams(ABC):
         if not 0 <= setup.id < self.channels:
             raise ValueError(f"channel {setup.id}: the board has channels 0 to {self.channels - 1}")
         low, high = setup.min_steps / US_STEPS, setup.max_steps / US_STEPS
-        least, most, decided = self.ends_us()
+        least, most, decided = self.pulse_range_us()
         if not least <= low <= high <= most:
             raise ValueError(
                 f"channel {setup.id}: its range {low:g}..{high:g} us must lie within "

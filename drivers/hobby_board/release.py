@@ -17,7 +17,7 @@ class Stoppable(Protocol):
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop the pulses of channels."""
 
-    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Return the present pulses, None if the board does not answer."""
 
 
@@ -31,7 +31,7 @@ def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:
     heard: set[int] = set()
     for attempt in range(TRIES):
         board.stop(left, attempt == TRIES - 1)
-        found = board.pulses(left)
+        found = board.read_pulses(left)
         if found is not None:
             heard.update(left)
             left = tuple(channel for channel, pulse in zip(left, found, strict=True) if pulse)

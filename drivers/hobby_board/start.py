@@ -19,7 +19,7 @@ class HoldResult(Enum):
 
     HELD = "held"
     NO_ANSWER = "no answer"
-    ELSEWHERE = "elsewhere"
+    OTHER_PULSE = "elsewhere"
 
 
 def hold_channel(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
@@ -38,30 +38,30 @@ def hold_channel(board: Board, channel: Channel, pulse_steps: int) -> HoldResult
     if not board.send_limits([channel], confirmed=True):
         return HoldResult.NO_ANSWER
     board.send_goals([channel])
-    found = board.pulses((channel.id,))
+    found = board.read_pulses((channel.id,))
     channel.advance(board.line.port.now_s())
     if found is None:
         return HoldResult.NO_ANSWER
     low, high = sorted((pulse_steps or goal, goal))
     # A first pulse is exact; another one may have been moving when it was read.
-    room = channel.room_steps() if pulse_steps else FINE_STEPS
+    room = channel.pulse_tolerance_steps() if pulse_steps else FINE_STEPS
     if not found[0] or not low - room <= found[0] <= high + room:
-        channel.gives(found[0])
-        return HoldResult.ELSEWHERE
-    channel.ramp.found(found[0])
-    channel.hold()
+        channel.record_pulse(found[0])
+        return HoldResult.OTHER_PULSE
+    channel.ramp.set_pulse(found[0])
+    channel.record_hold()
     return HoldResult.HELD
 
 
-def refusal(board: Board, channel: Channel) -> str:
+def refusal_text(board: Board, channel: Channel) -> str:
     """Return why a channel's pulse differs from the commanded one, with the remedy."""
     goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
     if not pulse:
-        return f"{channel.setup.label('channel')} has no pulses: {board.texts.no_pulses}"
+        return f"{channel.setup.label('channel')} has no pulses: {board.texts.no_pulses_remedy}"
     sent, got = f"{goal / US_STEPS:g} us", f"{pulse / US_STEPS:g} us"
     return (
         f"{channel.setup.label('channel')} is sent to {sent} and gets {got}: "
-        f"{board.texts.other_pulse}"
+        f"{board.texts.other_pulse_remedy}"
     )
 
 
@@ -74,16 +74,16 @@ def read_every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, 
     """
     ids = tuple(setup.id for setup in setups)
     for _ in range(TRIES):
-        pulses = board.pulses(ids)
+        pulses = board.read_pulses(ids)
         if pulses is not None:
             return pulses
     where = board.line.port.port_name
     for setup in setups:
-        if board.pulses((setup.id,)) is None:
+        if board.read_pulses((setup.id,)) is None:
             raise ServoMissing(
-                f"{where}: no answer about {setup.label('channel')}: {board.texts.no_answer}"
+                f"{where}: no answer about {setup.label('channel')}: {board.texts.no_answer_remedy}"
             )
-    raise ServoMissing(f"{where}: answers are lost: {board.texts.noise}")
+    raise ServoMissing(f"{where}: answers are lost: {board.texts.noise_remedy}")
 
 
 def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
@@ -96,7 +96,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
     board.prepare(log)
     pulses = read_every_pulse(board, [channel.setup for channel in channels])
     for channel, pulse in zip(channels, pulses, strict=True):
-        channel.found(pulse)
+        channel.adopt_pulse(pulse)
     without_pulses = [channel.setup.label("channel") for channel in channels if not channel.on]
     if without_pulses:
         log.add(f"{', '.join(without_pulses)} had no pulses: they move to their goals immediately")
@@ -114,11 +114,11 @@ def _enable_channel(board: Board, channel: Channel, pulse: int) -> None:
         outcome = hold_channel(board, channel, pulse)
         if outcome is HoldResult.HELD:
             return
-        if outcome is HoldResult.ELSEWHERE and channel.on:
+        if outcome is HoldResult.OTHER_PULSE and channel.on:
             break
     where = board.line.port.port_name
     if outcome is HoldResult.NO_ANSWER:
         raise ServoMissing(
             f"{where}: no answer about {channel.setup.label('channel')}: check its cable"
         )
-    raise ServoMissing(f"{where}: {refusal(board, channel)}")
+    raise ServoMissing(f"{where}: {refusal_text(board, channel)}")

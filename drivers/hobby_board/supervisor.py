@@ -12,7 +12,7 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.params import HOBBY
-from gazerig.drivers.hobby_board.start import HoldResult, hold_channel, refusal
+from gazerig.drivers.hobby_board.start import HoldResult, hold_channel, refusal_text
 from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
@@ -33,7 +33,7 @@ class BoardSupervisor:
     """Supervisor of a board's status, which recovers its channels.
 
     engaged: whether goals are followed
-    sure: whether goals may be sent, as the board has kept its settings
+    may_send_goals: whether goals may be sent, as the board has kept its settings
     pending: channels with an unknown position, until they are held again
     """
 
@@ -42,18 +42,18 @@ class BoardSupervisor:
         self._line = board.line
         self._channels = tuple(channels)
         self._log = log
-        self._led = board.timing.longest_ramp_s < inf
+        self._is_ramped_here = board.timing.longest_ramp_s < inf
         self.engaged = False
         self.pending: list[Channel] = []
-        self._asked = -1
-        self.sure = True
-        self._unhandled: tuple[str, ...] = ()
+        self._channel_index = -1
+        self.may_send_goals = True
+        self._unhandled_errors: tuple[str, ...] = ()
         self._restarts: list[float] = []
         self._errors_s: dict[str, float] = {}
         self._disturbed: list[float] = []
         self._damages = 0
         self._last_found = -1, 0
-        self._damaged_s = self._hold_at_s = self._told_s = -inf
+        self._damaged_s = self._hold_at_s = self._reported_s = -inf
 
     def start_supervision(self) -> None:
         """Start supervision of enabled channels."""
@@ -62,21 +62,21 @@ class BoardSupervisor:
         self._disturbed.clear()
         self._hold_at_s = -inf
         self.pending.clear()
-        self.sure, self._unhandled = True, ()
+        self.may_send_goals, self._unhandled_errors = True, ()
 
     def stop_supervision(self) -> None:
         """Stop supervision."""
         self.engaged = False
         self.pending.clear()
         for channel in self._channels:
-            channel.release()
+            channel.record_release()
 
     def mark_all_for_recovery(self) -> None:
         """Mark every channel to be enabled again."""
-        self.sure = False
+        self.may_send_goals = False
         if self.engaged:
             for channel in self._channels:
-                self._drop(channel)
+                self._mark_for_recovery(channel)
 
     def record_errors(self, names: Sequence[str], now_s: float) -> None:
         """Record errors that the board has reported."""
@@ -92,7 +92,7 @@ class BoardSupervisor:
 
     # --- in every read
 
-    def watch(self) -> bool:
+    def check_status(self) -> bool:
         """Read the errors and one channel's pulse, and act on them.
 
         Returns:
@@ -101,35 +101,35 @@ class BoardSupervisor:
         Raises:
             BusLost: the port is lost.
         """
-        self._asked = (self._asked + 1) % len(self._channels)
-        channel = self._channels[self._asked]
-        if self.engaged and self._led:
-            self.lead()
-        found = self._board.look(channel)
+        self._channel_index = (self._channel_index + 1) % len(self._channels)
+        channel = self._channels[self._channel_index]
+        if self.engaged and self._is_ramped_here:
+            self.advance_pulses()
+        found = self._board.read_status(channel)
         if found is None:
-            self.sure = False
+            self.may_send_goals = False
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
         self.record_errors(found.errors, now_s)
         if self.engaged:
-            self._unhandled = (*self._unhandled, *found.errors)
+            self._unhandled_errors = (*self._unhandled_errors, *found.errors)
             pulse = found.pulse_steps
-            odd = channel.held and channel.implausible(pulse, now_s)
-            if self._unhandled or not self.sure or odd:
+            odd = channel.held and channel.is_implausible(pulse, now_s)
+            if self._unhandled_errors or not self.may_send_goals or odd:
                 if not self._check_all():
                     return False
             elif channel.held:
-                channel.confirmed(pulse)
+                channel.record_expected_pulse(pulse)
             if self.pending and now_s >= self._hold_at_s:
                 self._recover_next(now_s)
             for one in self._channels:
-                if one.entering and one.inside():
+                if one.entering and one.is_within_limits():
                     one.entering = False
                     self._board.send_limits([one], confirmed=False)
             return True
-        channel.found(found.pulse_steps)
-        self.sure = True
+        channel.adopt_pulse(found.pulse_steps)
+        self.may_send_goals = True
         return True
 
     def advance(self, now_s: float) -> None:
@@ -137,43 +137,43 @@ class BoardSupervisor:
         for channel in self._channels:
             channel.advance(now_s)
 
-    def lead(self) -> None:
+    def advance_pulses(self) -> None:
         """Advance moving pulses if the board does not do so itself."""
-        if not self._led:
+        if not self._is_ramped_here:
             return
         self.advance(self._line.port.now_s())
         off = [channel.id for channel in self.pending if not channel.on]
         if off:
             self._board.stop(off)  # noise may have begun their pulses
-        if self.sure:
-            self._board.lead([channel for channel in self._channels if channel.held])
+        if self.may_send_goals:
+            self._board.advance_pulses([channel for channel in self._channels if channel.held])
 
     def _check_all(self) -> bool:
         """Compare every channel's pulse with the expected one; return whether they were read."""
-        pulses = self._board.pulses([channel.id for channel in self._channels])
+        pulses = self._board.read_pulses([channel.id for channel in self._channels])
         if pulses is None:
-            self.sure = False
+            self.may_send_goals = False
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
-        errors, sure = tuple(dict.fromkeys(self._unhandled)), self.sure
-        self._unhandled, self.sure = (), True
+        errors, sure = tuple(dict.fromkeys(self._unhandled_errors)), self.may_send_goals
+        self._unhandled_errors, self.may_send_goals = (), True
         away = bool(errors) or not sure
         found = dict(zip(self._channels, pulses, strict=True))
         held = [channel for channel in self._channels if channel.held]
-        odd = [channel for channel in held if channel.implausible(found[channel], now_s, away)]
+        odd = [channel for channel in held if channel.is_implausible(found[channel], now_s, away)]
         home = [channel for channel in odd if not found[channel]]
         # Boards that ramp to their home are lost with any unexpected pulse as well.
-        astray = not self._led and (home or away or len(odd) == len(held))
+        astray = not self._is_ramped_here and (home or away or len(odd) == len(held))
         lost = odd if astray else home
         if lost:
             self._record_lost_hold(lost, errors, now_s)
         for channel in odd:
             if channel not in lost:
-                self._off_goal(channel, found[channel])
+                self._record_off_goal(channel, found[channel])
         for channel in held:
             if channel not in odd:
-                channel.confirmed(found[channel])
+                channel.record_expected_pulse(found[channel])
         if away or home:
             # A restart loses the limits: they are armed before the goals are sent. A board that
             # moves its channels home at their armed speed has not moved them far yet. A goal to a
@@ -182,24 +182,24 @@ class BoardSupervisor:
             held = [channel for channel in self._channels if channel.held]
             if held:
                 if not self._board.send_limits(held, confirmed=True):
-                    self.sure = False
+                    self.may_send_goals = False
                 else:
                     self._board.send_goals(held)
         for channel in self.pending:
-            channel.found(found[channel])
+            channel.adopt_pulse(found[channel])
         return True
 
-    def _off_goal(self, channel: Channel, pulse: int) -> None:
+    def _record_off_goal(self, channel: Channel, pulse: int) -> None:
         """Record that a channel stays off its goal, at a limit of the board's own range."""
-        if self._led:
+        if self._is_ramped_here:
             # Boards ramped by the driver have no range of their own: the command was lost.
             self._line.errors["other pulse"] += 1
-            channel.found(pulse)
+            channel.adopt_pulse(pulse)
             return
-        if channel.off_goal(pulse) and not channel.off_goal_reported:
+        if channel.is_off_goal(pulse) and not channel.off_goal_reported:
             channel.off_goal_reported = True
             self._line.errors["other pulse"] += 1
-            self._log.add(refusal(self._board, channel))
+            self._log.add(refusal_text(self._board, channel))
 
     def _record_lost_hold(
         self, lost: Sequence[Channel], errors: Sequence[str], now_s: float
@@ -213,8 +213,8 @@ class BoardSupervisor:
         )
         self._line.errors["restarted"] += 1
         for channel in lost:
-            self._drop(channel)
-        if named or self._recent_noise(now_s):
+            self._mark_for_recovery(channel)
+        if named or self._is_noisy(now_s):
             self._wait_for_quiet(who, named or "bytes arrive damaged", now_s)
             return
         self._restarts = [at_s for at_s in self._restarts if now_s - at_s < WITHIN_S]
@@ -227,15 +227,15 @@ class BoardSupervisor:
                 self._log.add(f"{channel.setup.label('channel')}: {fault}")
             self._board.stop([channel.id for channel in self.pending])
             for channel in self.pending:
-                channel.stop()
+                channel.record_stop()
             self.pending.clear()
         else:
             self._log.add(f"{who} restarted: set up again")
 
-    def _recent_noise(self, now_s: float) -> bool:
+    def _is_noisy(self, now_s: float) -> bool:
         """Return whether bytes to or from the board have been damaged recently."""
         errors = self._line.errors
-        damages = sum(errors[name] for name in self._board.damage)
+        damages = sum(errors[name] for name in self._board.noise_errors)
         if damages != self._damages:
             self._damages, self._damaged_s = damages, now_s
         return now_s - self._damaged_s < WITHIN_S
@@ -249,52 +249,59 @@ class BoardSupervisor:
         self._disturbed.append(now_s)
         often = len(self._disturbed) - MOST_RESTARTS
         self._hold_at_s = now_s + min(LONGEST_REST_S, REST_S * often) if often > 0 else -inf
-        if now_s - self._told_s < WITHIN_S and often != 1:
+        if now_s - self._reported_s < WITHIN_S and often != 1:
             return
-        self._told_s = now_s
-        again = f" again and again: held once the line is quiet; {self._board.texts.noise}"
+        self._reported_s = now_s
+        again = f" again and again: held once the line is quiet; {self._board.texts.noise_remedy}"
         rest = again if often > 0 else ": set up again"
         self._log.add(f"{who} was sent home by an error ({named}){rest}")
 
-    def _drop(self, channel: Channel) -> None:
+    def _mark_for_recovery(self, channel: Channel) -> None:
         if channel.held:
-            channel.release()
+            channel.record_release()
             self.pending.append(channel)
 
     def _recover_next(self, now_s: float) -> None:
         """Enable one channel again; the next one at the next read, to spare the supply."""
         channel = self.pending[0]
-        found = self._board.pulses((channel.id,))
+        found = self._board.read_pulses((channel.id,))
         if found is None:
             return
         pulse = found[0]
         before, self._last_found = self._last_found, (channel.id, pulse)
-        if self._never_sent(channel, pulse, now_s):
+        if self._is_unsendable(channel, pulse, now_s):
             pulse = 0
-        elif pulse and not self._led:
+        elif pulse and not self._is_ramped_here:
             # A goal to a channel without pulses is not ramped, so its pulse is read twice.
-            twice = before[0] == channel.id and abs(before[1] - pulse) <= channel.room_steps()
+            twice = (
+                before[0] == channel.id
+                and abs(before[1] - pulse) <= channel.pulse_tolerance_steps()
+            )
             if pulse < LEAST_STEPS or not twice:
                 return
-        channel.found(pulse)
+        channel.adopt_pulse(pulse)
         outcome = hold_channel(self._board, channel, pulse)
         if outcome is HoldResult.HELD:
-            channel.rearm()
+            channel.record_rearm()
             self.pending.remove(channel)
-        elif outcome is HoldResult.ELSEWHERE and channel.on:
-            if self._never_sent(channel, round(channel.ramp.pulse_steps), now_s):
+        elif outcome is HoldResult.OTHER_PULSE and channel.on:
+            if self._is_unsendable(channel, round(channel.ramp.pulse_steps), now_s):
                 self._line.errors["damaged"] += 1
-                channel.gives(0)  # tried again at the next read
+                channel.record_pulse(0)  # tried again at the next read
                 return
             # It outputs other pulses: report that once, and hold it at these.
-            self._off_goal(channel, round(channel.ramp.pulse_steps))
-            channel.hold()
-            channel.rearm()
+            self._record_off_goal(channel, round(channel.ramp.pulse_steps))
+            channel.record_hold()
+            channel.record_rearm()
             self.pending.remove(channel)
 
-    def _never_sent(self, channel: Channel, pulse: int, now_s: float) -> bool:
+    def _is_unsendable(self, channel: Channel, pulse: int, now_s: float) -> bool:
         """Return whether this driver cannot have sent a pulse: the line may damage one bit."""
-        return self._led and not channel.fits(pulse) and channel.implausible(pulse, now_s)
+        return (
+            self._is_ramped_here
+            and not channel.is_pulse_allowed(pulse)
+            and channel.is_implausible(pulse, now_s)
+        )
 
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
@@ -318,27 +325,27 @@ class SilenceMonitor:
         self._log, self._lateness = log, lateness
         self.missed = 0
         self._reported = False
-        self._spoilt = 0
+        self._damaged_answers = 0
         self._back_s: float | None = None
         self._since_s, self._due_s, self._wait_s = 0.0, -inf, AGAIN_FIRST_S
 
-    def due(self, now_s: float) -> bool:
+    def is_due(self, now_s: float) -> bool:
         """Return whether a request is due."""
         return now_s >= self._due_s
 
-    def miss(self, now_s: float, heard_s: float = -inf) -> None:
+    def record_miss(self, now_s: float, heard_s: float = -inf) -> None:
         """Record a missing or damaged answer; ``heard_s``: time of the last received byte."""
         if not self.missed:
             self._wait_s = AGAIN_FIRST_S
             if self._back_s is None:
-                self._since_s, self._spoilt = now_s, 0
+                self._since_s, self._damaged_answers = now_s, 0
         self._back_s = None
         self.missed += 1
         if self.missed >= IN_A_ROW:
             self._due_s = now_s + self._wait_s
             self._wait_s = min(AGAIN_LAST_S, 2.0 * self._wait_s)
-        self._spoilt += heard_s >= now_s
-        damaged = self._spoilt >= IN_A_ROW
+        self._damaged_answers += heard_s >= now_s
+        damaged = self._damaged_answers >= IN_A_ROW
         if not self._reported and now_s - self._since_s >= (SILENCE_S if damaged else BLAME_S):
             self._reported = True
             self._log.add(
@@ -347,14 +354,14 @@ class SilenceMonitor:
                 else "the board does not answer: check its power and the cable"
             )
 
-    def answer(self, now_s: float) -> None:
+    def record_answer(self, now_s: float) -> None:
         """Record an answer."""
         if self.missed:
             self.missed, self._due_s, self._back_s = 0, -inf, now_s
         if self._back_s is None or now_s - self._back_s < OWED_S:
             return
         silent_s = self._back_s - self._since_s
-        noise = self._spoilt >= IN_A_ROW
+        noise = self._damaged_answers >= IN_A_ROW
         if silent_s >= SILENCE_S and not noise and self._lateness.was_late_since(self._since_s):
             self._log.add(STOOD_STILL.format(silent_s))
         elif self._reported:
@@ -365,6 +372,6 @@ class SilenceMonitor:
             )
         self._reported, self._back_s = False, None
 
-    def seconds(self, now_s: float) -> float:
+    def silent_for_s(self, now_s: float) -> float:
         """Return the time without an answer, seconds; 0 if the last request was answered."""
         return now_s - self._since_s if self.missed else 0.0

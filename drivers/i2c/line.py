@@ -54,7 +54,7 @@ class I2cLine:
         answer, _ = port.exchange(packet, wanted, deadline_s)
         self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
-        self.failure = self._error_of(answer, lengths)
+        self.failure = self._answer_error(answer, lengths)
         self._late = self.failure in ("timeout", "incomplete", "damaged")
         if self.failure:
             self.errors[self.failure] += 1
@@ -66,7 +66,7 @@ class I2cLine:
         return found
 
     @staticmethod
-    def _error_of(answer: bytes, lengths: Sequence[int]) -> str:
+    def _answer_error(answer: bytes, lengths: Sequence[int]) -> str:
         """Return the error in an answer, "" for none."""
         if not answer:
             return "timeout"

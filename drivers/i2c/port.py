@@ -69,7 +69,7 @@ class I2cPort:
         try:
             bus = self._open_bus(self.port_name)
         except OSError as error:
-            raise PortError(explain(self.port_name, error.errno)) from error
+            raise PortError(open_failure_text(self.port_name, error.errno)) from error
         if bus.fd is not None:
             try:
                 if self._exclusive:
@@ -78,7 +78,7 @@ class I2cPort:
                 fcntl.ioctl(bus.fd, I2C_RETRIES, 1)
             except OSError as error:
                 bus.close()
-                raise PortError(explain(self.port_name, error.errno)) from error
+                raise PortError(open_failure_text(self.port_name, error.errno)) from error
         self._bus, self._waiting, self._status = bus, b"", OK
         self._checked.clear()
         return True
@@ -182,7 +182,7 @@ class I2cPort:
         return BusLost(f"{self.port_name} is gone ({reason}): check the adapter and its cable")
 
 
-def explain(path: str, code: int | None) -> str:
+def open_failure_text(path: str, code: int | None) -> str:
     """Return in one line why an I2C bus cannot be opened, with the remedy."""
     here = ", ".join(sorted(map(str, Path("/dev").glob("i2c-*")))) or "none"
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
@@ -193,14 +193,14 @@ def explain(path: str, code: int | None) -> str:
     if code in (errno.EACCES, errno.EPERM):
         return (
             f"no permission to open {path}: join its group with "
-            f"'sudo usermod -aG {group_of(path)} $USER' and log in again"
+            f"'sudo usermod -aG {device_group(path)} $USER' and log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN):
         return f"{path} is busy: close the other program that moves servos on it"
     return f"{path} is no I2C bus ({os.strerror(code) if code else 'unknown'}); buses here: {here}"
 
 
-def group_of(path: str) -> str:
+def device_group(path: str) -> str:
     """Return the group that may use a device, "i2c" if it is unknown."""
     try:
         status = os.stat(path)

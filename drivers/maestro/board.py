@@ -8,7 +8,7 @@ from math import inf
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing, goals_of
+from gazerig.drivers.hobby_board.board import BoardTexts, BoardTiming, ChannelStatus, goals_of
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.start import read_every_pulse
@@ -31,21 +31,21 @@ from gazerig.drivers.types import ServoConfig
 class MaestroBoard:
     """One board; implements gazerig.drivers.hobby_board.board.Board."""
 
-    damage = ("damaged", "incomplete", *ERRORS)
+    noise_errors = ("damaged", "incomplete", *ERRORS)
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
         self.params = params
         self.line = MaestroLink(port, params)
-        self.timing = Timing(
+        self.timing = BoardTiming(
             params.baud, params.watch_ms / 1000.0, params.stagger_ms / 1000.0, params.give_up_s, inf
         )
         self.texts = BoardTexts(
             name=f"board {params.device}",
-            no_pulses="set its channel to Servo in Pololu's program",
-            other_pulse="widen its range in Pololu's program, or delete the board's script",
-            noise="check cable, ground and baud rate",
-            no_answer=f"has the board {params.channels} channels?",
-            left_alone="the board keeps its last goals while it has power",
+            no_pulses_remedy="set its channel to Servo in Pololu's program",
+            other_pulse_remedy="widen its range in Pololu's program, or delete the board's script",
+            noise_remedy="check cable, ground and baud rate",
+            no_answer_remedy=f"has the board {params.channels} channels?",
+            unreachable_behaviour="the board keeps its last goals while it has power",
         )
         self._errors_first = False
         self._questions: dict[int, tuple[bytes, bytes]] = {}
@@ -58,7 +58,7 @@ class MaestroBoard:
             ServoMissing: it does not answer, or a channel is not a servo channel.
         """
         where = self.line.port.port_name
-        register = self.line.greet()
+        register = self.line.wait_for_answer()
         if register is None:
             params = self.params
             number = f", its device number {params.device}" if params.protocol == "pololu" else ""
@@ -86,15 +86,15 @@ class MaestroBoard:
 
     def prepare(self, log: EventLog) -> None:
         """Stop the board's own script if one runs: it would move servos against this program."""
-        if self.line.ask(self.line.speech.script_status(), 1) == b"\0":
-            self.line.send(self.line.speech.stop_script())
+        if self.line.ask(self.line.codec.script_status(), 1) == b"\0":
+            self.line.send(self.line.codec.stop_script())
             log.add("the board ran a script of its own: stopped")
 
-    def look(self, channel: Channel) -> ChannelStatus | None:
+    def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read one channel's pulse and the error register; None without an answer."""
         questions = self._questions.get(channel.id)
         if questions is None:
-            speech = self.line.speech
+            speech = self.line.codec
             one, other = speech.position(channel.id), speech.errors()
             questions = self._questions[channel.id] = one + other, other + one
         # The order alternates: on a line that repeats its last answer a pulse width takes the place
@@ -110,18 +110,18 @@ class MaestroBoard:
             return None
         return ChannelStatus(pulse, name_errors(register | self.line.take_errors()))
 
-    def wake(self) -> tuple[str, ...] | None:
+    def read_waking_errors(self) -> tuple[str, ...] | None:
         """Read the errors of a board that may have to detect its baud rate; None if silent."""
-        register = self.line.wake()
+        register = self.line.read_waking_errors()
         return None if register is None else name_errors(register)
 
-    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Return the confirmed present pulses of channels; None after a failure."""
-        return self.line.pulses(channels)
+        return self.line.read_pulses(channels)
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
         """Arm speed and acceleration; return False if a requested confirmation fails."""
-        packet, speech = b"", self.line.speech
+        packet, speech = b"", self.line.codec
         for channel in channels:
             speed = speed_units(channel.top_speed_steps_s)
             accel = accel_units(channel.setup.max_accel_steps_s2)
@@ -135,12 +135,12 @@ class MaestroBoard:
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send the goals of channels."""
-        self.line.send(self.line.speech.targets(goals_of(channels)))
+        self.line.send(self.line.codec.targets(goals_of(channels)))
 
     def resend_pulses(self, channels: Sequence[Channel]) -> None:
         """Do nothing: a board that may have restarted would apply goals without any ramp."""
 
-    def lead(self, channels: Sequence[Channel]) -> None:
+    def advance_pulses(self, channels: Sequence[Channel]) -> None:
         """Do nothing: the board ramps its pulses itself."""
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
@@ -174,7 +174,7 @@ class MaestroBus(HobbyBoardBus):
             BusLost: the port is lost.
         """
         self._supervisor.stop_supervision()
-        self._maestro.line.send(self._maestro.line.speech.go_home())
+        self._maestro.line.send(self._maestro.line.codec.go_home())
 
     def moving(self) -> bool | None:
         """Return whether any channel with a limit is moving; None if unknown.
@@ -186,5 +186,5 @@ class MaestroBus(HobbyBoardBus):
         """
         if self._maestro.params.channels <= MICRO:
             return None
-        answer = self._maestro.line.ask(self._maestro.line.speech.moving(), 1)
+        answer = self._maestro.line.ask(self._maestro.line.codec.moving(), 1)
         return None if answer is None else bool(answer[0])

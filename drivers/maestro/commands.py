@@ -112,7 +112,7 @@ class MaestroCodec:
 
     def target(self, channel: int, steps: int) -> bytes:
         """Encode a channel's target, a pulse width in quarter microseconds; 0: no pulses."""
-        return self.command(SET_TARGET, channel, *split(steps))
+        return self.command(SET_TARGET, channel, *seven_bit_bytes(steps))
 
     def targets(self, goals: Mapping[int, int]) -> bytes:
         """Encode targets: one command for every run of adjacent channels, if the board has it.
@@ -120,7 +120,7 @@ class MaestroCodec:
         goals: pulse width by channel, quarter microseconds
         """
         packet = b""
-        for run in runs(sorted(goals)):
+        for run in adjacent_runs(sorted(goals)):
             if len(run) > 1 and self.channels > MICRO:
                 widths = [goals[channel] for channel in run]
                 data = [0] * (2 * len(run))
@@ -134,11 +134,11 @@ class MaestroCodec:
 
     def speed(self, channel: int, units: int) -> bytes:
         """Encode a channel's speed limit, 0.25 us per 10 ms; 0: unlimited."""
-        return self.command(SET_SPEED, channel, *split(units))
+        return self.command(SET_SPEED, channel, *seven_bit_bytes(units))
 
     def acceleration(self, channel: int, units: int) -> bytes:
         """Encode a channel's acceleration limit, 0..255 in 0.25 us per 10 ms per 80 ms; 0: none."""
-        return self.command(SET_ACCELERATION, channel, *split(units))
+        return self.command(SET_ACCELERATION, channel, *seven_bit_bytes(units))
 
     def position(self, channel: int) -> bytes:
         """Encode a request for a channel's present pulse width; the answer is a word."""
@@ -165,7 +165,7 @@ class MaestroCodec:
         return self.command(SCRIPT_STATUS)
 
 
-def split(number: int) -> tuple[int, int]:
+def seven_bit_bytes(number: int) -> tuple[int, int]:
     """Return a number's two data bytes of seven bits, the low one first.
 
     Raises:
@@ -176,7 +176,7 @@ def split(number: int) -> tuple[int, int]:
     return number & 0x7F, number >> 7
 
 
-def runs(channels: Sequence[int]) -> list[list[int]]:
+def adjacent_runs(channels: Sequence[int]) -> list[list[int]]:
     """Split ascending channels into runs of adjacent ones."""
     parted: list[list[int]] = []
     for channel in channels:

@@ -26,7 +26,7 @@ them."""
 class MaestroLink:
     """A port with one board; every method may raise BusLost.
 
-    speech: encoder of the board's commands
+    codec: encoder of the board's commands
     tx_bytes, rx_bytes: counts since creation
     errors: counts by kind
     lateness: counter of answers after their time-outs
@@ -34,7 +34,7 @@ class MaestroLink:
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
         self.port = port
-        self.speech = MaestroCodec(params.protocol, params.device, params.crc, params.channels)
+        self.codec = MaestroCodec(params.protocol, params.device, params.crc, params.channels)
         # A command in the Pololu form begins with the byte that a board needs to detect its baud
         # rate; any other board simply answers it.
         self._waking = MaestroCodec("pololu", params.device, params.crc).errors()
@@ -44,8 +44,8 @@ class MaestroLink:
         self._byte_s = BITS_PER_BYTE / params.baud
         self._reply_timeout_s = params.reply_timeout_ms / 1000.0
         self._late = False
-        self._owed = 0
-        self._unhandled = 0
+        self._owed_bytes = 0
+        self._unhandled_errors = 0
 
     def send(self, packet: bytes) -> None:
         """Send commands that are not answered."""
@@ -55,20 +55,20 @@ class MaestroLink:
     def ask(self, packet: bytes, length: int) -> bytes | None:
         """Send requests and return their answers; None if they do not come in time."""
         port = self.port
-        if self._late or self._owed:
+        if self._late or self._owed_bytes:
             # After a silence answers to earlier requests may come first.
             dropped = port.drain()
-            if 0 < dropped <= self._owed:
+            if 0 < dropped <= self._owed_bytes:
                 self.lateness.record_late_answer(port.now_s())
             if not self._late and not dropped:
-                self._owed = 0
+                self._owed_bytes = 0
         wire_s = (len(packet) + length) * self._byte_s
         deadline_s = port.now_s() + wire_s + self._reply_timeout_s
         answer, _ = port.exchange(packet, length, deadline_s)
         self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
         self._late = len(answer) < length
-        self._owed += length - len(answer)
+        self._owed_bytes += length - len(answer)
         if self._late:
             self.errors["incomplete" if answer else "timeout"] += 1
             return None
@@ -92,29 +92,29 @@ class MaestroLink:
 
         On an error it may have stopped all pulses, so no command that moves a servo may follow.
         """
-        found = self.ask_words(packet + self.speech.errors(), 1)
+        found = self.ask_words(packet + self.codec.errors(), 1)
         if found is None:
             return False
-        self._unhandled |= found[0]
+        self._unhandled_errors |= found[0]
         return not found[0]
 
     def take_errors(self) -> int:
         """Return the errors that ``send_checked`` has found since the last call."""
-        register, self._unhandled = self._unhandled, 0
+        register, self._unhandled_errors = self._unhandled_errors, 0
         return register
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Stop pulses."""
         # Each by its own command, so that a damaged one affects no other.
-        self.send(b"".join(self.speech.target(channel, 0) for channel in channels))
+        self.send(b"".join(self.codec.target(channel, 0) for channel in channels))
 
-    def greet(self) -> int | None:
+    def wait_for_answer(self) -> int | None:
         """Read the errors until the board answers; None if it stays silent.
 
         The request also lets a board detect its baud rate.
         """
         for attempt in range(GREETINGS):
-            packet = self._waking if attempt % 2 else self.speech.errors()
+            packet = self._waking if attempt % 2 else self.codec.errors()
             found = self.ask_words(packet, 1)
             if found is not None:
                 return found[0]
@@ -125,18 +125,18 @@ class MaestroLink:
 
         Other boards answer too, but find an error in every command.
         """
-        if not self.speech.crc:
+        if not self.codec.crc:
             return True
-        self.ask_words(self.speech.errors(), 1)
-        found = self.ask_words(self.speech.errors(), 1)
+        self.ask_words(self.codec.errors(), 1)
+        found = self.ask_words(self.codec.errors(), 1)
         return found is None or not found[0] >> PROTOCOL_ERROR & 1
 
-    def wake(self) -> int | None:
+    def read_waking_errors(self) -> int | None:
         """Read the errors once, so that a board that detects its baud rate wakes up."""
         found = self.ask_words(self._waking, 1)
         return found[0] if found is not None else None
 
-    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Read the pulse widths of some channels, quarter microseconds; 0: no pulses.
 
         They are read twice, as answers have no checksum and decide the position at which a channel
@@ -164,7 +164,7 @@ class MaestroLink:
         found: tuple[int, ...] = ()
         for i in range(0, len(channels), AT_ONCE):
             some = channels[i : i + AT_ONCE]
-            packet = b"".join(self.speech.position(channel) for channel in some)
+            packet = b"".join(self.codec.position(channel) for channel in some)
             got = self.ask_words(packet, len(some))
             if got is None:
                 return None

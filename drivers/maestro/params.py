@@ -25,6 +25,6 @@ class MaestroParams(HobbyBoardParams):
     channels: Annotated[int, Choices(6, 12, 18, 24), "Number of channels of the board; the Micro Maestro has 6."] = 12
     # fmt: on
 
-    def ends_us(self) -> tuple[float, float, str]:
+    def pulse_range_us(self) -> tuple[float, float, str]:
         """Return the shortest and longest pulse that a board can give."""
         return 64.0, 4080.0, "what a Maestro can give"

@@ -28,17 +28,17 @@ class DetectedMaestro(NamedTuple):
     """A board that answers.
 
     forms: command forms that it answers; "pololu" with the given device number
-    crc: whether it expects a check byte after every command
+    expects_crc: whether it expects a check byte after every command
     errors: errors of its error register, which is now cleared
-    script: whether its own script runs, None if unknown
+    is_script_running: whether its own script runs, None if unknown
     pulses: pulse widths by channel, quarter microseconds; 0: no pulses
     channels: number of channels, None if not counted
     """
 
     forms: tuple[Form, ...]
-    crc: bool
+    expects_crc: bool
     errors: tuple[str, ...]
-    script: bool | None
+    is_script_running: bool | None
     pulses: tuple[int, ...]
     channels: int | None
 
@@ -61,7 +61,7 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> Detected
         for form in (params.protocol, other):
             line = MaestroLink(port, replace(params, protocol=form, crc=crc))
             port.drain()
-            register = line.greet()
+            register = line.wait_for_answer()
             if register is not None and not register >> len(ERRORS) and line.expects_crc():
                 return _read_state(line, params, register, count)
     return None
@@ -71,12 +71,12 @@ def _read_state(
     line: MaestroLink, params: MaestroParams, register: int, count: bool
 ) -> DetectedMaestro | None:
     """Read the remaining state of a board that answers."""
-    crc = line.speech.crc
+    crc = line.codec.crc
     forms: tuple[Form, ...] = ()
     # If several boards share a line, all of them answer the compact form.
-    for form in FORMS if line.speech.form == "compact" else ("pololu",):
+    for form in FORMS if line.codec.form == "compact" else ("pololu",):
         spoken = MaestroLink(line.port, replace(params, protocol=form, crc=crc))
-        found = _retry(partial(spoken.ask_words, spoken.speech.errors(), 1))
+        found = _retry(partial(spoken.ask_words, spoken.codec.errors(), 1))
         if found is not None:
             forms, line = (*forms, form), spoken
             register |= found[0]
@@ -84,13 +84,13 @@ def _read_state(
             line.port.drain()
     if not forms:
         return None
-    status = line.ask(line.speech.script_status(), 1)
-    pulses = _retry(partial(line.pulses, range(min(MICRO, params.channels))))
+    status = line.ask(line.codec.script_status(), 1)
+    pulses = _retry(partial(line.read_pulses, range(min(MICRO, params.channels))))
     if pulses is None:
         return None
-    channels = _count(line) if count and not any(pulses) else None
+    channels = _count_channels(line) if count and not any(pulses) else None
     if channels is not None and channels > MICRO:
-        pulses = line.pulses(range(channels)) or pulses
+        pulses = line.read_pulses(range(channels)) or pulses
     script = None if status is None else status == b"\0"
     return DetectedMaestro(forms, crc, name_errors(register), script, pulses, channels)
 
@@ -100,13 +100,13 @@ def _retry(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | None:
     return next((answer for answer in (ask() for _ in range(TRIES)) if answer is not None), None)
 
 
-def _count(line: MaestroLink) -> int:
+def _count_channels(line: MaestroLink) -> int:
     """Return the number of channels: read the first one of each larger board until one fails."""
     for channels in sorted(USB_CHANNELS.values())[:-1]:
-        question = line.speech.position(channels) + line.speech.errors()
+        question = line.codec.position(channels) + line.codec.errors()
         found = line.ask_words(question, 2)
         if found is None or found[1] >> PROTOCOL_ERROR & 1:
             # The rejected command set an error bit, which is cleared here.
-            line.greet()
+            line.wait_for_answer()
             return channels
     return max(USB_CHANNELS.values())

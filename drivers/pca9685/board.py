@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.hobby_board.board import BoardTexts, ChannelStatus, Timing
+from gazerig.drivers.hobby_board.board import BoardTexts, BoardTiming, ChannelStatus
 from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.start import read_every_pulse
@@ -32,11 +32,11 @@ from gazerig.drivers.pca9685.registers import (
     SOFTWARE_RESET,
     START_S,
     TOTEM_POLE,
+    adjacent_runs,
     counts_of,
     counts_within,
-    output,
-    pulse,
-    runs,
+    output_register,
+    pulse_registers,
 )
 from gazerig.drivers.serial.port import BusPort, wait_until
 from gazerig.drivers.types import ServoConfig
@@ -64,12 +64,12 @@ class Pca9685Board:
         params: Addresses and timing of the boards.
     """
 
-    damage = ("damaged", "incomplete")
+    noise_errors = ("damaged", "incomplete")
 
     def __init__(self, port: BusPort, params: Pca9685Params) -> None:
         self.params = params
         self.line = I2cLine(port, params.baud, params.reply_timeout_ms)
-        self.timing = Timing(
+        self.timing = BoardTiming(
             params.baud,
             params.watch_ms / 1000.0,
             params.stagger_ms / 1000.0,
@@ -80,19 +80,21 @@ class Pca9685Board:
         again = "is another program using the board? check SDA, SCL and ground"
         self.texts = BoardTexts(
             name=f"board {named}",
-            no_pulses=again,
-            other_pulse=again,
-            noise="check SDA, SCL and ground, and the length of the cable",
-            no_answer="check power, SDA, SCL and ground of its board",
-            left_alone="the board keeps its last pulses while it has power",
+            no_pulses_remedy=again,
+            other_pulse_remedy=again,
+            noise_remedy="check SDA, SCL and ground, and the length of the cable",
+            no_answer_remedy="check power, SDA, SCL and ground of its board",
+            unreachable_behaviour="the board keeps its last pulses while it has power",
         )
         self._clocks = params.clocks
         self._places = [(address, nth) for address in params.addresses for nth in range(CHANNELS)]
-        self._grains = [self._clocks[address].grain_steps for address, _ in self._places]
+        self._resolution_steps = [
+            self._clocks[address].resolution_steps for address, _ in self._places
+        ]
         self._questions: dict[int, list[tuple[bytes, int]]] = {}
         self._sent: dict[int, tuple[int, int]] = {}
         self._sent_s = 0.0
-        self._looks = 0
+        self._next_look = 0
 
     # --- addresses and units
 
@@ -176,19 +178,19 @@ class Pca9685Board:
 
     # --- status
 
-    def look(self, channel: Channel) -> ChannelStatus | None:
+    def read_status(self, channel: Channel) -> ChannelStatus | None:
         """Read a channel's pulse and its board's mode; None without an answer.
 
         A board that was reset sleeps and outputs no pulses, whatever its registers contain.
         """
         address, nth = self._places[channel.id]
-        self._looks += 1
-        with_prescale = self._looks % PRESCALE_EVERY == 0
+        self._next_look += 1
+        with_prescale = self._next_look % PRESCALE_EVERY == 0
         questions = self._questions.get(channel.id)
         if questions is None:
             questions = self._questions[channel.id] = [
                 (bridge.read(address, MODE1, 1), 1),
-                (bridge.read(address, output(nth), BYTES), BYTES),
+                (bridge.read(address, output_register(nth), BYTES), BYTES),
                 (bridge.read(address, PRESCALE, 1), 1),
             ]
         found = self.line.ask(questions if with_prescale else questions[:2])
@@ -200,7 +202,7 @@ class Pca9685Board:
             return ChannelStatus(self._pulse_steps(channel.id, counts_of(found[1]), prescale))
         # The board has lost its setup, or was read badly.
         address, _ = self._places[channel.id]
-        now, pulses = self._modes(address), self.pulses((channel.id,))
+        now, pulses = self._modes(address), self.read_pulses((channel.id,))
         if now is None or pulses is None:
             return None
         well = now[0] & ~RESTART == AWAKE and now[2] == self._clocks[address].prescale
@@ -215,14 +217,14 @@ class Pca9685Board:
         sent, clock = self._sent.get(servo_id), self._clocks[self._places[servo_id][0]]
         if sent is not None and sent[0] == counts and prescale == clock.prescale:
             return sent[1]
-        return round(counts * clock._replace(prescale=prescale).grain_steps)
+        return round(counts * clock._replace(prescale=prescale).resolution_steps)
 
-    def wake(self) -> tuple[str, ...] | None:
+    def read_waking_errors(self) -> tuple[str, ...] | None:
         """Check whether the first board answers."""
         mode = self.line.ask([(bridge.read(self.params.address, MODE1, 1), 1)])
         return None if mode is None else ()
 
-    def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
+    def read_pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
         """Return the present pulses of channels, read twice; None if the reads differ or fail."""
         first = self._pulses_once(channels)
         second = None if first is None else self._pulses_once(channels)
@@ -245,7 +247,9 @@ class Pca9685Board:
                 continue
             # Each channel in one transfer only if the board auto-increments.
             size = BYTES if mode & AUTO_INCREMENT else 1
-            places = [output(channel) + k for channel in own for k in range(0, BYTES, size)]
+            places = [
+                output_register(channel) + k for channel in own for k in range(0, BYTES, size)
+            ]
             found = self.line.ask([(bridge.read(address, at, size), size) for at in places])
             if found is None:
                 return None
@@ -275,7 +279,9 @@ class Pca9685Board:
         for channel in channels:
             servo_id, setup, steps = channel.id, channel.setup, round(channel.ramp.pulse_steps)
             # Its intermediate pulse, inside its limits.
-            width = counts_within(steps, setup.min_steps, setup.max_steps, self._grains[servo_id])
+            width = counts_within(
+                steps, setup.min_steps, setup.max_steps, self._resolution_steps[servo_id]
+            )
             counts[servo_id], self._sent[servo_id] = width, (width, steps)
             channel.sent_steps = steps
         self._send(counts)
@@ -285,12 +291,14 @@ class Pca9685Board:
         boards: dict[int, dict[int, bytes]] = defaultdict(dict)
         for servo_id, width in counts.items():
             address, nth = self._places[servo_id]
-            boards[address][nth] = pulse(width)
+            boards[address][nth] = pulse_registers(width)
         packet = b"".join(
             [
-                bridge.write(address, output(run[0]), b"".join([outputs[nth] for nth in run]))
+                bridge.write(
+                    address, output_register(run[0]), b"".join([outputs[nth] for nth in run])
+                )
                 for address, outputs in boards.items()
-                for run in runs(sorted(outputs))
+                for run in adjacent_runs(sorted(outputs))
             ]
         )
         self.line.send(packet)
@@ -300,7 +308,7 @@ class Pca9685Board:
         """Send the last pulses once more, as a byte lost in a series of them shifts the rest."""
         self._send({c.id: self._sent[c.id][0] for c in channels if c.id in self._sent})
 
-    def lead(self, channels: Sequence[Channel]) -> None:
+    def advance_pulses(self, channels: Sequence[Channel]) -> None:
         """Advance moving pulses a little if no goals arrive."""
         if self.line.port.now_s() - self._sent_s < FOLLOW_UP_S:
             return
@@ -315,7 +323,9 @@ class Pca9685Board:
         for servo_id in channels:
             address, nth = self._places[servo_id]
             self._sent.pop(servo_id, None)
-            packets.append(bridge.write(address, output(nth) + BYTES - 1, bytes((FULL_OFF,))))
+            packets.append(
+                bridge.write(address, output_register(nth) + BYTES - 1, bytes((FULL_OFF,)))
+            )
         if last_try:
             for address in self._boards(channels):
                 packets.append(bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))))

@@ -55,7 +55,7 @@ class Pca9685Params(HobbyBoardParams):
         if any(clock.prescale > MOST_PRESCALE for clock in self.clocks.values()):
             raise ValueError("frequency_hz is too low for this oscillator_hz")
 
-    def ends_us(self) -> tuple[float, float, str]:
+    def pulse_range_us(self) -> tuple[float, float, str]:
         """Return the shortest and longest pulse that may be sent."""
         return self.min_pulse_us, self.max_pulse_us, "min_pulse_us, max_pulse_us"
 

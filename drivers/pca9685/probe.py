@@ -11,7 +11,7 @@ from gazerig.drivers.pca9685.registers import (
     LED0,
     MODE1,
     PRESCALE,
-    plausible,
+    are_plausible,
 )
 from gazerig.drivers.serial.port import BusPort
 
@@ -35,7 +35,7 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
             continue
         if line.ask([(read(address, MODE1, 1), 1)]) is not None:
             registers = _registers(line, address)
-            if registers is not None and plausible(*registers):
+            if registers is not None and are_plausible(*registers):
                 found.append(address)
         elif line.failure != "not acknowledged":
             break  # no I2C bus, or one that is stuck
@@ -69,7 +69,7 @@ def check_board(line: I2cLine, address: int) -> None:
             )
         raise ServoMissing(f"{where}{silence_reason}")
     first_six, outputs, prescale = found
-    if not plausible(first_six, outputs, prescale):
+    if not are_plausible(first_six, outputs, prescale):
         raise ServoMissing(
             f"{where}the chip at {address:#x} is no PCA9685: another chip has this "
             "address; close a jumper and write the new one under bus.pca9685.address"

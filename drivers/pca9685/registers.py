@@ -46,17 +46,17 @@ class PulseClock(NamedTuple):
     prescale: int
 
     @property
-    def grain_steps(self) -> float:
+    def resolution_steps(self) -> float:
         """Return the length of one 4096th of the period, quarter microseconds."""
         return (self.prescale + 1) / self.oscillator_hz * 1e6 * US_STEPS
 
 
-def output(channel: int) -> int:
+def output_register(channel: int) -> int:
     """Return the first register of a channel."""
     return LED0 + BYTES * channel
 
 
-def pulse(counts: int) -> bytes:
+def pulse_registers(counts: int) -> bytes:
     """Return the registers of a channel for a pulse; 0: none."""
     return bytes((0, 0, counts & 0xFF, counts >> 8)) if counts else OFF
 
@@ -71,7 +71,7 @@ def counts_of(registers: bytes) -> int:
     return ((off_low | (off_high & 0x0F) << 8) - (on_low | (on_high & 0x0F) << 8)) % COUNTS
 
 
-def plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
+def are_plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
     """Return whether registers can belong to a PCA9685: reserved bits are 0.
 
     Args:
@@ -106,7 +106,7 @@ def _counts_between(low_steps: int, high_steps: int, grain_steps: float) -> tupl
     return ceil(low_steps / grain_steps), floor(high_steps / grain_steps)
 
 
-def runs(channels: Sequence[int]) -> list[list[int]]:
+def adjacent_runs(channels: Sequence[int]) -> list[list[int]]:
     """Split ascending channels into runs of adjacent ones that fit into a bridge's buffer."""
     longest = CHANNELS - 1
     parted: list[list[int]] = []

@@ -24,7 +24,7 @@ class CallEnded(SystemExit):
 class OverdueSource(Protocol):
     """A source of calls that may block a thread for too long."""
 
-    def lasts(self) -> tuple[float, str] | None:
+    def overdue_call(self) -> tuple[float, str] | None:
         """Return the time for which a call lasts [s] and a message; None if no call lasts."""
 
 
@@ -38,7 +38,7 @@ class OverdueReport:
     def __init__(self) -> None:
         self._due_s: dict[OverdueSource, float] = {}
 
-    def lines(self) -> tuple[str, ...]:
+    def due_lines(self) -> tuple[str, ...]:
         """Return the lines that are due."""
         lasting = _overdue()
         self._due_s = {one: self._due_s.get(one, FIRST_LINE_S) for one, _, _ in lasting}
@@ -54,21 +54,21 @@ def overdue_text() -> str:
 
 
 def _overdue() -> list[tuple[OverdueSource, float, str]]:
-    found = [(one, one.lasts()) for one in tuple(OVERDUE_SOURCES)]
+    found = [(one, one.overdue_call()) for one in tuple(OVERDUE_SOURCES)]
     return [(one, *lasts) for one, lasts in found if lasts is not None]
 
 
 class CallResult(NamedTuple):
     """Result of a call.
 
-    error: exception that it raised, as text in ``why``; took_s: run time in seconds, without the
-        wait for its start
+    error: exception that it raised, as text in ``error_text``; took_s: run time in seconds, without
+        the wait for its start
     """
 
     value: Any = None
     error: BaseException | None = None
     took_s: float = 0.0
-    why: str = ""
+    error_text: str = ""
 
 
 class _Call:
@@ -82,7 +82,7 @@ class _Call:
 
     def make(self) -> None:
         begun_s = perf_counter()
-        outcome = _outcome(self._work, BaseException)
+        outcome = _call_result(self._work, BaseException)
         self.outcome = outcome._replace(took_s=perf_counter() - begun_s)
         self.done.release()
 
@@ -114,14 +114,14 @@ class BoundedCall:
         begun_s = self._begun_s
         return 0.0 if begun_s is None else perf_counter() - begun_s
 
-    def waiting(self) -> int:
+    def waiting_calls(self) -> int:
         """Return the number of calls that wait for the present one."""
         return self._calls.qsize()
 
     def __call__(self, work: Callable[[], Any]) -> CallResult | None:
         """Make a call; return its result or that of the late one before, None while that lasts."""
         if self._longest_s is None:
-            return _outcome(work, (Exception, SystemExit))
+            return _call_result(work, (Exception, SystemExit))
         if self._late is not None:
             return self._await_result(self._late, 0.0)
         return self._await_result(self._submit(work), self._longest_s)
@@ -142,7 +142,7 @@ class BoundedCall:
             return None
         return self._await_result(self._submit(work), longest_s)
 
-    def idle(self, longest_s: float) -> bool:
+    def wait_idle(self, longest_s: float) -> bool:
         """Wait until all calls are done, at most ``longest_s`` [s]; return whether they are."""
         return (
             self._late is None
@@ -186,7 +186,7 @@ class BoundedCall:
             )
             ending.start()
 
-    def lasts(self) -> tuple[float, str]:
+    def overdue_call(self) -> tuple[float, str]:
         """Return the time [s] for which an abandoned call has been running, and a message."""
         for_s = perf_counter() - (self._closed_s or 0.0)
         return for_s, (
@@ -225,13 +225,13 @@ def _do_nothing() -> None:
     """Do nothing; used to wait for all earlier calls."""
 
 
-def _outcome(
+def _call_result(
     work: Callable[[], Any], caught: type[BaseException] | tuple[type[BaseException], ...]
 ) -> CallResult:
     try:
         return CallResult(work())
     except caught as error:  # a package may raise anything
         try:
-            return CallResult(None, error, why=describe_error(error))
+            return CallResult(None, error, error_text=describe_error(error))
         except Exception:  # even str() of its error may fail
-            return CallResult(None, error, why=type(error).__name__)
+            return CallResult(None, error, error_text=type(error).__name__)

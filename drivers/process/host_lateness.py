@@ -72,7 +72,7 @@ class HostLateness:
         """Reset the count."""
         self._late.clear()
 
-    def busy(self, now_s: float) -> int:
+    def late_answers(self, now_s: float) -> int:
         """Return the number of late answers within the last second; 0 if they are few."""
         late = self._late
         while late and late[0] < now_s - WITHIN_S:

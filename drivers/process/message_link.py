@@ -63,17 +63,17 @@ class MessageLink(Protocol):
 class LinkOffer(NamedTuple):
     """Links for a child that will be started.
 
-    ours: ends of this program
-    words: command line arguments with which the child opens its ends
+    parent_ends: ends of this program
+    arguments: command line arguments with which the child opens its ends
     fds: file descriptors that it must inherit; variables: additions to its environment
-    theirs: sockets to close here once it has started
+    child_sockets: sockets to close here once it has started
     """
 
-    ours: tuple[MessageLink, ...]
-    words: tuple[str, ...]
+    parent_ends: tuple[MessageLink, ...]
+    arguments: tuple[str, ...]
     fds: tuple[int, ...]
     variables: Mapping[str, str]
-    theirs: tuple[socket.socket, ...]
+    child_sockets: tuple[socket.socket, ...]
 
 
 def create_links(count: int) -> LinkOffer:
@@ -172,26 +172,26 @@ class LoopbackLink:
         while True:
             if waits:
                 self.wait()
-            elif not self._ready(0.0):
+            elif not self._is_ready(0.0):
                 raise BlockingIOError
             if self._closed or (self._end is None and not self._accept()):
                 return b""
-            if self._end is None or not self._ready(0.0):
+            if self._end is None or not self._is_ready(0.0):
                 continue
             try:
-                more = self._end.recv(self._missing())
+                more = self._end.recv(self._missing_bytes())
             except ConnectionError:
                 more = b""
             if not more:
                 return b""
             self._got += more
-            if self._missing() == 0:
+            if self._missing_bytes() == 0:
                 message, self._got = self._got[_LENGTH_BYTES:], b""
                 return message
 
     def wait(self) -> None:
         """Wait until a message, the end of the link or a caller arrives."""
-        while not self._closed and not self._ready(_LOOK_S):
+        while not self._closed and not self._is_ready(_LOOK_S):
             if self._end is None:
                 self._looks -= 1
                 if self._looks <= 0:  # the child has died before it connected
@@ -213,7 +213,7 @@ class LoopbackLink:
             if held is not None:
                 held.close()
 
-    def _ready(self, within_s: float) -> bool:
+    def _is_ready(self, within_s: float) -> bool:
         """Return whether there are bytes to read or a connection to accept."""
         try:
             return bool(select.select([self.fileno()], [], [], within_s)[0])
@@ -243,7 +243,7 @@ class LoopbackLink:
             self._news.notify_all()
         return True
 
-    def _missing(self) -> int:
+    def _missing_bytes(self) -> int:
         """Return how many bytes of the message, or of its length, have not arrived yet."""
         if len(self._got) < _LENGTH_BYTES:
             return _LENGTH_BYTES - len(self._got)

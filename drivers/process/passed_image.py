@@ -33,7 +33,7 @@ class PassedImage(NamedTuple):
     dtype: str
 
 
-def copied(image: NDArray[Any]) -> PassedImage:
+def copy_image(image: NDArray[Any]) -> PassedImage:
     """Return a copy of an image in memory that can be passed to a process.
 
     Raises:
@@ -50,7 +50,7 @@ def copied(image: NDArray[Any]) -> PassedImage:
     return PassedImage(fd, image.shape, image.dtype.str)
 
 
-def taken(image: PassedImage) -> NDArray[Any]:
+def take_image(image: PassedImage) -> NDArray[Any]:
     """Return the pixels, read-only, and close the file descriptor."""
     try:
         held = mmap.mmap(image.fd, 0, prot=mmap.PROT_READ)

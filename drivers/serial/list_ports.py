@@ -51,16 +51,16 @@ class SerialPort(NamedTuple):
 class Access(NamedTuple):
     """Permissions of this user for a path.
 
-    exists: whether the path exists; serial: whether it is a device, not a plain file
+    exists: whether the path exists; is_device: whether it is a device, not a plain file
     allowed: whether it may be read and written
-    group: group with access; joined: whether this user is in it (but perhaps not this session)
+    group: group with access; is_member: whether this user is in it (but perhaps not this session)
     """
 
     exists: bool
-    serial: bool
+    is_device: bool
     allowed: bool
     group: str
-    joined: bool
+    is_member: bool
 
 
 def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
@@ -162,10 +162,10 @@ def set_latency(file: Path, ms: int = RECOMMENDED_LATENCY_MS) -> bool:
     return latency_ms(file) == ms
 
 
-def explain(port_name: str, code: int | None) -> str:
+def open_failure_text(port_name: str, code: int | None) -> str:
     """Return in one line why a port cannot be opened, with the remedy."""
     if code == errno.ENOENT or code == errno.ENODEV or code == errno.ENXIO:
-        return f"no serial port {port_name}: plug the adapter in; ports here: {name_ports()}"
+        return f"no serial port {port_name}: plug the adapter in; ports here: {port_names_text()}"
     if code in (errno.EACCES, errno.EPERM):
         return (
             f"no permission to open {port_name}: join its group with "
@@ -176,10 +176,10 @@ def explain(port_name: str, code: int | None) -> str:
         who = f", {held}," if held else ""
         return f"{port_name} is busy: close the other program{who} that uses it"
     reason = os.strerror(code) if code else "not a serial port"
-    return f"cannot open {port_name} ({reason}); ports here: {name_ports()}"
+    return f"cannot open {port_name} ({reason}); ports here: {port_names_text()}"
 
 
-def name_ports() -> str:
+def port_names_text() -> str:
     """Return the names of the serial ports as text."""
     ports = [f"{port.device} ({port.description})" for port in list_ports.comports()]
     return ", ".join(ports) or "none"

@@ -14,7 +14,7 @@ from dynamixel_sdk import PortHandler
 from serial import Serial, SerialException
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.serial.list_ports import explain, is_i2c, persistent_name
+from gazerig.drivers.serial.list_ports import is_i2c, open_failure_text, persistent_name
 
 try:
     import termios
@@ -126,7 +126,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._on_traffic = on_traffic
         self.ser: Serial | None = None
         self._fd = -1
-        self._poll: Callable[[int], object] = _closed
+        self._poll: Callable[[int], object] = _raise_closed
         self._deadline_s = 0.0
 
     # --- methods for the control loop
@@ -175,7 +175,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     def _read_rest(self, got: bytes, length: int, deadline_s: float) -> bytes:
         """Read until there are ``length`` bytes, or the deadline."""
         while len(got) < length and self._wait(deadline_s):
-            more = self._take(length - len(got))
+            more = self._read_available(length - len(got))
             got = got + more if got else more
         if not got and not os.path.exists(self.opened_as):
             raise self._lost("it was unplugged")
@@ -231,7 +231,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         end_s = time.monotonic() + BABBLE_S
         dropped = 0
         while (now_s := time.monotonic()) < end_s and self._wait(now_s + QUIET_S):
-            dropped += len(self._take(4096))
+            dropped += len(self._read_available(4096))
         return dropped
 
     def _wait(self, deadline_s: float) -> bool:
@@ -246,7 +246,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
 
-    def _take(self, length: int) -> bytes:
+    def _read_available(self, length: int) -> bytes:
         try:
             data = os.read(self._fd, length)
         except BlockingIOError:
@@ -301,7 +301,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         try:
             self.ser = Serial(where, cflag_baud, timeout=0, exclusive=self._exclusive or None)
         except (SerialException, OSError) as error:
-            raise PortError(explain(self.port_name, error.errno)) from error
+            raise PortError(open_failure_text(self.port_name, error.errno)) from error
         except ValueError as error:  # pyserial: the adapter does not support this rate
             raise PortError(
                 f"{self.port_name} cannot run at {cflag_baud} bit/s: choose 115200 or 1000000"
@@ -322,7 +322,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Close; safe to call twice."""
         if self.ser is not None:
             self.ser.close()
-        self.ser, self._fd, self._poll = None, -1, _closed
+        self.ser, self._fd, self._poll = None, -1, _raise_closed
         self.is_open = self.is_using = False
 
     def clearPort(self) -> None:
@@ -365,7 +365,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return time.monotonic() * 1000.0
 
 
-def _closed(timeout_ms: int) -> object:
+def _raise_closed(timeout_ms: int) -> object:
     raise ValueError("it is closed")
 
 
@@ -391,7 +391,7 @@ def wait_until(port: BusPort, until_s: float) -> None:
             return  # an emulated port in simulated time, in which a wait takes no time
 
 
-def port_of(
+def port_at_path(
     path: str, exclusive: bool = True, on_traffic: Callable[[], None] | None = None
 ) -> BusPort:
     """Return the port at a path: an I2C bus of the kernel, or a serial port."""

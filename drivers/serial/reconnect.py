@@ -27,7 +27,7 @@ class Reconnect:
         self._since_s, self._wait_s = now_s, FIRST_S
         self._next_s = now_s + FIRST_S
 
-    def due(self, now_s: float) -> bool:
+    def is_due(self, now_s: float) -> bool:
         """Return whether an attempt is due."""
         return now_s >= self._next_s
 
@@ -88,7 +88,7 @@ class ReconnectingPort:
             BusLost: it has been lost for longer than ``give_up_s``.
         """
         gone_s = self._link.gone_for_s(now_s)
-        if self._link.due(now_s):
+        if self._link.is_due(now_s):
             if self._open():
                 self.down = False
                 where = getattr(self._port, "opened_as", self._port.port_name)
@@ -106,7 +106,7 @@ class ReconnectingPort:
         """Record that torque could not be switched off; it is after the port reconnects."""
         self.release_due = True
 
-    def released(self) -> None:
+    def record_release(self) -> None:
         """Record that torque was switched off on every servo that answers."""
         if self.release_due:
             self._log.add("torque switched off, as requested while the port was gone")

@@ -70,7 +70,7 @@ class SmartServoBus(PortBus):
         self._slot = {servo_id: i for i, servo_id in enumerate(self._ids)}
         self._lowest = tuple(setup.min_steps for setup in setups)
         self._highest = tuple(setup.max_steps for setup in setups)
-        self._goals = family.goals(self._ids)
+        self._goals = family.create_goal_packets(self._ids)
         self._nothing = Feedback.of_none(len(self._ids))
         self._log = EventLog()
         self._line = Transactions(
@@ -99,7 +99,7 @@ class SmartServoBus(PortBus):
         self._health = ServoHealth(by_id, log)
         plan = self._plan = self._family.read_plan(self._setups, self._params, firmware)
         single = Registers(self._port, self._family, 1)
-        self._provisioning = Provisioning(line, single, self._setups, log, plan.block)
+        self._provisioning = Provisioning(line, single, self._setups, log, plan.indirect_block)
         self._recovery = Recovery(
             line, self._provisioning, by_id, self._watchdog, self._health, log
         )
@@ -124,7 +124,7 @@ class SmartServoBus(PortBus):
                 return True
         return not self._supervisor.is_idle
 
-    def _take(self, replies: dict[int, ServoReply], now_s: float) -> None:
+    def _apply_one_by_one(self, replies: dict[int, ServoReply], now_s: float) -> None:
         """Apply an answer servo by servo, each with its errors."""
         supervisor, feedback = self._supervisor, self._feedback
         feedback.begin()
@@ -134,10 +134,10 @@ class SmartServoBus(PortBus):
         answered = bool(replies)
         if self._family.weak_check:
             replies = self._confirm_doubtful(replies, now_s)
-        believed, dark = feedback.all_plausible(replies), not self._poll_list.group
+        believed, dark = feedback.are_all_plausible(replies), not self._poll_list.group
         for servo_id, one in replies.items():
             slot = self._slot[servo_id]
-            garbled = servo_id in self._poll_list.garbling
+            garbled = servo_id in self._poll_list.garbling_ids
             was_out = self._poll_list.record_answer(servo_id)
             if was_out:
                 supervisor.check_after_silence(servo_id)
@@ -149,18 +149,18 @@ class SmartServoBus(PortBus):
                 # together produce the AND of their bytes, checksums included, so far more than one
                 # in 65,536 pass.
                 continue
-            elif one.sample.blank:
+            elif one.sample.is_blank:
                 supervisor.check_status(servo_id, one.sample, now_s)
             elif believed or feedback.is_plausible(slot, one):
                 supervisor.check_status(servo_id, one.sample, now_s)
-                feedback.take(slot, one)
+                feedback.apply_reply(slot, one)
             else:
                 self._line.errors["implausible"] += 1
-        supervisor.record_out(self._poll_list.out, now_s)
+        supervisor.record_out(self._poll_list.out_ids, now_s)
         self._health.record_silent(
-            {*self._poll_list.out, *self._unconfirmed},
+            {*self._poll_list.out_ids, *self._unconfirmed},
             now_s,
-            self._poll_list.garbling | self._unconfirmed,
+            self._poll_list.garbling_ids | self._unconfirmed,
             self._line.lateness,
             answered,
         )
@@ -182,13 +182,13 @@ class SmartServoBus(PortBus):
             self._poll_list.record_answer(servo_id)
             second = again.get(servo_id)
             slot, first = self._slot[servo_id], replies[servo_id]
-            both = second and self._feedback.confirmed(slot, first, second)
+            both = second and self._feedback.confirm(slot, first, second)
             if both:
                 kept[servo_id] = both
             else:
                 self._line.errors["unconfirmed"] += 1
                 self._unconfirmed.add(servo_id)
-        self._unconfirmed -= {*kept, *self._poll_list.out}
+        self._unconfirmed -= {*kept, *self._poll_list.out_ids}
         return kept
 
     # --- public interface
@@ -204,13 +204,13 @@ class SmartServoBus(PortBus):
         where, baud = self._port.port_name, self._params.baud
         if not self._port.setBaudRate(baud):
             raise PortError(
-                f"{where} cannot run at {baud} bit/s: choose {self._family.usual_bauds}"
+                f"{where} cannot run at {baud} bit/s: choose {self._family.recommended_bauds}"
             )
         registers = Registers(self._port, self._family)
         try:
             firmware = find(self._line, registers, self._setups, self._log)
             self._assemble(firmware)
-            block = self._plan.block
+            block = self._plan.indirect_block
             first = Provisioning(self._line, registers, self._setups, self._log, block)
             first.disable(self._ids)
             first.apply(self._ids)
@@ -242,12 +242,12 @@ class SmartServoBus(PortBus):
                 supervisor.recover_tripped(self._poll_list.group)
             group = reader.next_group(now_s)
             if group is None:
-                self._take(reader.read_troubled(now_s), now_s)
+                self._apply_one_by_one(reader.read_troubled(now_s), now_s)
             else:
                 raw, at_s = line.exchange(group.request, group.reply_length)
                 doubtful = self._wary and self._is_doubtful(now_s)
                 if doubtful or not feedback.apply_whole(group, raw, at_s):
-                    self._take(reader.salvage(group, raw, at_s, now_s), now_s)
+                    self._apply_one_by_one(reader.verified_replies(group, raw, at_s, now_s), now_s)
                 elif self._health.all_silent_since_s is not None:
                     self._health.record_answered_again(now_s, line.lateness)
             if now_s >= supervisor.due_s:
@@ -255,7 +255,7 @@ class SmartServoBus(PortBus):
         except BusLost as lost:
             self._record_loss(lost)
             return self._nothing
-        if self._poll_list.troubled:
+        if self._poll_list.is_troubled:
             silent_s = self._health.silent_for_s(now_s)
             if silent_s >= self._params.give_up_s:
                 raise BusLost(
@@ -307,7 +307,7 @@ class SmartServoBus(PortBus):
         supervisor, line = self._supervisor, self._line
         if not supervisor.engaged or self._link.down or line.starved:
             return
-        withheld = supervisor.withheld(self._now_s) if supervisor.withholds else ()
+        withheld = supervisor.withheld_ids(self._now_s) if supervisor.withholds_goals else ()
         speeds, entering = self._speeds, supervisor.entering
         if entering.places and self._family.goal_speed:
             speeds = self._recovery.speeds(self._ids, entering.ids)
@@ -320,7 +320,7 @@ class SmartServoBus(PortBus):
             if withheld:
                 kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
                 if kept:
-                    some = self._family.goals([self._ids[k] for k in kept])
+                    some = self._family.create_goal_packets([self._ids[k] for k in kept])
                     line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
             else:
                 line.send(packet)

@@ -50,17 +50,18 @@ class FoundServo(NamedTuple):
 class BaudScan(NamedTuple):
     """Result of the search at one baud rate.
 
-    possible: whether the adaptor supports the rate; junk: number of bytes outside any packet
-    shared: ids that two servos seem to share, as their longer answers are incomplete
-    protocol_1: ids that answer only to Protocol 1.0
+    is_supported: whether the adaptor supports the rate; junk_bytes: number of bytes outside any
+        packet
+    shared_ids: ids that two servos seem to share, as their longer answers are incomplete
+    protocol_1_ids: ids that answer only to Protocol 1.0
     """
 
     baud: int
-    possible: bool
+    is_supported: bool
     found: tuple[FoundServo, ...] = ()
-    junk: int = 0
-    shared: tuple[int, ...] = ()
-    protocol_1: tuple[int, ...] = ()
+    junk_bytes: int = 0
+    shared_ids: tuple[int, ...] = ()
+    protocol_1_ids: tuple[int, ...] = ()
 
 
 def scan(
@@ -87,7 +88,7 @@ def scan(
         PortError: the port cannot be opened.
         BusLost: the port is lost.
     """
-    for baud in family.usual_rates if bauds is None else bauds:
+    for baud in family.scan_rates if bauds is None else bauds:
         if not port.setBaudRate(baud):
             yield BaudScan(baud, False)
             continue
@@ -96,7 +97,7 @@ def scan(
             continue
         quiet_s = family.thorough_s if thorough else family.quiet_s
         found, junk = scan_ids(port, family, baud, quiet_s, progress, ids)
-        old = family.protocol_1(port) if family.protocol_1 and not found else ()
+        old = family.find_protocol_1_ids(port) if family.find_protocol_1_ids and not found else ()
         each = {one.id: (family_of or {}).get(one.model, family) for one in found}
         shared = tuple(i for i, its in each.items() if count_corrupt(port, its, i) >= SHARED)
         yield BaudScan(baud, True, found, junk, shared, old)
@@ -120,7 +121,7 @@ def scan_ids(
     codec, quiet_s = family.codec, family.quiet_s if quiet_s is None else quiet_s
     port.drain()
     if family.broadcast_ping:
-        request = codec.identify(codec.BROADCAST)
+        request = codec.identity_request(codec.BROADCAST)
         port.write(request)
         size = len(request) + codec.STATUS_OVERHEAD + codec.IDENTITY_LENGTH
         raw = read_until_quiet(port, quiet_s + size * BITS_PER_BYTE / baud)
@@ -129,10 +130,10 @@ def scan_ids(
         for servo_id in range(family.highest_id + 1) if ids is None else ids:
             if progress is not None:
                 progress(baud, servo_id)
-            request = codec.identify(servo_id)
+            request = codec.identity_request(servo_id)
             raw += transact(port, family, request, codec.IDENTITY_LENGTH, quiet_s)[0]
         raw += port.read_until(_ROOM, port.now_s() + REPLY_S)
-    whole = [status for status in codec.statuses(raw) if status.intact]
+    whole = [status for status in codec.parse_statuses(raw) if status.intact]
     used = sum(codec.STATUS_OVERHEAD + len(status.params) for status in whole)
     found = [one for status in whole if (one := _found(family, status, baud)) is not None]
     # A broadcast ping is answered once; a servo read alone may answer again, late.
@@ -162,7 +163,7 @@ def ping(
     codec = family.codec
     for _ in range(tries):
         port.drain()
-        request = codec.identify(servo_id)
+        request = codec.identity_request(servo_id)
         _, status = transact(port, family, request, codec.IDENTITY_LENGTH, REPLY_S, servo_id)
         found = None if status is None else _found(family, status, baud)
         if found is not None:
@@ -215,7 +216,7 @@ def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
 
 def _found(family: Family, status: Status, baud: int) -> FoundServo | None:
     """Return the servo that an answer identifies, or None."""
-    identity = family.codec.identity(status)
+    identity = family.codec.parse_identity(status)
     if identity is None:
         return None
     return FoundServo(status.id, *identity, baud, family.model_name(identity.model_number))
@@ -246,7 +247,9 @@ def find(
         setup.id: identified.get(setup.id) or registers.identify(setup.id)
         for setup in setups
     }
-    problems = [text for setup in setups if (text := _problem(family, setup, found[setup.id]))]
+    problems = [
+        text for setup in setups if (text := _servo_problem(family, setup, found[setup.id]))
+    ]
     if problems and not family.broadcast_ping:
         # An unexpected servo may be the missing one; only now is it worth reading every id.
         identified = identities(line)
@@ -272,7 +275,7 @@ def find(
     return {servo_id: identity.firmware for servo_id, identity in found.items() if identity}
 
 
-def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
+def _servo_problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
     """Return the problem of one servo, "" for none."""
     who = setup.label()
     if found is None:

@@ -20,14 +20,14 @@ class Status(NamedTuple):
     """One status packet of a servo as it arrived.
 
     intact: whether its checksum is correct
-    at: index of its first byte in the received bytes
+    offset: index of its first byte in the received bytes
     """
 
     id: int
     error: int
     params: bytes
     intact: bool
-    at: int = 0
+    offset: int = 0
 
 
 class Register(Protocol):
@@ -136,10 +136,10 @@ class Codec(Protocol):
     def IDENTITY_LENGTH(self) -> int:
         """Number of params of an identity answer."""
 
-    def identify(self, servo_id: int) -> bytes:
+    def identity_request(self, servo_id: int) -> bytes:
         """Build a request for a servo's identity."""
 
-    def identity(self, status: Status) -> Identity | None:
+    def parse_identity(self, status: Status) -> Identity | None:
         """Return model and firmware from an answer, None if it does not contain them."""
 
     def ping(self, servo_id: int) -> bytes:
@@ -162,7 +162,7 @@ class Codec(Protocol):
     ) -> bytes:
         """Build an instruction to write the same registers of several servos."""
 
-    def statuses(self, raw: bytes) -> list[Status]:
+    def parse_statuses(self, raw: bytes) -> list[Status]:
         """Return every complete answer in received bytes; noise is skipped."""
 
     def bytes_missing(self, raw: bytes, count: int, length: int) -> int:
@@ -180,7 +180,7 @@ class Arming(NamedTuple):
     """A register written before torque is switched on; ``speed``: whether it limits goal speeds."""
 
     register: str
-    speed: bool
+    limits_speed: bool
 
 
 @dataclass(frozen=True)
@@ -196,29 +196,29 @@ class Family:
         sign_bits: fields of a ``Sample`` with a separate sign bit, and that bit
         speed_units: converts steps/s to the unit of speed limits; at least 1
         acceleration_units: converts steps/s^2 to the unit of acceleration limits; None for no limit
-        goals: builds goal packets for some servos
+        create_goal_packets: builds goal packets for some servos
         sync_read: whether one request reads several servos; otherwise each is read alone
         baud_rates: bit/s, indexed by the value of the servo's register
-        usual_rates: all baud rates, the usual ones first
+        scan_rates: all baud rates, the usual ones first
         factory_baud: baud rate of a new servo
         highest_id: highest id of a servo
-        version: formats a firmware number as the manufacturer does
+        format_firmware: formats a firmware number as the manufacturer does
 
     Reading:
         read_plan: returns windows and packets for some servos, the rig's params and the firmware by
             id, None before it is known
         effort_register: register of load or current
-        armed: fields of a ``Sample`` that show whether a servo is still armed, and their expected
-            values; None accepts any value
+        armed_values: fields of a ``Sample`` that show whether a servo is still armed, and their
+            expected values; None accepts any value
         weak_check: whether the checksum of an answer misses some damage
 
     Settings:
-        spans: first and last register of ranges that are read together
-        wanted: required register values; written in this order within a span
-        target: value to write to a register, given the found and the wanted value
-        passes: number of correction passes; a first correction may reset other settings
+        read_spans: first and last register of ranges that are read together
+        wanted_settings: required register values; written in this order within a span
+        corrected_value: value to write to a register, given the found and the wanted value
+        correction_passes: number of correction passes; a first correction may reset other settings
         answer_level: Status Return Level at which every instruction is answered
-        lock: register that must be 0 while EEPROM is written, None if torque is the lock
+        lock_register: register that must be 0 while EEPROM is written, None if torque is the lock
 
     Traits:
         error_register: register of a servo's faults
@@ -233,10 +233,10 @@ class Family:
         quiet_s, thorough_s: time-outs of a search: silence after a broadcast ping, or for each id
         duplicate_id_registers: first and last of the registers in which two servos with the same id
             differ
-        protocol_1: returns ids that answer only to Protocol 1.0, if the family has it
+        find_protocol_1_ids: returns ids that answer only to Protocol 1.0, if the family has it
         arming: register written before torque is switched on
         most_goals: largest number of goals in one packet
-        usual_bauds: bit/s to recommend if an adaptor does not support another rate
+        recommended_bauds: bit/s to recommend if an adaptor does not support another rate
         fault_cure, jump_cure: remedies if torque is refused, or a position jumps
     """
 
@@ -250,23 +250,23 @@ class Family:
     sign_bits: Mapping[str, int]
     speed_units: Callable[[float], int]
     acceleration_units: Callable[[float | None], int]
-    goals: Callable[[Sequence[int]], GoalPackets]
+    create_goal_packets: Callable[[Sequence[int]], GoalPackets]
     sync_read: bool
     baud_rates: tuple[int, ...]
-    usual_rates: tuple[int, ...]
+    scan_rates: tuple[int, ...]
     factory_baud: int
     highest_id: int
-    version: Callable[[int], str]
+    format_firmware: Callable[[int], str]
     read_plan: "Callable[[Sequence[ServoConfig], Any, Mapping[int, int] | None], ReadPlan]"
     effort_register: str
-    armed: Callable[["ServoConfig"], Mapping[str, int | None]]
+    armed_values: Callable[["ServoConfig"], Mapping[str, int | None]]
     weak_check: bool
-    spans: tuple[tuple[str, str], ...]
-    wanted: Callable[["ServoConfig"], Mapping[str, int]]
-    target: Callable[[str, int, int], int]
-    passes: int
+    read_spans: tuple[tuple[str, str], ...]
+    wanted_settings: Callable[["ServoConfig"], Mapping[str, int]]
+    corrected_value: Callable[[str, int, int], int]
+    correction_passes: int
     answer_level: int
-    lock: str | None
+    lock_register: str | None
     error_register: str
     faults_latch: bool
     torque_faults: int
@@ -277,10 +277,10 @@ class Family:
     quiet_s: float
     thorough_s: float
     duplicate_id_registers: tuple[str, str]
-    protocol_1: Callable[[BusPort], tuple[int, ...]] | None
+    find_protocol_1_ids: Callable[[BusPort], tuple[int, ...]] | None
     arming: Arming
     most_goals: int
-    usual_bauds: str
+    recommended_bauds: str
     fault_cure: str
     jump_cure: str
 

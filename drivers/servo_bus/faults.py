@@ -72,7 +72,7 @@ class ServoHealth:
             del self.faults[servo_id]
             self._log.add(f"{self._setups[servo_id].label()}: the fault is gone")
 
-    def exhausted(self, servo_id: int, now_s: float) -> bool:
+    def has_exhausted_restarts(self, servo_id: int, now_s: float) -> bool:
         """Return whether a servo has restarted too often recently, and record that as a fault."""
         lately = [t_s for t_s in self._restarts.get(servo_id, []) if now_s - t_s < WITHIN_S]
         self._restarts[servo_id] = lately
@@ -125,7 +125,7 @@ class ServoHealth:
                 self._log.add(f"{who} answers again after {now_s - since_s:.1f} s")
         for servo_id in out:
             self._silent_since.setdefault(servo_id, now_s)
-        late = lateness.busy(now_s)
+        late = lateness.late_answers(now_s)
         if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
             self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return

@@ -69,7 +69,7 @@ class FeedbackColumns:
         self._engaged = False
         self.places = Plausibility([model.no_load_steps_s for model in models])
         self._none = self.now = Feedback.of_none(len(setups))
-        self._tenths: tuple[int, ...] = ()
+        self._tenth_volts: tuple[int, ...] = ()
         self.set_limits(setups)
 
     def begin(self) -> None:
@@ -88,10 +88,10 @@ class FeedbackColumns:
         """Apply one servo's feedback."""
         now = self.now
         self.now = now._replace(
-            position_steps=with_value(now.position_steps, slot, position),
-            velocity_steps_s=with_value(now.velocity_steps_s, slot, velocity),
-            load=with_value(now.load, slot, load),
-            at_s=with_value(now.at_s, slot, at_s),
+            position_steps=replace_value(now.position_steps, slot, position),
+            velocity_steps_s=replace_value(now.velocity_steps_s, slot, velocity),
+            load=replace_value(now.load, slot, load),
+            at_s=replace_value(now.at_s, slot, at_s),
             missing=tuple([other for other in now.missing if other != slot]),
         )
 
@@ -101,7 +101,7 @@ class FeedbackColumns:
         # Within half a turn of every range, no other turn is nearer.
         self._near_low = max((high for _, high in self._ranges), default=0) - self._turn // 2 + 1
         self._near_high = min((low for low, _ in self._ranges), default=0) + self._turn // 2 - 1
-        armed = [self._family.armed(setup) for setup in setups]
+        armed = [self._family.armed_values(setup) for setup in setups]
         self._limits = {name: [one[name] for one in armed] for name in armed[0]} if armed else {}
         self._expect()
 
@@ -124,7 +124,7 @@ class FeedbackColumns:
         Returns:
             Whether it was applied; if not, it must be checked servo by servo.
         """
-        values = group.whole(raw, self._expected)
+        values = group.parse_whole(raw, self._expected)
         if values is None:
             return False
         now = self.now
@@ -133,11 +133,11 @@ class FeedbackColumns:
         if self._signs:
             of_position, of_velocity, of_effort = self._signs
             if max(position) >= of_position:
-                position = _signed(position, of_position)
+                position = _to_signed(position, of_position)
             if max(velocity) >= of_velocity:
-                velocity = _signed(velocity, of_velocity)
+                velocity = _to_signed(velocity, of_velocity)
             if max(effort) >= of_effort:
-                effort = _signed(effort, of_effort)
+                effort = _to_signed(effort, of_effort)
         # Without torque a zero may come from an indirect block without addresses.
         if not self._engaged and 0 in position and group.covers_torque:
             return False
@@ -155,8 +155,8 @@ class FeedbackColumns:
             warm = celsius
         if not self.places.are_plausible(position, at_s):
             return False
-        if at_voltage is not None and (tenths := values[at_voltage]) != self._tenths:
-            self._tenths, volts = tenths, tuple([0.1 * one for one in tenths])
+        if at_voltage is not None and (tenths := values[at_voltage]) != self._tenth_volts:
+            self._tenth_volts, volts = tenths, tuple([0.1 * one for one in tenths])
         load = tuple(map(mul, effort, self._load_units))
         if max(load) > 1.0 or min(load) < -1.0:
             load = tuple([max(-1.0, min(1.0, share)) for share in load])
@@ -174,7 +174,7 @@ class FeedbackColumns:
 
     # --- answers servo by servo
 
-    def all_plausible(self, replies: Mapping[int, ServoReply]) -> bool:
+    def are_all_plausible(self, replies: Mapping[int, ServoReply]) -> bool:
         """Return whether all servos have answered plausibly in one exchange."""
         if len(replies) < len(self._ids):
             return False
@@ -183,14 +183,17 @@ class FeedbackColumns:
         if self.places.is_disturbed(at_s) or any(one.at_s != at_s for one in answers):
             return False
         return self.places.are_plausible(
-            [self._near(slot, one.sample.position) for slot, one in enumerate(answers)], at_s
+            [self._nearest_turn(slot, one.sample.position) for slot, one in enumerate(answers)],
+            at_s,
         )
 
     def is_plausible(self, slot: int, reply: ServoReply) -> bool:
         """Return whether one servo's answer is plausible; call it once for every answer."""
-        return self.places.is_plausible(slot, self._near(slot, reply.sample.position), reply.at_s)
+        return self.places.is_plausible(
+            slot, self._nearest_turn(slot, reply.sample.position), reply.at_s
+        )
 
-    def confirmed(self, slot: int, first: ServoReply, second: ServoReply) -> ServoReply | None:
+    def confirm(self, slot: int, first: ServoReply, second: ServoReply) -> ServoReply | None:
         """Return the values that two consecutive answers agree on, None if they differ."""
         one, other = first.sample, second.sample
         warmer = abs((one.temperature or 0) - (other.temperature or 0))
@@ -220,22 +223,22 @@ class FeedbackColumns:
             )
         )
 
-    def take(self, slot: int, reply: ServoReply) -> None:
+    def apply_reply(self, slot: int, reply: ServoReply) -> None:
         """Apply one servo's accepted answer."""
         sample = reply.sample
         if sample.torque is not None:
             self.set_torque(slot, sample.torque == 1)
-        if not sample.blank:
+        if not sample.is_blank:
             warm = sample.temperature
             if warm is not None and warm <= MOST_CELSIUS:
                 self._set_temperature(slot, warm)
             if sample.voltage is not None:
                 self._set_voltage(slot, sample.voltage)
         load = max(-1.0, min(1.0, sample.effort * self._load_units[slot]))
-        position = self._near(slot, sample.position)
+        position = self._nearest_turn(slot, sample.position)
         self._apply_one(slot, position, sample.velocity * self._velocity_unit, load, reply.at_s)
 
-    def _near(self, slot: int, position: int) -> int:
+    def _nearest_turn(self, slot: int, position: int) -> int:
         """Return a position with whole turns added if turns are ambiguous."""
         return nearest_turn(position, *self._ranges[slot], self._turn) if self._turn else position
 
@@ -247,15 +250,15 @@ class FeedbackColumns:
 
     def mark_rearmed(self, slot: int) -> None:
         """Mark a servo's answer: plans must begin at its position."""
-        self.now = self.now._replace(rearmed=with_value(self.now.rearmed, slot, True))
+        self.now = self.now._replace(rearmed=replace_value(self.now.rearmed, slot, True))
 
-    def name_fault(self, slot: int, fault: str) -> None:
+    def record_fault(self, slot: int, fault: str) -> None:
         """Record a servo's fault, "" for none."""
-        self.now = self.now._replace(fault=with_value(self.now.fault, slot, fault))
+        self.now = self.now._replace(fault=replace_value(self.now.fault, slot, fault))
 
     def set_torque(self, slot: int, on: bool) -> None:
         """Record whether a servo's torque is on."""
-        self.now = self.now._replace(torque=with_value(self.now.torque, slot, on))
+        self.now = self.now._replace(torque=replace_value(self.now.torque, slot, on))
 
     def expect_torque(self, on: bool) -> None:
         """Record that torque has been switched for all servos."""
@@ -269,27 +272,27 @@ class FeedbackColumns:
         self._set_temperature(slot, temperature_c)
 
     def _set_voltage(self, slot: int, tenth_volts: int) -> None:
-        self._tenths = ()
-        volts = with_value(self.now.voltage_v, slot, 0.1 * tenth_volts)
+        self._tenth_volts = ()
+        volts = replace_value(self.now.voltage_v, slot, 0.1 * tenth_volts)
         self.now = self.now._replace(voltage_v=volts)
 
     def _set_temperature(self, slot: int, celsius: float) -> None:
-        warm = with_value(self.now.temperature_c, slot, celsius)
+        warm = replace_value(self.now.temperature_c, slot, celsius)
         self.now = self.now._replace(temperature_c=warm)
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
         """Set the position of a servo that was just recovered and does not move."""
-        near = self._near(slot, position)
+        near = self._nearest_turn(slot, position)
         self.set_torque(slot, torque)
         self.places.record(slot, near, at_s)
         self._apply_one(slot, near, 0.0, 0.0, at_s)
 
 
-def with_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Value, ...]:
+def replace_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Value, ...]:
     """Return a column with a new value for one servo."""
     return (*column[:slot], value, *column[slot + 1 :])
 
 
-def _signed(column: tuple[int, ...], sign: int) -> tuple[int, ...]:
+def _to_signed(column: tuple[int, ...], sign: int) -> tuple[int, ...]:
     """Return signed values of a column whose sign bit has the value ``sign``."""
     return tuple([value if value < sign else sign - value for value in column])

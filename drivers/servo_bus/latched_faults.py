@@ -48,19 +48,19 @@ class LatchedFaultSupervisor(Supervisor):
         if sample.status:
             # Damaged bytes may look like a fault, which ends a run: read the servo once more.
             if servo_id in self._health.latches:
-                self._latched(servo_id, sample.status)
+                self._record_latched(servo_id, sample.status)
             else:
-                self._alert(servo_id)
+                self._record_alert(servo_id)
         elif sample.error & self._family.codec.ALERT:
-            self._alert(servo_id)
+            self._record_alert(servo_id)
         elif (
             servo_id in self._health.latches
-            or sample.blank
+            or sample.is_blank
             or self._lacks_torque(servo_id, sample.torque)
         ):
             self._suspect(servo_id)
 
-    def _alert(self, servo_id: int) -> None:
+    def _record_alert(self, servo_id: int) -> None:
         """Record that a servo has raised the alert bit."""
         if servo_id not in self._health.faults:
             self._unnamed.add(servo_id)
@@ -74,7 +74,7 @@ class LatchedFaultSupervisor(Supervisor):
         self._suspects.add(servo_id)
         self.due_s = -inf
 
-    def _latched(self, servo_id: int, status: int) -> None:
+    def _record_latched(self, servo_id: int, status: int) -> None:
         if self._health.record_latched(servo_id, self._family.name_errors(status)):
             self._line.errors["alert"] += 1
             self._name_fault(servo_id)
@@ -87,7 +87,7 @@ class LatchedFaultSupervisor(Supervisor):
         Raises:
             BusLost: the port is lost.
         """
-        covered = self._plan.covered
+        covered = self._plan.covers_torque
         if self._suspects and now_s >= self._recover_at_s:
             self._recover(group, now_s)
         if self._unnamed and now_s >= self._name_at_s:
@@ -134,8 +134,8 @@ class LatchedFaultSupervisor(Supervisor):
         self._unnamed.difference_update(found)
         latched = {servo_id: status for servo_id, status in found.items() if status}
         for servo_id, status in latched.items():
-            self._latched(servo_id, status)
-        if latched and not self._plan.covered:
+            self._record_latched(servo_id, status)
+        if latched and not self._plan.covers_torque:
             for servo_id, torque in self._line.ask(tuple(latched), "torque_enable").items():
                 self._feedback.set_torque(self._slot[servo_id], bool(torque))
 

@@ -18,8 +18,8 @@ class PollList:
     """List of the servos to read, by id, in the order of the bus.
 
     group: ids that are read together
-    troubled: whether a servo is out of the group or has answered badly recently
-    garbling: ids of servos out of the group because their answers arrive damaged
+    is_troubled: whether a servo is out of the group or has answered badly recently
+    garbling_ids: ids of servos out of the group because their answers arrive damaged
     """
 
     def __init__(self, ids: Sequence[int]) -> None:
@@ -28,15 +28,15 @@ class PollList:
         self._wait_s: dict[int, float] = {}
         self._damaged: dict[int, int] = {}
         self.group = self._ids
-        self.troubled = False
-        self.garbling: set[int] = set()
+        self.is_troubled = False
+        self.garbling_ids: set[int] = set()
 
     @property
-    def out(self) -> tuple[int, ...]:
+    def out_ids(self) -> tuple[int, ...]:
         """Return the ids of servos out of the group."""
         return tuple(self._due_s)
 
-    def due(self, now_s: float) -> int | None:
+    def next_due(self, now_s: float) -> int | None:
         """Return a servo to be read alone now; if all are out there is always one."""
         waiting = self._due_s
         ready = [i for i, due_s in waiting.items() if due_s <= now_s or not self.group]
@@ -55,16 +55,16 @@ class PollList:
     def record_damaged(self, servo_id: int, now_s: float) -> None:
         """Record that a servo's answer arrived damaged."""
         self._damaged[servo_id] = self._damaged.get(servo_id, 0) + 1
-        self.troubled = True
+        self.is_troubled = True
         if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._due_s:
-            self.garbling.add(servo_id)
+            self.garbling_ids.add(servo_id)
             self.record_silent(servo_id, now_s)
 
     def record_answer(self, servo_id: int) -> bool:
         """Record a good answer; return whether the servo had been out."""
-        self.garbling.discard(servo_id)
+        self.garbling_ids.discard(servo_id)
         if self._damaged.pop(servo_id, None) is not None:
-            self.troubled = bool(self._due_s or self._damaged)
+            self.is_troubled = bool(self._due_s or self._damaged)
         if self._due_s.pop(servo_id, None) is None:
             return False
         self._wait_s.pop(servo_id, None)
@@ -77,7 +77,7 @@ class PollList:
 
     def _regroup(self) -> None:
         self.group = tuple(servo_id for servo_id in self._ids if servo_id not in self._due_s)
-        self.troubled = bool(self._due_s or self._damaged)
+        self.is_troubled = bool(self._due_s or self._damaged)
 
 
 def silent_servos(ids: Sequence[int], answered: Collection[int]) -> tuple[int, ...]:

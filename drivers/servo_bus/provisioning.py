@@ -53,7 +53,7 @@ class Provisioning:
     def set_target(self, setups: Sequence[ServoConfig]) -> None:
         """Set the required settings."""
         self._setups = {setup.id: setup for setup in setups}
-        self._wanted = {setup.id: self._family.wanted(setup) for setup in setups}
+        self._wanted = {setup.id: self._family.wanted_settings(setup) for setup in setups}
 
     def apply(self, ids: Sequence[int]) -> None:
         """Set servos to position mode with their limits, speeds and gains.
@@ -67,7 +67,7 @@ class Provisioning:
         differences = self.differences(ids)
         if differences:
             self._correct(differences)
-            for _ in range(self._family.passes - 1):
+            for _ in range(self._family.correction_passes - 1):
                 self._correct(self.differences(ids))
             differences = self.differences(ids)
             if differences:
@@ -77,7 +77,7 @@ class Provisioning:
                     for servo_id, register, found, wanted in differences
                 )
                 raise ServoMissing(
-                    f"{self._where}: {named}: restart its power or correct the rig file"
+                    f"{self._port_name}: {named}: restart its power or correct the rig file"
                 )
         if self._block is not None:
             block = self._block
@@ -89,7 +89,7 @@ class Provisioning:
             bad = [self._setups[i].label() for i, data in found.items() if data != block.data]
             if bad:
                 raise ServoMissing(
-                    f"{self._where}: {', '.join(bad)} does not take the indirect addresses: restart "
+                    f"{self._port_name}: {', '.join(bad)} does not take the indirect addresses: restart "
                     "the servo power, or set indirect_block: false"
                 )
 
@@ -115,7 +115,7 @@ class Provisioning:
             ServoMissing: a servo does not answer.
         """
         different, registers = list[Difference](), self._family.registers
-        for first, last in self._family.spans:
+        for first, last in self._family.read_spans:
             start, stop = registers[first].address, registers[last].address + registers[last].size
             concerned = {
                 i: names
@@ -131,14 +131,14 @@ class Provisioning:
                     at = register.address - start
                     value = register.decode(found[servo_id][at : at + register.size])
                     wanted = self._wanted[servo_id][register.name]
-                    wanted = self._family.target(register.name, value, wanted)
+                    wanted = self._family.corrected_value(register.name, value, wanted)
                     if value != wanted:
                         different.append(Difference(servo_id, register, value, wanted))
         return different
 
     def _correct(self, differences: Sequence[Difference]) -> None:
         """Write the registers that differ; EEPROM without torque and with the lock open."""
-        lock = self._family.lock
+        lock = self._family.lock_register
         kept = [d.servo_id for d in differences if lock is None or d.register.area == "eeprom"]
         for servo_id in dict.fromkeys(kept):
             self._write(servo_id, "torque_enable", 0)
@@ -170,10 +170,10 @@ class Provisioning:
         missing = [self._setups[i].label() for i in ids if i not in found]
         if missing:
             raise ServoMissing(
-                f"{self._where}: {', '.join(missing)} does not answer when asked for its "
+                f"{self._port_name}: {', '.join(missing)} does not answer when asked for its "
                 f"{register_label(what)}: check its cable, restart its power"
             )
 
     @property
-    def _where(self) -> str:
+    def _port_name(self) -> str:
         return self._line.port.port_name

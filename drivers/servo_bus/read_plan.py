@@ -19,7 +19,7 @@ class Sample(NamedTuple):
     effort: present load or current, depending on the servo
     status: register of the servo's faults
     acceleration, torque_limit: values written before torque was switched on
-    blank: whether every byte is zero, as in an indirect block whose addresses are lost
+    is_blank: whether every byte is zero, as in an indirect block whose addresses are lost
     """
 
     error: int
@@ -32,7 +32,7 @@ class Sample(NamedTuple):
     voltage: int | None = None
     acceleration: int | None = None
     torque_limit: int | None = None
-    blank: bool = False
+    is_blank: bool = False
 
 
 class Columns(NamedTuple):
@@ -65,21 +65,23 @@ class ReadWindow(NamedTuple):
         values = dict(zip(self.fields, struct.unpack(self.order + self.layout, data), strict=True))
         for name, bit in self.signs:
             values[name] = from_sign_magnitude(values[name], bit)
-        return Sample(error, **values, blank="torque" in values and not any(data))
+        return Sample(error, **values, is_blank="torque" in values and not any(data))
 
-    def codes(self) -> Iterator[tuple[str, str]]:
+    def struct_codes(self) -> Iterator[tuple[str, str]]:
         """Yield the struct code of every number and its field, "" for unused bytes."""
         names = iter(self.fields)
         for code in re.findall(r"\d*x|[a-zA-Z]", self.layout):
             yield code, "" if code.endswith("x") else next(names)
 
-    def measured(self) -> tuple[str, ...]:
+    def measured_fields(self) -> tuple[str, ...]:
         """Return the fields whose values are not known in advance."""
         return tuple(name for name in self.fields if name not in KNOWN)
 
     def columns(self, stride: int) -> Columns:
         """Return the slices of the measured fields in a tuple of ``stride`` numbers per servo."""
-        return Columns(**{name: slice(i, None, stride) for i, name in enumerate(self.measured())})
+        return Columns(
+            **{name: slice(i, None, stride) for i, name in enumerate(self.measured_fields())}
+        )
 
 
 class WindowSchedule:
@@ -94,18 +96,18 @@ class WindowSchedule:
         usual: Windows; neighbours, and the first and last, have different lengths.
         spare: Windows of different lengths; two alternate after each trouble, then the next two.
 
-    troubled: whether the spare windows are read
+    is_troubled: whether the spare windows are read
     """
 
     def __init__(self, usual: Iterable[ReadWindow], spare: Iterable[ReadWindow]) -> None:
         self._usual, self._spare = tuple(usual), tuple(spare)
         self._at, self._pair, self._odd = -1, -2, 0
         self._calm_at_s = 0.0
-        self.troubled = False
+        self.is_troubled = False
 
-    def next(self) -> ReadWindow:
+    def next_window(self) -> ReadWindow:
         """Return the window of the next read."""
-        if self.troubled:
+        if self.is_troubled:
             self._odd ^= 1
             return self._spare[(self._pair + self._odd) % len(self._spare)]
         self._at += 1
@@ -115,14 +117,14 @@ class WindowSchedule:
 
     def record_trouble(self, now_s: float) -> None:
         """Record that an answer is missing: the next reads have other lengths."""
-        self.troubled = True
+        self.is_troubled = True
         self._pair, self._odd = (self._pair + 2) % len(self._spare), 1
         self._calm_at_s = now_s + CALM_S
 
     def end_trouble(self, now_s: float) -> None:
         """Return to the usual windows once no answer can be late any more."""
         if now_s >= self._calm_at_s:
-            self.troubled = False
+            self.is_troubled = False
 
 
 def from_sign_magnitude(raw: int, sign: int) -> int:
@@ -143,14 +145,14 @@ class PartialReply(NamedTuple):
 
     samples: verified values by id
     damaged: servos whose bytes were damaged
-    unproved: servos whose bytes cannot be verified because of a damaged answer before them
-    stray: whether an answer is missing and bytes arrived that belong to no valid answer
+    unverifiable: servos whose bytes cannot be verified because of a damaged answer before them
+    has_stray_bytes: whether an answer is missing and bytes arrived that belong to no valid answer
     """
 
     samples: dict[int, Sample]
     damaged: frozenset[int]
-    unproved: frozenset[int] = frozenset()
-    stray: bool = False
+    unverifiable: frozenset[int] = frozenset()
+    has_stray_bytes: bool = False
 
 
 class GroupRead(Protocol):
@@ -164,13 +166,13 @@ class GroupRead(Protocol):
     covers_torque: bool
 
     @property
-    def whole(self) -> "Callable[[bytes, Expected], Values | None]":
+    def parse_whole(self) -> "Callable[[bytes, Expected], Values | None]":
         """Return ``WholeAnswer.values`` of its answer."""
 
-    def missing(self, raw: bytes) -> int:
+    def bytes_missing(self, raw: bytes) -> int:
         """Return how many bytes have not arrived yet."""
 
-    def pieces(self, raw: bytes) -> PartialReply:
+    def verified_parts(self, raw: bytes) -> PartialReply:
         """Return the verified parts."""
 
 
@@ -207,10 +209,10 @@ class WholeAnswer:
     ) -> None:
         self._front, self._heads, self._window, self._check = front, heads, window, check
         order, one = window.order, f"{len(heads[0])}x"
-        for code, name in window.codes():
+        for code, name in window.struct_codes():
             one += f"{struct.calcsize(order + code)}x" if name in KNOWN else code
         layout = struct.Struct(f"{order}{len(front)}x" + (one + check) * len(heads))
-        stride = len(window.measured()) + 1
+        stride = len(window.measured_fields()) + 1
         self.length, self._unpack = layout.size, layout.unpack
         self.columns, self._checks = window.columns(stride), slice(stride - 1, None, stride)
         self._parts, self._intact = struct.Struct(parts).unpack, intact
@@ -233,7 +235,7 @@ class WholeAnswer:
             for k, head in enumerate(self._heads):
                 mask.append(b"\xff" * len(head))
                 known.append(head)
-                for code, name in (*self._window.codes(), (self._check, "")):
+                for code, name in (*self._window.struct_codes(), (self._check, "")):
                     value = expected[name][k] if name in expected else None
                     size = struct.calcsize(order + code)
                     mask.append((b"\x00" if value is None else b"\xff") * size)
@@ -256,18 +258,19 @@ class AddressMap(NamedTuple):
 class ReadPlan(NamedTuple):
     """Read windows and packets.
 
-    together, alone: windows for reads of all servos, and of servos that are read alone
-    second: windows for confirming reads, of other lengths than the first reads
-    packets: creates the read of some servos with a window, if it is not a plain sync read
-    armed: window with torque and limits, to check that a servo is still armed
-    covered: whether every read contains torque and faults
-    block: required contents of indirect blocks, None if there are none
+    group_windows, single_windows: windows for reads of all servos, and of servos that are read
+        alone
+    confirming_windows: windows for confirming reads, of other lengths than the first reads
+    create_group_read: creates the read of some servos with a window, if it is not a plain sync read
+    armed_window: window with torque and limits, to check that a servo is still armed
+    covers_torque: whether every read contains torque and faults
+    indirect_block: required contents of indirect blocks, None if there are none
     """
 
-    together: WindowSchedule
-    alone: WindowSchedule
-    second: WindowSchedule
-    packets: Callable[[Sequence[int], ReadWindow], GroupRead] | None = None
-    armed: ReadWindow | None = None
-    covered: bool = True
-    block: AddressMap | None = None
+    group_windows: WindowSchedule
+    single_windows: WindowSchedule
+    confirming_windows: WindowSchedule
+    create_group_read: Callable[[Sequence[int], ReadWindow], GroupRead] | None = None
+    armed_window: ReadWindow | None = None
+    covers_torque: bool = True
+    indirect_block: AddressMap | None = None

@@ -72,13 +72,13 @@ class Recovery:
             torque = line.ask(ids, "torque_enable")
             if not torque:
                 return None
-            whole = self._without_faults(
-                self._same_models(tuple(torque)), torque if engaged else {}
-            )
+            whole = self._recoverable(self._same_models(tuple(torque)), torque if engaged else {})
             try:
                 self._provisioning.apply(whole)
                 well = tuple(
-                    i for i in whole if torque[i] or not engaged or not health.exhausted(i, now_s)
+                    i
+                    for i in whole
+                    if torque[i] or not engaged or not health.has_exhausted_restarts(i, now_s)
                 )
                 if engaged:
                     well = self._release_lost(well)
@@ -102,7 +102,7 @@ class Recovery:
         finally:
             self._line.tries = before
 
-    def differs(self, servo_id: int) -> bool:
+    def has_differences(self, servo_id: int) -> bool:
         """Return whether a servo's settings are wrong; False for a silent servo.
 
         Raises:
@@ -128,7 +128,7 @@ class Recovery:
                 self._health.record_fault(servo_id, f"is not {model} any more: exchanged?")
         return tuple(i for i in ids if numbers.get(i) == expected[i])
 
-    def _without_faults(self, ids: tuple[int, ...], torque: Mapping[int, int]) -> tuple[int, ...]:
+    def _recoverable(self, ids: tuple[int, ...], torque: Mapping[int, int]) -> tuple[int, ...]:
         """Return the servos whose errors do not prevent torque: the others would delay them.
 
         torque: torque, on or off, of each servo that must have it
@@ -197,7 +197,7 @@ class Recovery:
         accel = family.acceleration_units
         armed = (
             speeds
-            if family.arming.speed
+            if family.arming.limits_speed
             else [accel(self._setups[i].max_accel_steps_s2) for i in ids]
         )
         write_verified(line, ids, family.arming.register, armed)

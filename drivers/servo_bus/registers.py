@@ -39,8 +39,8 @@ class Registers:
     def identify(self, servo_id: int) -> Identity | None:
         """Return a servo's model and firmware, None if it does not answer."""
         codec = self._family.codec
-        status = self._exchange(servo_id, codec.identify(servo_id), codec.IDENTITY_LENGTH)
-        return None if status is None else codec.identity(status)
+        status = self._exchange(servo_id, codec.identity_request(servo_id), codec.IDENTITY_LENGTH)
+        return None if status is None else codec.parse_identity(status)
 
     def read(self, servo_id: int, name: str) -> int | None:
         """Return a register's value, None without a good answer."""
@@ -88,7 +88,7 @@ class Registers:
         rows = [register.encode(value)] * len(ids)
         self._port.write(self._family.codec.sync_write(ids, register.address, register.size, rows))
 
-    def settle(self, servo_id: int, name: str, value: int) -> bool:
+    def write_if_different(self, servo_id: int, name: str, value: int) -> bool:
         """Write a register only if it differs; return whether it now has the value."""
         return self.read(servo_id, name) == value or self.write(servo_id, name, value)
 
@@ -100,9 +100,9 @@ class Registers:
         Returns:
             Whether the servo has the value.
         """
-        lock = self._family.lock
+        lock = self._family.lock_register
         if lock is None or self._family.registers[name].area != "eeprom":
-            return self.settle(servo_id, name, value)
+            return self.write_if_different(servo_id, name, value)
         if not self.write(servo_id, lock, 0):
             return False
         written = self.write(servo_id, name, value)
@@ -186,7 +186,7 @@ def transact(
     while len(raw) < LONGEST:
         more = port.read_until(codec.bytes_missing(raw, seen + 1, shortest) or 1, deadline_s)
         raw += more
-        found = codec.statuses(raw)
+        found = codec.parse_statuses(raw)
         seen = len(found)
         for status in found:
             mine = status.intact and servo_id in (None, status.id)

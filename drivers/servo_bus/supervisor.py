@@ -32,11 +32,11 @@ class Supervisor(ABC):
 
     engaged: whether torque is on
     entering: servos that move slowly into their limits
-    withholds: whether the supervisor may ever withhold goals
+    withholds_goals: whether the supervisor may ever withhold goals
     due_s: ``service`` has nothing to do before this time
     """
 
-    withholds = False
+    withholds_goals = False
 
     def __init__(
         self,
@@ -112,7 +112,7 @@ class Supervisor(ABC):
             BusLost: the port is lost.
         """
 
-    def withheld(self, now_s: float) -> frozenset[int]:
+    def withheld_ids(self, now_s: float) -> frozenset[int]:
         """Return the servos that must get no goals now."""
         return frozenset()
 
@@ -154,12 +154,12 @@ class Supervisor(ABC):
             self._line.errors["rearmed"] += 1
             slot = self._slot[servo_id]
             self._feedback.hold(slot, position, at_s, self.engaged)
-            self._recovered(servo_id)
+            self._clear_state(servo_id)
             if self.engaged:
                 self._rearmed.add(servo_id)
                 self.entering.add_if_outside(servo_id, position)
 
-    def _recovered(self, servo_id: int) -> None:  # noqa: B027  # most have nothing to add
+    def _clear_state(self, servo_id: int) -> None:  # noqa: B027  # most have nothing to add
         """Clear the state of a servo that works again."""
 
     def recover_tripped(self, group: Iterable[int]) -> None:
@@ -179,7 +179,7 @@ class Supervisor(ABC):
 
     def _name_fault(self, servo_id: int) -> None:
         """Copy a servo's fault to the feedback."""
-        self._feedback.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
+        self._feedback.record_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
 
     def _next_to_check(self, group: Collection[int], again_s: float) -> int | None:
         """Return the next servo in rotation, None if it is out of the group."""
@@ -201,7 +201,9 @@ class Supervisor(ABC):
             steps = self._feedback.position(slot)
             if steps is not None:
                 self._feedback.mark_rearmed(slot)
-                if self.entering.has_arrived(servo_id, steps, now_s) and self._full_speed(servo_id):
+                if self.entering.has_arrived(servo_id, steps, now_s) and self._restore_full_speed(
+                    servo_id
+                ):
                     self.entering.end(servo_id)
         for servo_id in tuple(self._rearmed):
             slot = self._slot[servo_id]
@@ -209,7 +211,7 @@ class Supervisor(ABC):
                 self._rearmed.discard(servo_id)
                 self._feedback.mark_rearmed(slot)
 
-    def _full_speed(self, servo_id: int) -> bool:
+    def _restore_full_speed(self, servo_id: int) -> bool:
         """Restore full speed, with the next goal or by a write; return whether a servo has it."""
         if self._family.goal_speed:
             return True

@@ -50,8 +50,12 @@ class SyncReader:
     def __init__(self, line: Transactions, polled: PollList, plan: ReadPlan) -> None:
         self._line = line
         self.poll_list = polled
-        self._together, self._alone, self._second = plan.together, plan.alone, plan.second
-        self._packets, self._header = plan.packets, line.family.codec.HEADER
+        self._together, self._alone, self._second = (
+            plan.group_windows,
+            plan.single_windows,
+            plan.confirming_windows,
+        )
+        self._packets, self._header = plan.create_group_read, line.family.codec.HEADER
         self._until_s = inf
         self._sync_read = line.family.sync_read
         self.unanswered_s = self.stray_s = -inf
@@ -63,18 +67,18 @@ class SyncReader:
     def next_group(self, now_s: float) -> GroupRead | None:
         """Return the due read of all servos; None if they are not all read in one exchange."""
         polled, turns = self.poll_list, self._together
-        if turns.troubled:
+        if turns.is_troubled:
             turns.end_trouble(now_s)
-        if polled.troubled or not self._sync_read:
+        if polled.is_troubled or not self._sync_read:
             return None
-        window = turns.next()
+        window = turns.next_window()
         # Looked up by identity: hashing ids and windows every tick takes as long as reading the
         # answer.
         if polled.group is self._prepared_ids and (ready := self._prepared.get(id(window))):
             return ready
         return self._group(polled.group, window)
 
-    def salvage(
+    def verified_replies(
         self, group: GroupRead, raw: bytes, at_s: float, now_s: float
     ) -> dict[int, ServoReply]:
         """Return the verified parts of an answer to a read of all servos.
@@ -87,7 +91,7 @@ class SyncReader:
         """
         self._until_s = self._line.whole_s + self._line.most_s
         replies: dict[int, ServoReply] = {}
-        self._save(group, raw, at_s, replies, now_s, self._together)
+        self._store_replies(group, raw, at_s, replies, now_s, self._together)
         return replies
 
     def is_reply_pending(self, servo_id: int, now_s: float) -> bool:
@@ -105,12 +109,12 @@ class SyncReader:
             BusLost: the port is lost.
         """
         replies: dict[int, ServoReply] = {}
-        window = self._second.next()
+        window = self._second.next_window()
         for asked in self._line.family.request_groups(ids):
             group = self._group(asked, window)
             raw, at_s = self._line.exchange(group.request, group.reply_length)
-            raw = self._line.complete(raw, group.missing, self._line.deadline_s)
-            samples = group.pieces(raw).samples
+            raw = self._line.wait_for_rest(raw, group.bytes_missing, self._line.deadline_s)
+            samples = group.verified_parts(raw).samples
             if len(samples) < len(group.ids) and not self._line.quiet:
                 self._line.drain(self._line.timeout.seconds)
             replies |= {servo_id: ServoReply(sample, at_s) for servo_id, sample in samples.items()}
@@ -123,15 +127,15 @@ class SyncReader:
             BusLost: the port is lost.
         """
         replies: dict[int, ServoReply] = {}
-        together, due = self.poll_list.group, self.poll_list.due(now_s)
+        together, due = self.poll_list.group, self.poll_list.next_due(now_s)
         self._until_s = inf
         if together:
-            window = self._together.next()
+            window = self._together.next_window()
             for asked in self._line.family.request_groups(together):
                 if self._line.port.now_s() < self._until_s:
                     self._read(asked, replies, now_s, self._together, window)
         if due is not None and self._line.port.now_s() < self._until_s:
-            self._read((due,), replies, now_s, self._alone, self._alone.next())
+            self._read((due,), replies, now_s, self._alone, self._alone.next_window())
         return replies
 
     def _read(
@@ -148,7 +152,7 @@ class SyncReader:
         raw, at_s = self._line.exchange(group.request, group.reply_length, reserve)
         # The whole read has one time limit, the longest one of its first exchange.
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
-        self._save(group, raw, at_s, replies, now_s, turns)
+        self._store_replies(group, raw, at_s, replies, now_s, turns)
 
     def _group(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
         """Return the prepared exchange for some servos."""
@@ -169,7 +173,7 @@ class SyncReader:
             self._prepared[id(window)] = group
         return group
 
-    def _save(
+    def _store_replies(
         self,
         group: GroupRead,
         raw: bytes,
@@ -180,8 +184,8 @@ class SyncReader:
     ) -> None:
         """Store the verified parts of an answer; read servos again that lost theirs to another."""
         while True:
-            raw = self._line.complete(raw, group.missing, self._line.deadline_s)
-            samples, damaged, unproved, stray = group.pieces(raw)
+            raw = self._line.wait_for_rest(raw, group.bytes_missing, self._line.deadline_s)
+            samples, damaged, unproved, stray = group.verified_parts(raw)
             if stray:
                 self.stray_s = now_s
             for servo_id, sample in samples.items():
@@ -207,12 +211,12 @@ class SyncReader:
                 polled.record_silent(servo_id, now_s)
             turns.record_trouble(now_s)
             if not line.quiet and line.drain(line.timeout.seconds):
-                line.timeout.missed()
+                line.timeout.record_late_answer()
             done = replies.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
             if not left or self._line.port.now_s() >= self._until_s:
                 return
-            group = self._group(left, turns.next())
+            group = self._group(left, turns.next_window())
             raw, at_s = self._line.exchange(group.request, group.reply_length)
 
 
@@ -231,22 +235,22 @@ class SyncRead:
         before, after = codec.CHECKED
         part = f"{before}x{self._size - before - after}s{after}x"
         answer = WholeAnswer(b"", heads, window, codec.CHECK, part * len(ids), codec.all_intact)
-        self.whole, self.columns = answer.values, answer.columns
+        self.parse_whole, self.columns = answer.values, answer.columns
         self.reply_length, self.covers_torque = answer.length, "torque" in window.fields
 
-    def missing(self, raw: bytes) -> int:
+    def bytes_missing(self, raw: bytes) -> int:
         """Return how many bytes have not arrived yet."""
         codec, count, length = self._codec, len(self.ids), self.window.length
         missing = codec.bytes_missing(raw, count, length)
         if missing:
             return missing
         # Repeated statuses, echoes and statuses of other servos are not expected ones.
-        found = codec.statuses(raw)
+        found = codec.parse_statuses(raw)
         fits = {s.id for s in found if len(s.params) == length or s.error & codec.REFUSAL}
         there = len(fits.intersection(self.ids))
         return codec.bytes_missing(raw, len(found) + count - there, length)
 
-    def pieces(self, raw: bytes) -> PartialReply:
+    def verified_parts(self, raw: bytes) -> PartialReply:
         """Return the verified parts.
 
         Servos answer in the order of the request. If an answer is missing, one in the position of
@@ -257,12 +261,12 @@ class SyncRead:
         damaged, twofold, in_place = set[int](), set[int](), set[int]()
         begin = len(self.request) if raw.startswith(self.request) else 0  # an echo
         stray = len(raw)
-        for status in self._codec.statuses(raw):
+        for status in self._codec.parse_statuses(raw):
             stray -= status.intact * (len(status.params) + self._codec.STATUS_OVERHEAD)
             if status.id not in self.ids:
                 continue
             place = begin + self.ids.index(status.id) * self._size
-            if status.intact and abs(status.at - place) < self._size // 2:
+            if status.intact and abs(status.offset - place) < self._size // 2:
                 in_place.add(status.id)
             if not status.intact:
                 damaged.add(status.id)

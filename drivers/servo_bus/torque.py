@@ -56,7 +56,7 @@ def write_verified(
     Raises:
         ServoMissing: a servo does not answer or rejects it.
     """
-    _until(
+    _send_until(
         line,
         dict(zip(ids, values, strict=True)),
         lambda left: line.write_all(tuple(left), name, left.values()),
@@ -68,7 +68,7 @@ def write_verified(
 def _send_goals(line: Transactions, wanted: Mapping[int, tuple[int, int]]) -> None:
     goals = [goal for goal, _ in wanted.values()]
     speeds = [speed for _, speed in wanted.values()]
-    line.send(line.family.goals(tuple(wanted)).packet(goals, speeds))
+    line.send(line.family.create_goal_packets(tuple(wanted)).packet(goals, speeds))
 
 
 def _ask_goals(
@@ -90,7 +90,7 @@ def _ask_goals(
     return found
 
 
-def _until(
+def _send_until(
     line: Transactions,
     wanted: Mapping[int, Value],
     send: Callable[[Mapping[int, Value]], None],
@@ -128,7 +128,7 @@ def switch_on(
     if family.goal_speed:
         before = read_positions(line, ids)
         places = dict(zip(ids, zip(before, goals, strict=True), strict=True))
-        _until(line, wanted, send, partial(_ask_goals, line, places), "goal_position")
+        _send_until(line, wanted, send, partial(_ask_goals, line, places), "goal_position")
     else:
         write_verified(line, ids, "goal_position", goals)
         before = read_positions(line, ids)
@@ -150,7 +150,7 @@ def switch_on(
                 f"{family.jump_cure}"
             )
     if family.goal_speed:
-        _until(line, wanted, send, partial(_ask_goals, line, {}), "goal_position")
+        _send_until(line, wanted, send, partial(_ask_goals, line, {}), "goal_position")
 
 
 def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
@@ -184,7 +184,9 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
         BusLost: the port is lost.
     """
     if not port.setBaudRate(baud):
-        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose {family.usual_bauds}")
+        raise PortError(
+            f"{port.port_name} cannot run at {baud} bit/s: choose {family.recommended_bauds}"
+        )
     released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
     return (*released.holding_ids, *released.unconfirmed_ids)
 

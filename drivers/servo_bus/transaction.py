@@ -53,7 +53,7 @@ class AdaptiveTimeout:
         self._count = 0
         self._empty_s = -inf
 
-    def with_reserve(self, now_s: float) -> float:
+    def reserve_timeout_s(self, now_s: float) -> float:
         """Return the time-out with the whole reserve, seconds."""
         reserve_s = REFILL * (now_s - self._empty_s)
         return min(self._most_s, self.seconds + min(RESERVE_S, reserve_s))
@@ -78,7 +78,7 @@ class AdaptiveTimeout:
             self.seconds = min(self._most_s, max(self._least_s, FACTOR * late_s))
             self._before_s, self._worst_s, self._count = self._worst_s[0], [0.0] * RANK, 0
 
-    def missed(self) -> None:
+    def record_late_answer(self) -> None:
         """Record that an answer came after its time-out."""
         self.update(self.seconds)
 
@@ -212,10 +212,12 @@ class Transactions:
     def deadline_s(self) -> float:
         """Return the end of the last exchange's time-out."""
         timeout = self.timeout
-        wait_s = timeout.with_reserve(self._sent_s) if self._reserved else timeout.seconds
+        wait_s = timeout.reserve_timeout_s(self._sent_s) if self._reserved else timeout.seconds
         return self.whole_s + wait_s
 
-    def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
+    def wait_for_rest(
+        self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float
+    ) -> bytes:
         """Continue to wait for an answer that is longer than its shortest form."""
         while wanted := missing(raw):
             more = self.port.read_until(wanted, deadline_s)
@@ -245,7 +247,7 @@ class Transactions:
 
     def _record_late(self, raw: bytes) -> None:
         """Record answers that arrived after their time-outs; noise does not count."""
-        if any(status.intact for status in self.family.codec.statuses(raw)):
+        if any(status.intact for status in self.family.codec.parse_statuses(raw)):
             self.lateness.record_late_answer(self.port.now_s())
 
     def ask_bytes(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
@@ -312,7 +314,7 @@ class Transactions:
 
         def missing(raw: bytes) -> int:
             others = 0
-            for status in codec.statuses(raw):
+            for status in codec.parse_statuses(raw):
                 if status.intact and status.id in ids and status.error & codec.REFUSAL:
                     refused.add(status.id)
                 elif status.id not in ids or len(status.params) != length:
@@ -322,7 +324,7 @@ class Transactions:
             done = len(found.keys() | refused) >= len(ids)
             return 0 if done else codec.bytes_missing(raw, len(ids) + others, length)
 
-        self.complete(b"", missing, deadline_s)
+        self.wait_for_rest(b"", missing, deadline_s)
         if len(found) < len(ids):
             self.drain()
         return found

@@ -21,7 +21,7 @@ RESTART_S = 0.1
 class TransientFaultSupervisor(Supervisor):
     """Supervisor of servos with transient faults."""
 
-    withholds = True
+    withholds_goals = True
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -56,7 +56,7 @@ class TransientFaultSupervisor(Supervisor):
     def check_prepared(self) -> None:
         """Do nothing: every answer of servos that have just been prepared contains their faults."""
 
-    def withheld(self, now_s: float) -> frozenset[int]:
+    def withheld_ids(self, now_s: float) -> frozenset[int]:
         """Return the servos that must get no goals now.
 
         Some firmware switches torque on with a goal, so a servo that may have restarted, or has no
@@ -70,7 +70,7 @@ class TransientFaultSupervisor(Supervisor):
 
     # --- one servo's answer
 
-    def _recovered(self, servo_id: int) -> None:
+    def _clear_state(self, servo_id: int) -> None:
         self._torque_off.discard(servo_id)
 
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
@@ -81,13 +81,13 @@ class TransientFaultSupervisor(Supervisor):
         self._last_errors[servo_id] = error
         if confirmed or servo_id in self._seen_s:
             seen_s = self._seen_s.setdefault(servo_id, {})
-            before = self._bits(servo_id)
+            before = self._recent_faults(servo_id)
             for bit in range(8):
                 if confirmed >> bit & 1:
                     seen_s[1 << bit] = now_s
             for bit in [b for b, at_s in seen_s.items() if now_s - at_s >= GONE_S]:
                 del seen_s[bit]
-            now = self._bits(servo_id)
+            now = self._recent_faults(servo_id)
             health = self._health
             worse = servo_id in health.faults and servo_id not in health.latches
             if now != before and not worse:
@@ -126,12 +126,12 @@ class TransientFaultSupervisor(Supervisor):
         for servo_id in out:
             self._out_since_s.setdefault(servo_id, now_s)
 
-    def _bits(self, servo_id: int) -> int:
+    def _recent_faults(self, servo_id: int) -> int:
         return sum(self._seen_s.get(servo_id, ()))
 
     def _is_armed(self, servo_id: int, sample: Sample) -> bool:
         """Return whether speed and torque limits are as they were written."""
-        wanted = self._family.armed(self._setups[servo_id]).items()
+        wanted = self._family.armed_values(self._setups[servo_id]).items()
         return all(limit is None or getattr(sample, name) == limit for name, limit in wanted)
 
     def _has_known_reason(self, servo_id: int) -> bool:
@@ -140,7 +140,7 @@ class TransientFaultSupervisor(Supervisor):
             return False
         if servo_id not in self._health.latches:
             return True
-        return bool(self._bits(servo_id) & self._family.torque_faults)
+        return bool(self._recent_faults(servo_id) & self._family.torque_faults)
 
     # --- after every read
 
@@ -159,11 +159,11 @@ class TransientFaultSupervisor(Supervisor):
             if servo_id is not None:
                 # Shortly after trouble on the line the answers do not contain torque.
                 self._doubted.add(servo_id)
-                if self._recovery.differs(servo_id):
+                if self._recovery.has_differences(servo_id):
                     self._line.errors["setting changed"] += 1
                     self._suspects.add(servo_id)
         if self._doubted and group:
-            window = self._plan.armed
+            window = self._plan.armed_window
             if window is not None:
                 ids = tuple(i for i in self._ids if i in self._doubted and i in group)
                 found = self._line.ask_bytes(ids, window.address, window.length)

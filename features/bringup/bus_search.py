@@ -36,7 +36,7 @@ ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
 
 RATES: Mapping[BusKind, Sequence[int]] = {
     "maestro": BOARD_RATES,
-    **{kind.name: kind.family.usual_rates for kind in KINDS.values()},
+    **{kind.name: kind.family.scan_rates for kind in KINDS.values()},
 }
 
 
@@ -110,7 +110,13 @@ def search(
         if kind != "maestro":
             (one,) = scan(port, KINDS[kind].family, (baud,), thorough, family_of=FAMILY_OF)
             looked = SearchRound(
-                kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1
+                kind,
+                baud,
+                one.is_supported,
+                one.found,
+                one.junk_bytes,
+                one.shared_ids,
+                one.protocol_1_ids,
             )
         elif port.setBaudRate(baud):
             # The first six channels are there on every board; others might be an error to it.

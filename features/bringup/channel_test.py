@@ -68,7 +68,7 @@ def walk(
     with give_pulses(board, slow) as channel:
         start = round(channel.ramp.pulse_steps)
         for nth, asked in enumerate(places):
-            channel.aim(channel.clip(asked), now_s())
+            channel.record_goal(channel.clip(asked), now_s())
             board.send_goals([channel])
             takes_s = abs(asked - start) / speed_steps_s + SETTLE_S
             until_s = now_s() + takes_s + LATE_S
@@ -103,7 +103,7 @@ def give_pulses(board: Board, setup: ServoConfig) -> Iterator[Channel]:
                 f"{board.line.port.port_name}: no answer about {servo_label(setup)}: check its "
                 "cable"
             )
-        channel.hold()
+        channel.record_hold()
         yield channel
     finally:
         try:
@@ -121,9 +121,9 @@ def _advance(board: Board, channel: Channel, sleep_until: Callable[[float], None
     """Wait a moment and return the pulse; move it on if the board does not do so itself."""
     sleep_until(board.line.port.now_s() + LOOK_S)
     channel.advance(board.line.port.now_s())
-    board.lead([channel])
+    board.advance_pulses([channel])
     for _ in range(MOST_TRIES - 1):
-        pulses = board.pulses((channel.id,))
+        pulses = board.read_pulses((channel.id,))
         if pulses is not None:
             return pulses[0]
     return read_every_pulse(board, [channel.setup])[0]
@@ -136,10 +136,10 @@ def send_home(line: MaestroLink) -> tuple[str, ...]:
         ServoMissing: the board does not answer.
         BusLost: the port is gone.
     """
-    register = line.greet()
+    register = line.wait_for_answer()
     if register is None:
         raise ServoMissing(
             f"{line.port.port_name}: no Maestro answers: gazerig doctor names the cure"
         )
-    line.send(line.speech.go_home())
+    line.send(line.codec.go_home())
     return name_errors(register)

@@ -37,7 +37,7 @@ class SetupResult(NamedTuple):
 
 def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
     """List all baud rates, those that a servo is likely to have first."""
-    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.usual_rates)))
+    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.scan_rates)))
 
 
 def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> FoundServo:
@@ -156,12 +156,14 @@ class _Assignment:
                 f"{self._port.port_name}: the servo does not answer as id {self._id} at "
                 f"{self._baud} bit/s: gazerig scan finds it"
             )
-        if kind.family.lock is not None and not registers.settle(self._id, kind.family.lock, 1):
+        if kind.family.lock_register is not None and not registers.write_if_different(
+            self._id, kind.family.lock_register, 1
+        ):
             raise self._refusal("close its lock")
         return SetupResult(self._found, seen, tuple(self._done))
 
     def _unlock(self) -> None:
-        lock = self._kind.family.lock
+        lock = self._kind.family.lock_register
         if lock is not None and not self._registers.write(self._id, lock, 0):
             raise self._refusal("open its lock")
 

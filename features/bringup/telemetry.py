@@ -123,7 +123,7 @@ class MaestroTelemetry:
 
     def read(self, joint: JointParams) -> Telemetry | None:
         """Read a joint's pulse; see TelemetryReader."""
-        found = self._lines[0].pulses((joint.id,))
+        found = self._lines[0].read_pulses((joint.id,))
         if found is None:
             self._lines.reverse()
             return None
@@ -138,7 +138,7 @@ class Pca9685Telemetry:
 
     def read(self, joint: JointParams) -> Telemetry | None:
         """Read a joint's pulse; see TelemetryReader."""
-        found = self._board.pulses((joint.id,))
+        found = self._board.read_pulses((joint.id,))
         return None if found is None else pulse_telemetry(joint, found[0])
 
 

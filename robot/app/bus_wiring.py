@@ -8,7 +8,7 @@ from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.plugins import BUS, BusPlugin, describe_error, find, is_ours, load
-from gazerig.drivers.serial.port import BusPort, port_of
+from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import setups
@@ -81,7 +81,7 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
     beat = guardian.beat if guardian is not None else None
     shares = []
     for name in bus_names(rig):
-        share = _bus_share(rig, name, port_of(paths[name], on_traffic=beat))
+        share = _bus_share(rig, name, port_at_path(paths[name], on_traffic=beat))
         if guardian is not None and name in plans:
             bus = GuardedBus(share.bus, len(share.servo_indices), guardian, guarded.index(name))
             share = share._replace(bus=bus)

@@ -233,7 +233,7 @@ class Session:
         for event in (*events, *self._run_observers.events()):
             self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
         if not self._options.fast:
-            for line in self._lasting.lines():
+            for line in self._lasting.due_lines():
                 self._made.robot.report(line)
 
     def _stop_reason(self, seconds: float) -> str | None:

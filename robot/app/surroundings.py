@@ -174,7 +174,7 @@ def surroundings(name: str) -> Surroundings:
     Raises:
         PluginError: they cannot be imported, or several packages have this name.
     """
-    outside = any(one.name == name and not one.ours for one in registrations(SURROUNDINGS))
+    outside = any(one.name == name and not one.is_ours for one in registrations(SURROUNDINGS))
     found = find(SURROUNDINGS, name if outside and not is_ours(SURROUNDINGS, name) else WORLD)
     part = found.load()
     if isinstance(part, type) and issubclass(part, Surroundings):
@@ -186,7 +186,7 @@ def surroundings_names() -> list[str]:
     """Return the names after ``--world``, ours and packages', without those that are missing."""
     names: list[str] = []
     for one in registrations(SURROUNDINGS):
-        if not one.ours:
+        if not one.is_ours:
             names.append(one.name)
             continue
         try:

@@ -115,7 +115,7 @@ def shipped_commands() -> Mapping[str, CommandEntry]:
 
 def package_commands() -> Mapping[str, CommandEntry]:
     """Return the commands of installed packages, by name."""
-    return _loaded([one for one in registrations(COMMAND) if not one.ours])
+    return _loaded([one for one in registrations(COMMAND) if not one.is_ours])
 
 
 def in_order(commands: Mapping[str, CommandEntry]) -> list[str]:

@@ -62,7 +62,7 @@ class LineWriter:
 
     def line(self, text: str) -> None:
         """Write this, line end included; returns at once."""
-        if self._gone or self._call.waiting() >= self._most:
+        if self._gone or self._call.waiting_calls() >= self._most:
             self.dropped += 1
             return
         # The text on the status line is older than this.
@@ -89,7 +89,7 @@ class LineWriter:
 
     def flush(self, timeout_s: float) -> bool:
         """Wait until everything is written, no longer than this; return whether it is."""
-        return self._gone or self._call.idle(timeout_s)
+        return self._gone or self._call.wait_idle(timeout_s)
 
     def _reader_gone(self) -> bool:
         """Return whether a pipe has lost its reader, which else only the next line would find."""

@@ -104,7 +104,7 @@ class GuardedChooser:
         if rule is not None:
             outcome = self._call(lambda: _reset(rule, t_s))
             if outcome is not None and outcome.error is not None:
-                self._drop(f"failed ({outcome.why})")
+                self._drop(f"failed ({outcome.error_text})")
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target of the rule, else that of the rig's own attention."""
@@ -128,7 +128,7 @@ class GuardedChooser:
                 self._drop(f"has not answered for {BLOCKED_S:g} s")
             return
         if outcome.error is not None:
-            self._drop(f"failed ({outcome.why})")
+            self._drop(f"failed ({outcome.error_text})")
         elif isinstance(outcome.value, str):
             self._drop(f"returned {outcome.value}")
         elif outcome.took_s <= LONGEST_S or not self._overrun(t_s):

@@ -40,7 +40,7 @@ class LineQueue:
 
     def line(self, text: str) -> None:
         """Queue a line without waiting."""
-        if self._call.waiting() >= self._most:
+        if self._call.waiting_calls() >= self._most:
             self.dropped += 1
             self._missing += 1
         else:
@@ -48,14 +48,14 @@ class LineQueue:
 
     def flush(self, timeout_s: float) -> bool:
         """Wait until everything is delivered or the time is over; return whether it is."""
-        return self._call.idle(timeout_s)
+        return self._call.wait_idle(timeout_s)
 
-    def lasts(self) -> tuple[float, str] | None:
+    def overdue_call(self) -> tuple[float, str] | None:
         """Return the duration [s] of a blocked delivery and a text, None if none is blocked."""
         for_s = self._call.running_s()
         if for_s == 0.0:
             return None
-        waiting = f"{self._call.waiting()} lines wait, {self.dropped} are lost"
+        waiting = f"{self._call.waiting_calls()} lines wait, {self.dropped} are lost"
         return for_s, f"{self._name} has not returned for {for_s:.0f} s: {waiting}"
 
     def __enter__(self) -> Self:
@@ -72,7 +72,7 @@ class LineQueue:
         """Wait for the running delivery, and abandon it after a second."""
         blocked = not self.flush(_END_S)
         OVERDUE_SOURCES.discard(self)
-        lost = self.dropped + self._call.waiting() * blocked
+        lost = self.dropped + self._call.waiting_calls() * blocked
         self._call.close()
         if lost:
             why = f"{self._name} does not return" if blocked else self._failure or "it was slow"

@@ -26,7 +26,7 @@ from typing import Any
 from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.serial.port import BusPort, port_of
+from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, HangDetector, Heartbeat
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe
 from gazerig.robot.model.clock import RealClock
@@ -174,7 +174,7 @@ class ProgramWatch:
     def _release(self, i: int, why: str, exclusive: bool) -> bool:
         """Release one plan's servos; return False if the port cannot be used."""
         plan = self._plans[i]
-        port = port_of(plan.port, exclusive)
+        port = port_at_path(plan.port, exclusive)
         try:
             unconfirmed = self._releasers[i](port)
         except DriverError as error:

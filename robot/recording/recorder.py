@@ -15,7 +15,7 @@ from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import refuse_existing
-from gazerig.drivers.process.passed_image import copied
+from gazerig.drivers.process.passed_image import copy_image
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.tick import Tick
@@ -209,7 +209,7 @@ class Recorder:
         if found is None or found.image is None or self._link.failed:
             return
         try:
-            image = copied(found.image)
+            image = copy_image(found.image)
         except OSError:  # no memory or no file descriptor: the run has priority
             return
         about = encode((found.captured_s, image.shape, image.dtype))

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from gazerig.drivers.process.passed_image import PassedImage, receive, taken
+from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
 from gazerig.drivers.process.priority import lower_priority
 from gazerig.drivers.types import BusHealth, ImageArray
 from gazerig.gaze.types import GazeCommand, GazeState, Vec3
@@ -164,7 +164,7 @@ def _write(
             router.ticks(body)
         elif kind == FRAME:
             captured_s, shape, dtype = decode_plain(body)
-            router.frame(captured_s, taken(PassedImage(fd, tuple(shape), dtype)))
+            router.frame(captured_s, take_image(PassedImage(fd, tuple(shape), dtype)))
         elif kind == HEALTH:
             counts, lost = decode_plain(body)
             router.health(BusHealth(*counts), lost)

@@ -34,7 +34,7 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.board import MaestroBus, MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Bus, Pca9685Params
-from gazerig.drivers.serial.port import BlockingPort, port_of
+from gazerig.drivers.serial.port import BlockingPort, port_at_path
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.control.body import Body, setups
@@ -82,7 +82,7 @@ def made(kind: str, path: str, configs: Sequence[ServoConfig]) -> ServoBus:
     if kind == "maestro":
         return MaestroBus(BlockingPort(path), configs, MaestroParams(stagger_ms=0.0))
     if kind == "pca9685":
-        return Pca9685Bus(port_of(path), configs, Pca9685Params(stagger_ms=0.0))
+        return Pca9685Bus(port_at_path(path), configs, Pca9685Params(stagger_ms=0.0))
     if kind == "feetech":
         return SmartServoBus(FEETECH, BlockingPort(path), configs, FeetechParams())
     # While others have their turn it is silent for longer than servos bear.

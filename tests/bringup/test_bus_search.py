@@ -155,7 +155,7 @@ def test_nobody():
 
 def test_all_rates_of_a_kind_are_in_the_plan():
     rows = plan("", ALL, None)
-    assert [rate for kind, rate in rows if kind == "dynamixel"] == list(DYNAMIXEL.usual_rates)
+    assert [rate for kind, rate in rows if kind == "dynamixel"] == list(DYNAMIXEL.scan_rates)
     assert rows[0] == ("maestro", 115_200)
 
 

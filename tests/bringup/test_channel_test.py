@@ -92,7 +92,7 @@ def test_an_error_of_the_board_on_the_way_is_no_place():
 
 def test_an_input_is_refused():
     bench = Bench()
-    bench.driver.line.pulses = lambda channels: (700,)  # type: ignore[method-assign]
+    bench.driver.line.read_pulses = lambda channels: (700,)  # type: ignore[method-assign]
     with pytest.raises(ServoMissing, match="channel 2 is an input, left_upper_lid"):
         bench.walk()
 

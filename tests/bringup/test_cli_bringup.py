@@ -25,7 +25,7 @@ from gazerig.config.save import copy_shipped, save_rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.drivers.serial.port import BlockingPort, port_of
+from gazerig.drivers.serial.port import BlockingPort, port_at_path
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.features.bringup.cli import ports
 from gazerig.features.bringup.cli.manual_session import holding_text, unreleased_text
@@ -685,7 +685,7 @@ def test_setup_of_a_pca9685_with_yes_measures_nothing(on_pca9685):
 
 def test_reboot_of_a_maestro_says_what_there_is_instead():
     with served("maker") as (port, _, command):
-        line = port_of(port)
+        line = port_at_path(port)
         line.setBaudRate(115_200)
         line.write(bytes.fromhex("84 00 70 2E 2B"))
         line.closePort()

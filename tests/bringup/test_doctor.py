@@ -21,7 +21,7 @@ from gazerig.drivers.pca9685.registers import (
     PRESCALE,
     SLEEP,
     prescale_of,
-    pulse,
+    pulse_registers,
 )
 from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
@@ -784,7 +784,7 @@ class Pca9685Rig:
             (MODE1, bytes((SLEEP,))),
             (PRESCALE, bytes((prescale,))),
             (MODE1, bytes((AWAKE,))),
-            (LED0 + 4 * channel, pulse(counts)),
+            (LED0 + 4 * channel, pulse_registers(counts)),
         ):
             self.port.write(bridge.write(0x40, register, data))
             self.now_s += 0.01

@@ -21,7 +21,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 YAW = ServoConfig(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
 
-RATES = DYNAMIXEL.family.usual_rates
+RATES = DYNAMIXEL.family.scan_rates
 
 
 class Bench:
@@ -260,8 +260,8 @@ def test_a_standing_in_words(standing, text):
 
 
 def test_kinds_write_firmware_as_their_makers_do():
-    assert [FEETECH.family.version(number) for number in (353, 310)] == ["3.53", "3.10"]
-    assert DYNAMIXEL.family.version(53) == "53"
+    assert [FEETECH.family.format_firmware(number) for number in (353, 310)] == ["3.53", "3.10"]
+    assert DYNAMIXEL.family.format_firmware(53) == "53"
 
 
 def test_any_reply_is_a_matter_of_answers_not_of_echoes():

@@ -191,8 +191,8 @@ class SingleJoint:
             self._guardian.join(0)
             self._guardian.arm(0)
         self._torque_off()
-        if self._family.lock is not None:
-            put(self._family.lock, 1)
+        if self._family.lock_register is not None:
+            put(self._family.lock_register, 1)
         wanted = {
             **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
             **driving.gentle(value, params.strength, 2.0 * params.speed_deg_s * STEPS_PER_DEG),

@@ -9,7 +9,7 @@ import typer
 
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.config.schema import load_rig
-from gazerig.drivers.serial.port import BusPort, port_of
+from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoConfig
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_files import detector_status
@@ -71,7 +71,7 @@ def doctor(
         refuse_packages(model, "doctor")
         tell: Tell = (lambda _: None) if as_json else _print_line
         with rig_ports(model, mock, port) as wired:
-            lines = {name: port_of(path) for name, path in wired.paths.items()}
+            lines = {name: port_at_path(path) for name, path in wired.paths.items()}
             findings = _examine_buses(model, lines, tell)
             if fix:
                 _apply_fixes(model, lines, findings, tell)

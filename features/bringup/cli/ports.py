@@ -12,7 +12,7 @@ from gazerig.config.rig import Rig
 from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
 from gazerig.drivers.serial.list_ports import Host, SerialPort, check_owner, serial_ports, usb_id_of
-from gazerig.drivers.serial.port import BusPort, port_of
+from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, bus_ports, joints_on, servo_configs
 from gazerig.robot.app.run_bus import emulated_lines
@@ -44,7 +44,7 @@ def unopened_port(path: str, on_traffic: Callable[[], None] | None = None) -> It
 
     on_traffic: called whenever bytes are sent or waited for
     """
-    line = port_of(path, on_traffic=on_traffic)
+    line = port_at_path(path, on_traffic=on_traffic)
     try:
         yield line
     finally:

@@ -19,7 +19,7 @@ from gazerig.drivers.hobby_board.params import US_STEPS
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.serial.list_ports import POLOLU, SerialPort, is_i2c
-from gazerig.drivers.serial.port import BusPort, port_of
+from gazerig.drivers.serial.port import BusPort, port_at_path
 from gazerig.features.bringup.bus_search import (
     RATES,
     SearchRound,
@@ -188,7 +188,7 @@ def _one(
         )
     if not asked:
         raise SetupError(f"--bauds: none of them is a rate of {' or '.join(kinds)}")
-    line = port_of(path)
+    line = port_at_path(path)
     try:
         rounds = _search(line, usb, asked, thorough, named == "all")
         if not thorough and not any(one.has_answer for one in rounds):
@@ -242,21 +242,21 @@ def _show(
         table = Table("id", "model", "firmware", "baud", "kind")
         for kind, servo in found:
             made = kind_of(servo.model) if servo.model in FAMILY_OF else KINDS[kind]
-            version = made.family.version(servo.firmware)
+            version = made.family.format_firmware(servo.firmware)
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
     for one, board in boards:
         size = f"{one.channels} channels"
         if one.channels is None:
             size = "6 channels or more (asking for one too many would send all of them home)"
-        crc = "on" if board.crc else "off"
+        crc = "on" if board.expects_crc else "off"
         given = [f"{n}: {pulse / US_STEPS:g} us" for n, pulse in enumerate(board.pulses) if pulse]
         script: dict[bool | None, str] = {True: "its own script runs", False: "no script runs"}
         for line in (
             f"Pololu Maestro: {size}, {' and '.join(board.forms)} form, CRC {crc}",
             f"pulses: {', '.join(given) or 'none'} (channels 0..{len(board.pulses) - 1})",
             f"errors it held, cleared by asking: {', '.join(board.errors) or 'none'}",
-            script.get(board.script, "its script: no answer"),
+            script.get(board.is_script_running, "its script: no answer"),
         ):
             out.print(f"{where}: {line}", markup=False)
     for line in remarks(rounds, where, requested):

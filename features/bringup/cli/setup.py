@@ -122,7 +122,7 @@ def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes:
     """Give the connected servo its id and baud rate; return False if the user skips it."""
     found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
     clear_progress()
-    firmware = kind.family.version(found.firmware)
+    firmware = kind.family.format_firmware(found.firmware)
     say(f"   found: {found.model}, firmware {firmware}, id {found.id} at {found.baud} bit/s")
     servo_setup.refuse_model(found, kind, wanted, line.port_name)
     question = f"   give it id {wanted.id} and {baud} bit/s?"

@@ -365,7 +365,7 @@ def oscillator_hz(clock: PulseClock, typed: str) -> float:
     if unit == "hz":
         hz = value * COUNTS * periods
     else:
-        counts = round(PULSE_STEPS / clock.grain_steps)
+        counts = round(PULSE_STEPS / clock.resolution_steps)
         hz = counts * periods * 1e6 / value if value else 0.0
     if not LOW_HZ <= hz <= HIGH_HZ:
         usual = clock.oscillator_hz / COUNTS / periods

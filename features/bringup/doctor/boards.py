@@ -198,7 +198,7 @@ def visit_maestro(
     channels = size or params.channels
     line = MaestroLink(port, _board_params(params, found))
     pulses = _read_pulses(line, setups, channels, found, size is not None)
-    crc = "on" if found.crc else "off"
+    crc = "on" if found.expects_crc else "off"
     named = f"{channels} channels{'' if size else ' assumed'}"
     well = f"answers in the {' and the '.join(found.forms)} form, CRC {crc}, {named}, no script"
     own = []
@@ -206,8 +206,8 @@ def visit_maestro(
         pololu = params.protocol == "pololu"
         number = f"its device number is not {params.device}; " if pololu else ""
         own.append(ADVICE["form"].at(WHERE, form=found.forms[0], params=params, number=number))
-    if found.crc != params.crc:
-        own.append(ADVICE["CRC" if found.crc else "no CRC"].at(WHERE))
+    if found.expects_crc != params.crc:
+        own.append(ADVICE["CRC" if found.expects_crc else "no CRC"].at(WHERE))
     if size is not None and size != params.channels:
         own.append(ADVICE["size"].at(WHERE, size=size, params=params))
     for error in found.errors:
@@ -215,7 +215,7 @@ def visit_maestro(
         advice = ADVICE["timeout" if error == TIMEOUT else "error"]
         cure = CURES.get(error, "look it up in Pololu's guide")
         own.append(advice.at(WHERE, error=error, cure=cure))
-    if found.script:
+    if found.is_script_running:
         own.append(ADVICE["script"].at(WHERE, Fix(BOARD, SCRIPT, 0, 1)))
     findings = examine(MAESTRO, setups, pulses, channels, own, well)
     wide = [
@@ -251,18 +251,18 @@ def _read_pulses(
         if sure <= channel < channels:
             continue
         silent = None in pulses.values()
-        heard = None if silent or channel >= channels else line.pulses((channel,))
+        heard = None if silent or channel >= channels else line.read_pulses((channel,))
         pulses[channel] = None if heard is None else heard[0]
     if None in pulses.values():
         # The unknown channel is an error in its register now, and no fault.
-        line.greet()
+        line.wait_for_answer()
     return pulses
 
 
 def _board_params(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
     """Return the protocol of a board that was found; the rig file may differ."""
     form = params.protocol if params.protocol in found.forms else found.forms[0]
-    return replace(params, protocol=form, crc=found.crc)
+    return replace(params, protocol=form, crc=found.expects_crc)
 
 
 def stop_script(port: BusPort, params: MaestroParams) -> str:
@@ -276,8 +276,8 @@ def stop_script(port: BusPort, params: MaestroParams) -> str:
     if found is None:
         raise PortError(f"{port.port_name}: no Maestro answers: gazerig doctor names the cure")
     line = MaestroLink(port, _board_params(params, found))
-    line.send(line.speech.stop_script())
-    return "" if line.ask(line.speech.script_status(), 1) == b"\1" else "it runs on"
+    line.send(line.codec.stop_script())
+    return "" if line.ask(line.codec.script_status(), 1) == b"\1" else "it runs on"
 
 
 # --- PCA9685
@@ -298,7 +298,7 @@ def visit_pca9685(
     findings, fitting = [], []
     for setup in setups:
         try:
-            params.check(setup)
+            params.check_servo(setup)
             fitting.append(setup)
         except ValueError as error:
             what = str(error).removeprefix(f"channel {setup.id}: ")

@@ -165,7 +165,7 @@ def find_servos(
     known = {setup.id for setup in setups}
     strangers = tuple(found for i, found in sorted(there.items()) if i not in known)
     elsewhere: list[FoundServo] = []
-    for other in kind.family.usual_rates if missing else ():
+    for other in kind.family.scan_rates if missing else ():
         if other != baud:
             tell(f"a servo is missing: asking at {other} bit/s")
             if port.setBaudRate(other) and has_any_reply(port, kind.family):
@@ -291,10 +291,10 @@ def examine_port(facts: PortFacts) -> list[Diagnostic]:
     trouble = ""
     if not access.exists:
         trouble = "absent"
-    elif not access.serial:
+    elif not access.is_device:
         trouble = "no port"
     elif not access.allowed:
-        trouble = "joined" if access.joined else "group"
+        trouble = "joined" if access.is_member else "group"
     elif facts.holders:
         trouble = "held"
     if trouble:

@@ -173,7 +173,7 @@ def examine(state: ServoState) -> list[Diagnostic]:
             rules: tuple[Rule, ...] = (_unread,) if silent else (_unread, *RULES)
             findings = [finding for rule in rules for finding in rule(state)]
     if not any(finding.level in ("warn", "error") for finding in findings):
-        firmware = family.version(state.found.firmware)
+        firmware = family.format_firmware(state.found.firmware)
         volts = (values["present_input_voltage"] or 0) / 10.0
         findings.insert(0, state.finding(ADVICE["well"], firmware=firmware, volts=volts))
     return findings

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
-from gazerig.drivers.process.passed_image import PassedImage, receive, taken
+from gazerig.drivers.process.passed_image import PassedImage, receive, take_image
 from gazerig.drivers.types import (
     BusHealth,
     DetectedFace,
@@ -333,7 +333,7 @@ class LiveFeed:
         )
         if head.shape is not None and (fd >= 0 or pixels is not None):
             if pixels is None:
-                array = taken(PassedImage(fd, tuple(head.shape), head.dtype))
+                array = take_image(PassedImage(fd, tuple(head.shape), head.dtype))
             else:
                 array = np.frombuffer(pixels, np.dtype(head.dtype)).reshape(head.shape)
             found = replace(found, depth_m=array) if head.depth else replace(found, image=array)

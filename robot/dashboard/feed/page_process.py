@@ -178,7 +178,7 @@ class PageProcess:
         try:
             self._process = child_process.start(
                 "gazerig.robot.dashboard.page_main",
-                *links.words,
+                *links.arguments,
                 *(str(os.getpid()), self._host, str(self._port)),
                 stderr=self._errors.fileno(),
                 pass_fds=links.fds,
@@ -191,9 +191,9 @@ class PageProcess:
                 },
             )
         finally:
-            for theirs in links.theirs:
+            for theirs in links.child_sockets:
                 theirs.close()
-        ours, stops = links.ours
+        ours, stops = links.parent_ends
         self._began_s = self._clock.now_s()
         self.join(ours, stops)
 

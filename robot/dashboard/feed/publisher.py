@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from math import inf
 
-from gazerig.drivers.process.passed_image import CAN_PASS, copied
+from gazerig.drivers.process.passed_image import CAN_PASS, copy_image
 from gazerig.drivers.types import Detections
 from gazerig.robot.control.command_handler import ParamAccess, plain
 from gazerig.robot.control.observers import failure_text
@@ -245,7 +245,7 @@ class Publisher:
         if not CAN_PASS:
             self._page.show_detections(frame_with_pixels(found, array, depth, self.depth))
             return
-        image = copied(array)
+        image = copy_image(array)
         try:
             self._page.show_detections(frame_message(found, image, depth, self.depth), image.fd)
         finally:

@@ -12,7 +12,7 @@ from gazerig.config.rig import Rig
 from gazerig.config.save import propose, rig_file
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
-from gazerig.drivers.serial.port import port_of
+from gazerig.drivers.serial.port import port_at_path
 from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
 from gazerig.features.bringup.calibration.hobby_access import HobbyServoHandle
 from gazerig.features.bringup.calibration.joint_calibration import (
@@ -217,7 +217,7 @@ _VOID = "until this calibration is written the rig file's zero is wrong by that"
 def _calibrate_hobby_servo(bench: CalibrationJob, name: str, bus: str) -> JointResult:
     config = bench.rig.bus_named(bus)
     guardian = _guardian(bench, name, bus)
-    port = port_of(bench.wire.paths[bus], on_traffic=guardian.beat)
+    port = port_at_path(bench.wire.paths[bus], on_traffic=guardian.beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
     params = config.maestro if config.kind == "maestro" else config.pca9685
     hobby = HobbyServoHandle(
