@@ -66,7 +66,7 @@ class AllowedFolder:
             gazerig.config.load.ConfigError: with every file that may not.
         """
         faults: list[ConfigFault] = []
-        for key, value in _leaves("", changes):
+        for key, value in _assigned_values("", changes):
             files = (value,) if isinstance(value, str) else value
             kind = "" if _MESH_FILE.fullmatch(key) else _KIND_OF_KEY.get(key)
             if kind is None or not isinstance(files, list | tuple):
@@ -81,10 +81,10 @@ class AllowedFolder:
             raise ConfigError(faults)
 
 
-def _leaves(above: str, value: object) -> Iterator[tuple[str, object]]:
+def _assigned_values(above: str, value: object) -> Iterator[tuple[str, object]]:
     """Return each value with its whole dotted key, whether it came dotted or as mappings."""
     if not isinstance(value, Mapping):
         yield above, value
         return
     for step, inner in value.items():
-        yield from _leaves(f"{above}.{step}" if above else str(step), inner)
+        yield from _assigned_values(f"{above}.{step}" if above else str(step), inner)

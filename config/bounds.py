@@ -69,10 +69,10 @@ def validate(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]
     try:
         return typing.cast(T, _adapter(typing.cast(Any, into)).validate_python(data)), []
     except ValidationError as error:
-        return None, [one for one in error.errors(include_url=False) if not _miscounted(one)]
+        return None, [one for one in error.errors(include_url=False) if not _is_miscount(one)]
 
 
-def with_stand_ins(
+def fill_stand_ins(
     into: type[T], data: object, faulty: Container[tuple[Step, ...]], high: bool
 ) -> T:
     """Return the dataclass with stand-ins at the faulty paths, its own rules unchecked.
@@ -193,7 +193,9 @@ def _annotation(shape: Shape) -> Any:
         case Shape(form="value"):
             kind = Any
         case Shape(form="choice"):
-            kind = Annotated[Literal[shape.choices], BeforeValidator(partial(_exact, shape))]
+            kind = Annotated[
+                Literal[shape.choices], BeforeValidator(partial(_check_exact_type, shape))
+            ]
         case Shape(form="list", inner=Shape() as inner):
             length = Field(min_length=shape.length, max_length=shape.length)
             kind = Annotated[types.GenericAlias(tuple, (_annotation(inner), ...)), length]
@@ -202,11 +204,11 @@ def _annotation(shape: Shape) -> Any:
                 dict, (Annotated[str, AfterValidator(_printable)], _annotation(inner))
             )
         case Shape(params=type() as params):
-            kind = _frozen(params)
+            kind = _dataclass_type(params)
     return kind | None if shape.optional else kind
 
 
-def _frozen(params: type) -> Any:
+def _dataclass_type(params: type) -> Any:
     """Return a dataclass as a pydantic type whose value is the dataclass itself."""
     return Annotated[model_of(params), WrapValidator(partial(_build, params))]
 
@@ -229,7 +231,7 @@ def _printable(text: str) -> str:
     return text
 
 
-def _exact(shape: Shape, value: object) -> object:
+def _check_exact_type(shape: Shape, value: object) -> object:
     """Refuse 57600.0 for 57600, which Literal takes for equal."""
     if isinstance(value, float) and not any(isinstance(c, float) for c in shape.choices):
         raise PydanticCustomError("literal_error", "not a whole number")
@@ -247,10 +249,10 @@ def _build(params: type, value: object, validate: Callable[[object], BaseModel])
 @cache
 def _adapter(params: type) -> TypeAdapter[Any]:
     """Return the validator of a whole file."""
-    return TypeAdapter(_frozen(params))
+    return TypeAdapter(_dataclass_type(params))
 
 
-def _miscounted(details: ErrorDetails) -> bool:
+def _is_miscount(details: ErrorDetails) -> bool:
     """Return whether an error of length only counts the items that were right."""
     return details["type"] in ("too_short", "too_long") and (
         len(details["input"]) != details["ctx"]["actual_length"]
@@ -277,7 +279,7 @@ def _fill(
                     parts[name] = _fill(field, data.get(name), (*path, name), faulty, high)
                 elif set(data) - set(parts):  # an unknown key may have been meant for this one
                     parts[name] = _stand_in(field, high)
-            return _bare(params, parts)
+            return _without_post_init(params, parts)
         case Shape(inner=Shape() as inner):
             steps = data.items() if isinstance(data, dict) else enumerate(data)
             parts = {k: _fill(inner, item, (*path, k), faulty, high) for k, item in steps}
@@ -302,7 +304,9 @@ def _stand_in(shape: Shape, high: bool) -> Any:
             return shape.choices[-1 if high else 0]
         case Shape(params=type() as params):
             fields = shapes_of(params).items()
-            return _bare(params, {name: _stand_in(field, high) for name, field in fields})
+            return _without_post_init(
+                params, {name: _stand_in(field, high) for name, field in fields}
+            )
     return _LEFT_OUT
 
 
@@ -313,7 +317,7 @@ def _default(declared: dataclasses.Field[Any]) -> Any:
     return _LEFT_OUT if declared.default is dataclasses.MISSING else declared.default
 
 
-def _bare(params: type, parts: Mapping[str, Any]) -> Any:
+def _without_post_init(params: type, parts: Mapping[str, Any]) -> Any:
     """Return a dataclass made without its ``__post_init__``."""
     made: object = object.__new__(params)
     for name, part in parts.items():

@@ -15,7 +15,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.reader import ReaderError
 
 from gazerig.config.bounds import Step
-from gazerig.config.export import abbreviated, suggestion
+from gazerig.config.export import abbreviate, suggestion_text
 from gazerig.config.faults import ConfigFault
 from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_limited
 
@@ -35,12 +35,12 @@ class Entry:
     file: str
     line: int
 
-    def plain(self) -> Any:
+    def to_plain(self) -> Any:
         """Return the value as dicts, tuples and scalars."""
         if isinstance(self.value, dict):
-            return {key: entry.plain() for key, entry in self.value.items()}
+            return {key: entry.to_plain() for key, entry in self.value.items()}
         if isinstance(self.value, tuple):
-            return tuple(entry.plain() for entry in self.value)
+            return tuple(entry.to_plain() for entry in self.value)
         return self.value
 
     def nearest(self, path: Sequence[Step]) -> "Entry":
@@ -50,13 +50,13 @@ class Entry:
         """
         entry, at = self, 0
         while at < len(path):
-            held, steps = entry._below(path[at:])
+            held, steps = entry._find_below(path[at:])
             if held is None:
                 break
             entry, at = held, at + steps
         return entry
 
-    def _below(self, path: Sequence[Step]) -> "tuple[Entry | None, int]":
+    def _find_below(self, path: Sequence[Step]) -> "tuple[Entry | None, int]":
         """Return the entry that the first steps of a path name, and how many steps they are."""
         if isinstance(self.value, dict):
             for steps in range(1, len(path) + 1):
@@ -79,9 +79,9 @@ def read(
     file, text = str(path), ""
     try:
         text = read_limited(path, _LARGEST).decode("utf-8-sig")
-        node = composed(text)
+        node = compose_yaml(text)
     except OSError as error:
-        faults.append(ConfigFault(file, None, "", "", _unreadable(path, error)))
+        faults.append(ConfigFault(file, None, "", "", _read_error(path, error)))
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         rule = f"is not UTF-8 text (byte 0x{error.object[error.start]:02x}); save it as UTF-8"
@@ -90,7 +90,7 @@ def read(
         faults.append(ConfigFault(file, None, "", "", _TOO_DEEP))
     except (YAMLError, ValueError, ArithmeticError, LookupError) as error:
         # ruamel lets others out: characters past U+10FFFF, "%YAML 9.9"
-        faults.append(_syntax(file, text, error))
+        faults.append(_syntax_fault(file, text, error))
     else:
         if isinstance(node, MappingNode):
             keys = [key.value for key, _ in node.value[:1000] if isinstance(key, ScalarNode)]
@@ -125,7 +125,7 @@ class _BoundedComposer(Composer):
 
 
 @lru_cache(maxsize=64)
-def composed(text: str) -> Node | None:
+def compose_yaml(text: str) -> Node | None:
     """Return YAML parsed as far as nodes, which know their lines and are only read.
 
     The parser takes nearly all the time of loading, and a rig loads the same layers again
@@ -145,17 +145,17 @@ def _entries_of(file: str, text: str) -> tuple[Entry | None, tuple[ConfigFault, 
 
     Kept for the next loading of the same file: entries are only read, as nodes are.
     """
-    node, faults = composed(text), list[ConfigFault]()
+    node, faults = compose_yaml(text), list[ConfigFault]()
     assert isinstance(node, MappingNode)
-    return _Reader(file, faults).whole(node), tuple(faults)
+    return _Reader(file, faults).read_top(node), tuple(faults)
 
 
-def _unreadable(path: Path, error: OSError) -> str:
+def _read_error(path: Path, error: OSError) -> str:
     """Return why a file cannot be opened, and the remedy."""
     match error:
         case FileNotFoundError():
             beside = [p.name for p in path.parent.glob("*.yaml")] if path.parent.is_dir() else []
-            return f"no such file{suggestion(path.name, beside) or ';'} check the name"
+            return f"no such file{suggestion_text(path.name, beside) or ';'} check the name"
         case IsADirectoryError():
             return "is a directory; name a file in it"
         case PermissionError():
@@ -165,7 +165,7 @@ def _unreadable(path: Path, error: OSError) -> str:
     return f"cannot be read ({error.strerror}); check the path"
 
 
-def _syntax(file: str, text: str, error: Exception) -> ConfigFault:
+def _syntax_fault(file: str, text: str, error: Exception) -> ConfigFault:
     """Return the fault of a text that is not YAML, with its position."""
     if isinstance(error, ReaderError):
         before = text[: error.position]
@@ -174,12 +174,12 @@ def _syntax(file: str, text: str, error: Exception) -> ConfigFault:
         rule = f"not valid YAML: character {code} is not allowed; take it out"
         return ConfigFault(file, before.count("\n") + 1, "", "", rule, column)
     if not isinstance(error, MarkedYAMLError) or error.problem_mark is None:
-        words = _unquoted(" ".join(str(error).split()))
+        words = _remove_quotes(" ".join(str(error).split()))
         return ConfigFault(file, None, "", "", f"not valid YAML: {words}")
     mark = error.problem_mark
     if isinstance(error, _TooMany):
         return ConfigFault(file, mark.line + 1, "", "", _TOO_MANY)
-    words = _unquoted(", ".join(filter(None, (error.context, error.problem))))
+    words = _remove_quotes(", ".join(filter(None, (error.context, error.problem))))
     if "max_depth" in words:
         return ConfigFault(file, mark.line + 1, "", "", _TOO_DEEP, mark.column + 1)
     cure = "; indent with spaces" if "'\\t'" in words else "; check this line and the one above"
@@ -188,7 +188,7 @@ def _syntax(file: str, text: str, error: Exception) -> ConfigFault:
     )
 
 
-def _unquoted(words: str) -> str:
+def _remove_quotes(words: str) -> str:
     """Return a parser's message without what it quotes of the text."""
     kept = ("' '", "'\\t'")  # one character, or a parser's own name for what it met
     return _QUOTED.sub(
@@ -216,7 +216,7 @@ class _Reader:
         self._values = 0
         self._endless = False
 
-    def whole(self, node: MappingNode) -> Entry | None:
+    def read_top(self, node: MappingNode) -> Entry | None:
         """Return the top node as an entry, None if it is too deep, too large or no mapping."""
         root = self._entry(node, _line(node), ())
         return root if isinstance(root.value, dict) and not self._endless else None
@@ -249,7 +249,7 @@ class _Reader:
                 if str(key.tag) == f"{_TAG}merge":
                     bad_key = "merge keys (<<) are not read; write the keys out"
                 else:
-                    name = abbreviated(key.value) if isinstance(key, ScalarNode) else "this"
+                    name = abbreviate(key.value) if isinstance(key, ScalarNode) else "this"
                     bad_key = f"key {name} is not text; put it in quotes"
                 self._note(line, path, bad_key)
             elif key.value in entries:
@@ -264,7 +264,7 @@ class _Reader:
         self._faults.append(ConfigFault(self._file, line, ".".join(map(str, path)), "", rule))
 
 
-def _whole(text: str) -> int | str:
+def _parse_integer(text: str) -> int | str:
     """Return an integer of YAML 1.2 (decimal, 0o, 0x); one of 40 digits or more stays text."""
     digits = text.replace("_", "")
     for base in (0, 10):  # 10: "007" is 7
@@ -275,7 +275,7 @@ def _whole(text: str) -> int | str:
     return text
 
 
-def _real(text: str) -> float | str:
+def _parse_float(text: str) -> float | str:
     """Return a float of YAML 1.2, .inf and .nan among them."""
     try:
         return float(text.replace("_", "").lower().replace(".inf", "inf").replace(".nan", "nan"))
@@ -286,8 +286,8 @@ def _real(text: str) -> float | str:
 _SCALARS: dict[str, Callable[[str], Scalar]] = {
     "null": lambda text: None,
     "bool": lambda text: text.lower() in ("true", "yes", "on", "y"),
-    "int": _whole,
-    "float": _real,
+    "int": _parse_integer,
+    "float": _parse_float,
     "str": str,
     "timestamp": str,  # 2026-01-31 is text in YAML 1.2
     "value": str,

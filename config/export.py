@@ -45,22 +45,22 @@ def violation(into: type, details: ErrorDetails) -> Violation:
     if path[-1:] == ("[key]",):  # of a mapping's key, not of what it holds
         return Violation(path[:-1], "", _rule(Shape("text"), details))
     if details["type"] == "extra_forbidden":
-        holder = _at(root, path[:-1])
+        holder = _nested_shape(root, path[:-1])
         names = tuple(shapes_of(holder.params)) if holder.params else ()
-        near = suggestion(str(path[-1]), names) or ";"
+        near = suggestion_text(str(path[-1]), names) or ";"
         return Violation(
             path,
-            abbreviated(details["input"]),
-            f"unknown key {abbreviated(path[-1])}{near} allowed: {', '.join(names) or 'none'}",
+            abbreviate(details["input"]),
+            f"unknown key {abbreviate(path[-1])}{near} allowed: {', '.join(names) or 'none'}",
         )
-    shape = _at(root, path)
+    shape = _nested_shape(root, path)
     if details["type"] == "missing":
         described = f" ({shape.description})" if shape.description else ""
-        return Violation(path, "", f"missing; wanted {expected(shape)}{described}")
-    return Violation(path, abbreviated(details["input"]), _rule(shape, details))
+        return Violation(path, "", f"missing; wanted {expected_text(shape)}{described}")
+    return Violation(path, abbreviate(details["input"]), _rule(shape, details))
 
 
-def expected(shape: Shape) -> str:
+def expected_text(shape: Shape) -> str:
     """Return the allowed values of a position, as text."""
     match shape:
         case Shape(form="number"):
@@ -75,9 +75,9 @@ def expected(shape: Shape) -> str:
             text = f"one of {', '.join(map(repr, shape.choices))}"
         case Shape(form="list", inner=Shape() as inner):
             count = f" of {shape.length}" if shape.length is not None else ""
-            text = f"a list{count}, each {expected(inner)}"
+            text = f"a list{count}, each {expected_text(inner)}"
         case Shape(form="mapping", inner=Shape() as inner):
-            text = f"a mapping, each key with {expected(inner)}"
+            text = f"a mapping, each key with {expected_text(inner)}"
         case Shape(params=type() as params):
             text = f"a mapping with the keys {', '.join(shapes_of(params))}"
         case _:
@@ -85,13 +85,13 @@ def expected(shape: Shape) -> str:
     return f"{text} or null" if shape.optional else text
 
 
-def suggestion(word: str, words: Iterable[str]) -> str:
+def suggestion_text(word: str, words: Iterable[str]) -> str:
     """Return "; did you mean 'x'?" if a known word is similar, else ""."""
     near = difflib.get_close_matches(word, list(words), n=1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
-def abbreviated(value: object) -> str:
+def abbreviate(value: object) -> str:
     """Return a value for a message, cut if it is long."""
     writer = reprlib.Repr()
     writer.maxlevel, writer.maxstring, writer.maxother = 2, 60, 60
@@ -109,30 +109,30 @@ def _rule(shape: Shape, details: ErrorDetails) -> str:
     value, unit = details["input"], f" (unit {shape.unit})" if shape.unit else ""
     match details["type"]:
         case "greater_than_equal" if shape.low is not None:
-            return f"{abbreviated(value)} is below {_number(shape.low)}{unit}"
+            return f"{abbreviate(value)} is below {_number(shape.low)}{unit}"
         case "less_than_equal" if shape.high is not None:
-            return f"{abbreviated(value)} is above {_number(shape.high)}{unit}"
+            return f"{abbreviate(value)} is above {_number(shape.high)}{unit}"
         case "finite_number":
-            return f"{abbreviated(value)} is not a finite number"
+            return f"{abbreviate(value)} is not a finite number"
         case "too_short" | "too_long":
             return f"has length {len(value)}, wanted {shape.length}"
         case "value_error":
             return " ".join(str(details["ctx"]["error"]).split())
         case "literal_error" if isinstance(value, str):
-            return f"{abbreviated(value)} is not {expected(shape)}{suggestion(value, map(str, shape.choices))}"
+            return f"{abbreviate(value)} is not {expected_text(shape)}{suggestion_text(value, map(str, shape.choices))}"
     if value is None:
         named = "is empty"
     elif isinstance(value, dict | tuple):
         named = f"is {_TYPE_WORDS[type(value)]}"
     else:
-        named = f"{abbreviated(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
+        named = f"{abbreviate(value)} is {_TYPE_WORDS.get(type(value), type(value).__name__)}"
     hint = ""  # the correction if it is obvious
     if shape.form == "text" and isinstance(value, bool | int | float):
         hint = "; put it in quotes"
     elif shape.form in ("number", "whole") and isinstance(value, str):
         bare = value.replace(".", "", 1).removeprefix("-").isdecimal()
         hint = "; take the quotes away" if bare else ""
-    return f"{named}, wanted {expected(shape)}{hint}"
+    return f"{named}, wanted {expected_text(shape)}{hint}"
 
 
 def _range(shape: Shape) -> str:
@@ -143,7 +143,7 @@ def _range(shape: Shape) -> str:
     return f" in{unit}" if unit else ""
 
 
-def _at(shape: Shape, path: tuple[Step, ...]) -> Shape:
+def _nested_shape(shape: Shape, path: tuple[Step, ...]) -> Shape:
     """Return the shape at a path through nested shapes."""
     for step in path:
         if shape.params is not None:

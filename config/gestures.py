@@ -9,10 +9,10 @@ from typing import Annotated
 from gazerig.config.load import (
     ConfigError,
     ConfigFault,
-    from_packages,
     load,
-    shipped,
+    package_file_path,
     shipped_names,
+    shipped_path,
 )
 from gazerig.gaze.gesture.gesture import Gesture, faults_of, loop_fault
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
@@ -40,7 +40,9 @@ def shipped_gestures() -> Mapping[str, Gesture]:
 
 @cache
 def _shipped() -> Mapping[str, Gesture]:
-    return {name: load_gesture(shipped("gestures", name)) for name in shipped_names("gestures")}
+    return {
+        name: load_gesture(shipped_path("gestures", name)) for name in shipped_names("gestures")
+    }
 
 
 def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
@@ -79,7 +81,7 @@ def gesture_path(file: str) -> Path:
     """
     if "/" in file or file.endswith((".yaml", ".yml")):
         return Path(file).expanduser()
-    return from_packages("gestures", file)
+    return package_file_path("gestures", file)
 
 
 def gesture_name(file: str) -> str:

@@ -11,13 +11,13 @@ from dataclasses import MISSING, asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from gazerig.config.bounds import Shape, Step, shapes_of, validate, with_stand_ins
+from gazerig.config.bounds import Shape, Step, fill_stand_ins, shapes_of, validate
 from gazerig.config.entries import Entry as Entry
 from gazerig.config.entries import read
-from gazerig.config.export import Violation, abbreviated, suggestion, violation
+from gazerig.config.export import Violation, abbreviate, suggestion_text, violation
 from gazerig.config.faults import ConfigError as ConfigError
 from gazerig.config.faults import ConfigFault as ConfigFault
-from gazerig.config.plugin_sections import extended
+from gazerig.config.plugin_sections import extend_type
 from gazerig.config.shipped import SHIPPED
 from gazerig.config.shipped import shipped_names as shipped_names
 from gazerig.drivers.errors import PluginError
@@ -49,7 +49,7 @@ class Document:
     @property
     def data(self) -> dict[str, Any]:
         """Return the values as dicts, tuples and scalars."""
-        return dict(self.root.plain())
+        return dict(self.root.to_plain())
 
     def line(self, key: str) -> int:
         """Return the line of a dotted key path, or of the nearest mapping above it."""
@@ -75,12 +75,12 @@ def load(
     faults: list[ConfigFault] = []
     known = tuple(shapes_of(cast(Any, into)))
     layers = [read(file, faults, known)[1] for file in files]
-    whole = [_from_its_folder(layer) for layer in layers if layer is not None]
+    whole = [_resolve_paths(layer) for layer in layers if layer is not None]
     if len(whole) < len(files):  # the content of a missing layer is unknown
         raise ConfigError(faults)
     root = whole[0]
     for layer in whole[1:]:
-        root = _merged(root, layer, cast(Any, into))
+        root = _merge(root, layer, cast(Any, into))
     outcome = validate_entries(into, root, checks)
     value, found = outcome
     faults += found
@@ -97,19 +97,19 @@ def validate_entries(
 
     Findings of checks are faults too, so a value may come with some.
     """
-    into, problems = extended(into, root.plain())
+    into, problems = extend_type(into, root.to_plain())
     if problems:
-        return None, [_placed(root, _contradiction(root, *one)) for one in problems]
-    value, errors = validate(into, root.plain())
+        return None, [_to_fault(root, _contradiction(root, *one)) for one in problems]
+    value, errors = validate(into, root.to_plain())
     complaints = [violation(into, error) for error in errors]
     if value is not None:
         complaints += [_contradiction(root, *found) for c in checks for found in c(value)]
     else:
         wrong = {error["loc"] for error in errors if error["type"] != "value_error"}
         complaints += [
-            _contradiction(root, *found) for found in _certain(root, into, wrong, checks)
+            _contradiction(root, *found) for found in _certain_findings(root, into, wrong, checks)
         ]
-    return value, [_placed(root, one) for one in complaints]
+    return value, [_to_fault(root, one) for one in complaints]
 
 
 def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
@@ -127,7 +127,7 @@ def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
     return Document(path, text, root)
 
 
-def shipped(kind: str, name: str, home: Path | None = None) -> Path:
+def shipped_path(kind: str, name: str, home: Path | None = None) -> Path:
     """Return the path of a file that comes with the package, e.g. ``shipped("rigs", "desk")``.
 
     Args:
@@ -142,11 +142,11 @@ def shipped(kind: str, name: str, home: Path | None = None) -> Path:
     if name in names:
         return (home or SHIPPED) / kind / f"{name}.yaml"
     if kind in _GROUPS:
-        return from_packages(kind, name)
+        return package_file_path(kind, name)
     raise _unknown(kind, name, names)
 
 
-def from_packages(kind: str, name: str) -> Path:
+def package_file_path(kind: str, name: str) -> Path:
     """Return the path of a file that another package brings, of rigs or gestures.
 
     Raises:
@@ -165,7 +165,7 @@ def from_packages(kind: str, name: str) -> Path:
 
 def _unknown(kind: str, name: str, names: Sequence[str]) -> ConfigError:
     known = f"there are {', '.join(names)}" if names else "there are none of this kind"
-    rule = f"nothing named {name!r} is shipped{suggestion(name, names) or ';'} {known}"
+    rule = f"nothing named {name!r} is shipped{suggestion_text(name, names) or ';'} {known}"
     return ConfigError([ConfigFault(f"config/{kind}", None, "", repr(name), rule)])
 
 
@@ -174,7 +174,7 @@ def _steps(key: str) -> tuple[str, ...]:
     return tuple(key.split(".")) if key else ()
 
 
-def _from_its_folder(layer: Entry) -> Entry:
+def _resolve_paths(layer: Entry) -> Entry:
     """Return a file's entries with paths of neighbouring files relative to the working folder."""
     if not isinstance(layer.value, dict):
         return layer
@@ -188,12 +188,12 @@ def _from_its_folder(layer: Entry) -> Entry:
         found[_FILES_BESIDE] = replace(gestures, value=paths)
     meshes = found.get(_MESHES)
     if meshes is not None and isinstance(meshes.value, dict):
-        beside = {name: _beside(one, folder) for name, one in meshes.value.items()}
+        beside = {name: _relative_mesh(one, folder) for name, one in meshes.value.items()}
         found[_MESHES] = replace(meshes, value=beside)
     return replace(layer, value=found)
 
 
-def _beside(mesh: Entry, folder: Path) -> Entry:
+def _relative_mesh(mesh: Entry, folder: Path) -> Entry:
     """Return the entry of a mesh with its file as seen from the working folder."""
     file = mesh.value.get("file") if isinstance(mesh.value, dict) else None
     if file is None or not isinstance(file.value, str) or file.value.startswith("~"):
@@ -210,7 +210,7 @@ def _is_relative(value: object) -> bool:
     return path and not str(value).startswith("~")
 
 
-def _merged(low: Entry, high: Entry, into: type | None = None) -> Entry:
+def _merge(low: Entry, high: Entry, into: type | None = None) -> Entry:
     """Return one entry laid over another; a mapping keeps the line of the lowest file.
 
     into: the dataclass that they make; its default mapping is below ``high`` where
@@ -222,14 +222,16 @@ def _merged(low: Entry, high: Entry, into: type | None = None) -> Entry:
     shapes = shapes_of(into) if into is not None else {}
     for key, entry in high.value.items():
         shape = shapes.get(key)
-        below = low.value.get(key) or _by_default(into, key, shape, entry)
+        below = low.value.get(key) or _default_mapping(into, key, shape, entry)
         over[key] = entry
         if below is not None:
-            over[key] = _merged(below, entry, shape.params if shape is not None else None)
+            over[key] = _merge(below, entry, shape.params if shape is not None else None)
     return Entry(over, low.file, low.line)
 
 
-def _by_default(into: type | None, key: str, shape: Shape | None, above: Entry) -> Entry | None:
+def _default_mapping(
+    into: type | None, key: str, shape: Shape | None, above: Entry
+) -> Entry | None:
     """Return what a dataclass has at a key by default if that is a mapping, else None."""
     if into is None or shape is None:
         return None
@@ -252,7 +254,7 @@ def entries_at(value: Any, at: Entry) -> Entry:
     return Entry(value, at.file, at.line)
 
 
-def _placed(root: Entry, violation: Violation) -> ConfigFault:
+def _to_fault(root: Entry, violation: Violation) -> ConfigFault:
     """Return a complaint its file and line."""
     entry = root.nearest(violation.path)
     key = ".".join(map(str, violation.path))
@@ -263,24 +265,24 @@ def _contradiction(root: Entry, key: str, rule: str) -> Violation:
     """Return what a check found as a violation."""
     stands = root.nearest(_steps(key)).value
     return Violation(
-        _steps(key), "" if isinstance(stands, dict | tuple) else abbreviated(stands), rule
+        _steps(key), "" if isinstance(stands, dict | tuple) else abbreviate(stands), rule
     )
 
 
-def _certain(
+def _certain_findings(
     root: Entry, into: type[T], wrong: set[tuple[Step, ...]], checks: Sequence[Check[T]]
 ) -> list[tuple[str, str]]:
     """Return what the checks find whichever right values take the place of the wrong ones."""
-    low, high = (with_stand_ins(into, root.plain(), wrong, end) for end in (False, True))
+    low, high = (fill_stand_ins(into, root.to_plain(), wrong, end) for end in (False, True))
     found: list[tuple[str, str]] = []
     for check in checks:
-        also = set(_as_far_as_possible(check, high))
-        found += [one for one in _as_far_as_possible(check, low) if one in also]
+        also = set(_findings_until_failure(check, high))
+        found += [one for one in _findings_until_failure(check, low) if one in also]
     named = [tuple(map(str, path)) for path in wrong]
     return [one for one in found if not any(_steps(one[0])[: len(p)] == p for p in named)]
 
 
-def _as_far_as_possible(check: Check[T], value: T) -> Iterator[tuple[str, str]]:
+def _findings_until_failure(check: Check[T], value: T) -> Iterator[tuple[str, str]]:
     """Return the findings of a check until a stand-in makes it fail."""
     with contextlib.suppress(ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         yield from check(value)

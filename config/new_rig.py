@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from gazerig.config.save_text import written
+from gazerig.config.save_text import format_value
 
 BOARDS: Mapping[str, str] = {
     "dynamixel": "Dynamixel servos on a U2D2, an OpenRB-150 or another adaptor",
@@ -74,7 +74,7 @@ class _Servo(NamedTuple):
     model: str
     speed_deg_s: int
     accel_deg_s2: int
-    more: str = ""
+    further_settings: str = ""
 
 
 class _Board(NamedTuple):
@@ -87,7 +87,7 @@ class _Board(NamedTuple):
     port: str
     bus: str
     first_id: int
-    id_is: str
+    id_comment: str
     eye: _Servo
     lid: _Servo
     neck: _Servo
@@ -141,7 +141,7 @@ _MIRRORED = ("right_eye_tilt", *_UPPER[1:], *_LOWER[1:])
 """Joints whose servo sits mirrored to its fellow on the left."""
 
 
-def params_text(new: NewRig) -> str:
+def rig_text(new: NewRig) -> str:
     """Return the YAML of a rig.
 
     Raises:
@@ -165,9 +165,9 @@ def joints_of(text: str) -> tuple[str, ...]:
 def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
     there = "no board yet: only with --mock" if new.board == "none" else "`gazerig scan` shows it"
     yield f"# A head of {len(new.joints)} servos. All keys, with units and ranges: docs/parameters.md."
-    yield f"name: {written(new.name)}"
+    yield f"name: {format_value(new.name)}"
     yield "profile: robot"
-    yield f"bus: {{{board.bus}, port: {written(new.port or board.port)}}}  # port: {there}"
+    yield f"bus: {{{board.bus}, port: {format_value(new.port or board.port)}}}  # port: {there}"
     yield "# Measure in mm: the eyes' centres ahead of and above the neck's pitch axis (or the table)."
     height, ahead, above = (70, 38, 55) if new.has_neck else (0, 0, 90)
     yield "geometry:"
@@ -175,11 +175,11 @@ def _lines(new: NewRig, board: _Board, camera: str) -> Iterator[str]:
         f"  {{pitch_axis_height_mm: {height}, eyes_ahead_mm: {ahead}, eyes_above_mm: {above}, "
         f"interocular_mm: {new.eyes_mm:g}}}"
     )
-    yield f"joints:  # id: {board.id_is}; `gazerig calibrate` measures zero, sign and range of each"
+    yield f"joints:  # id: {board.id_comment}; `gazerig calibrate` measures zero, sign and range of each"
     for number, name in enumerate(new.joints):
         yield f"  {name}: {{id: {board.first_id + number}, {_joint(name, board)}}}"
     yield from _lids_and_park(new.joints)
-    yield from _seeing(new, camera)
+    yield from _camera_lines(new, camera)
     gaze = list(board.gaze)
     if "neck_yaw" not in new.joints:
         gaze.append(_NECKLESS_GAZE)
@@ -195,12 +195,12 @@ def _lids_and_park(joints: tuple[str, ...]) -> Iterator[str]:
         yield "lid_joints:  # deg, each lid shut and fully open"
         ends = []
         for name in lids:
-            shut, wide = _ends_deg(name)
+            shut, wide = _lid_ends_deg(name)
             key = name.removesuffix("_lid").removesuffix("_upper")
             ends.append(f"{key}_shut_deg: {shut}, {key}_open_deg: {wide}")
         rows = [", ".join(ends[i : i + 2]) for i in range(0, len(ends), 2)]
         yield "  {" + ",\n   ".join(rows) + "}"
-    park = [f"{name}: {_ends_deg(name)[0]}" for name in lids]
+    park = [f"{name}: {_lid_ends_deg(name)[0]}" for name in lids]
     if "neck_pitch" in joints:
         park = ["neck_pitch: -12", *park]
     if park:
@@ -218,7 +218,7 @@ def _joint(name: str, board: _Board) -> str:
     parts = [
         f"model: {servo.model}", f"min_deg: {low}", f"max_deg: {high}",
         f"max_speed_deg_s: {servo.speed_deg_s}", f"max_accel_deg_s2: {servo.accel_deg_s2}",
-        *(["sign: -1"] if name in _MIRRORED else []), servo.more,
+        *(["sign: -1"] if name in _MIRRORED else []), servo.further_settings,
     ]  # fmt: skip
     return ", ".join(part for part in parts if part)
 
@@ -233,11 +233,11 @@ def _range_deg(name: str, board: _Board) -> tuple[int, int]:
     return -half, half
 
 
-def _ends_deg(lid: str) -> tuple[int, int]:
+def _lid_ends_deg(lid: str) -> tuple[int, int]:
     return _UPPER_ENDS if lid in _UPPER else _LOWER_ENDS
 
 
-def _seeing(new: NewRig, camera: str) -> Iterator[str]:
+def _camera_lines(new: NewRig, camera: str) -> Iterator[str]:
     """Return the place of the camera: on the head if a neck turns it, else next to it."""
     if CAMERAS[camera] == CAMERAS["none"]:
         return

@@ -14,9 +14,9 @@ from functools import lru_cache
 from typing import Any
 
 from gazerig.config.bounds import Shape, shape_at, shapes_of, validate
-from gazerig.config.export import abbreviated, suggestion
+from gazerig.config.export import abbreviate, suggestion_text
 from gazerig.config.load import ConfigError, ConfigFault, Entry, entries_at, validate_entries
-from gazerig.config.plugin_sections import extended
+from gazerig.config.plugin_sections import extend_type
 from gazerig.config.rig import GazeConfig, Rig
 from gazerig.config.schema import RULES
 from gazerig.gaze.types import PARTS
@@ -65,7 +65,9 @@ def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
     """Return the parameters of a rig in the order of its file."""
     known = values(defaults)
     leaves = _leaves(_root(rig), rig, (), _unlisted(rig))
-    return tuple(_knob(k, s, known[k] if k in known else _at(defaults, k)) for k, s, _ in leaves)
+    return tuple(
+        _parameter(k, s, known[k] if k in known else _at(defaults, k)) for k, s, _ in leaves
+    )
 
 
 def value_of(rig: Rig, key: str) -> Value:
@@ -84,10 +86,10 @@ def value_of(rig: Rig, key: str) -> Value:
         if step in _unlisted(rig).get(over, ()) and done == len(steps) - 1:
             return _LEFT_OUT.get(over)
         names = tuple(held or ())
-        near = suggestion(step, names) or ";"
+        near = suggestion_text(step, names) or ";"
         there = f"there is {', '.join(names)}" if names else f"{over} has no keys"
         raise ConfigError(
-            [ConfigFault("", None, key, "", f"unknown key {abbreviated(step)}{near} {there}")]
+            [ConfigFault("", None, key, "", f"unknown key {abbreviate(step)}{near} {there}")]
         )
     found: Value = plain(value)
     return found
@@ -110,7 +112,7 @@ def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[st
     return {**known, **found} if same_entries else values(after)
 
 
-def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
+def apply_changes(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     """Return the rig with other values at dotted keys, every rule checked.
 
     A mapping is laid over what is there, as a file's layer is. None takes an entry out of a
@@ -120,16 +122,16 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
         gazerig.config.load.ConfigError: with every fault, as in loading a file.
     """
     # Sections in which nothing changes go through the judge as they are, already checked.
-    data = _opened(rig, [tuple(key.split(".")) for key in changes])
-    if not any([_put(_root(rig), data, key, _frozen(value)) for key, value in changes.items()]):
-        into, problems = extended(Rig, data)
+    data = _open_paths(rig, [tuple(key.split(".")) for key in changes])
+    if not any([_put(_root(rig), data, key, _freeze(value)) for key, value in changes.items()]):
+        into, problems = extend_type(Rig, data)
         made, _ = validate(into, data)
         if not problems and made is not None and not any(True for r in RULES for _ in r(made)):
             return made
     # Something is wrong with it: every fault of every rule is named.
     data, faults = plain(rig), []
     for key, value in changes.items():
-        faults += _put(_root(rig), data, key, _frozen(value))
+        faults += _put(_root(rig), data, key, _freeze(value))
     unnamed = Entry(None, "", 0)  # as if read from a file without a name
     outcome = validate_entries(Rig, entries_at(data, unnamed), RULES)
     made, found = outcome
@@ -144,17 +146,17 @@ def differences(before: Rig, after: Rig) -> dict[str, Value]:
 
     An entry that a mapping lost has the value None.
     """
-    return dict(_differing(_root(after), before, after, ()))
+    return dict(_iterate_differences(_root(after), before, after, ()))
 
 
-def flattened(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
+def flatten_changes(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
     """Return changes with mappings written out as their single keys, as a file holds them."""
     out: dict[str, Value] = {}
     for key, value in changes.items():
         shape = shape_at(_root(rig), key.split("."))
         group = shape is not None and (shape.params is not None or shape.form == "mapping")
         if group and isinstance(value, Mapping):
-            out |= flattened(rig, {f"{key}.{step}": item for step, item in value.items()})
+            out |= flatten_changes(rig, {f"{key}.{step}": item for step, item in value.items()})
         else:
             out[key] = value
     return out
@@ -181,7 +183,7 @@ def _parts(value: Any) -> dict[str, Any] | None:
     return None
 
 
-def _opened(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
+def _open_paths(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
     """Return a value with plain dicts along the paths and at their ends, the rest as it is."""
     if () in paths:
         return plain(value)
@@ -189,7 +191,7 @@ def _opened(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
     if parts is None:
         return value
     for step in {path[0] for path in paths} & parts.keys():
-        parts[step] = _opened(parts[step], [path[1:] for path in paths if path[0] == step])
+        parts[step] = _open_paths(parts[step], [path[1:] for path in paths if path[0] == step])
     return parts
 
 
@@ -222,7 +224,7 @@ def _leaves(
         yield key, shape, plain(value)
 
 
-def _knob(key: str, shape: Shape, default: Value) -> Parameter:
+def _parameter(key: str, shape: Shape, default: Value) -> Parameter:
     inner = shape.inner or shape
     while inner.inner is not None:
         inner = inner.inner
@@ -238,7 +240,7 @@ def _knob(key: str, shape: Shape, default: Value) -> Parameter:
         choices,
         "mapping" if shape.form == "params" else shape.form,
         default,
-        live(key),
+        effect_time(key),
         shape.optional or (entry in _UNLISTED and entry not in _LEFT_OUT),
         shape.length,
         shape.inner.form if shape.inner is not None else None,
@@ -246,7 +248,7 @@ def _knob(key: str, shape: Shape, default: Value) -> Parameter:
 
 
 @lru_cache(maxsize=1024)
-def live(key: str) -> str:
+def effect_time(key: str) -> str:
     """Return when a change of a key takes effect, and why no sooner."""
     for pattern, reason in _AT_START.items():
         if fnmatchcase(key, pattern):
@@ -261,7 +263,7 @@ def live(key: str) -> str:
 
 def start_note(key: str) -> str:
     """Return " (next start: ...)" with the reason if a running rig cannot take a key, else ""."""
-    when = live(key)
+    when = effect_time(key)
     return f" ({when})" if when.startswith(NEXT_START) else ""
 
 
@@ -273,7 +275,7 @@ def _at(rig: Rig, key: str) -> Value:
         return None
 
 
-def _differing(
+def _iterate_differences(
     shape: Shape, before: Any, after: Any, path: tuple[str, ...]
 ) -> Iterator[tuple[str, Value]]:
     if before is after:
@@ -282,7 +284,7 @@ def _differing(
         for name, field in shapes_of(shape.params).items():
             if hasattr(before, name):
                 both = getattr(before, name), getattr(after, name)
-                yield from _differing(field, *both, (*path, name))
+                yield from _iterate_differences(field, *both, (*path, name))
             else:  # the section of a plug-in that was not there before
                 yield ".".join((*path, name)), plain(getattr(after, name))
     elif before == after and type(before) is type(after):
@@ -290,7 +292,9 @@ def _differing(
     elif shape.form == "mapping" and shape.inner is not None:
         for step in {**before, **after}:
             if step in before and step in after:
-                yield from _differing(shape.inner, before[step], after[step], (*path, step))
+                yield from _iterate_differences(
+                    shape.inner, before[step], after[step], (*path, step)
+                )
             else:
                 yield ".".join((*path, step)), plain(after.get(step))
     else:
@@ -309,30 +313,30 @@ def _put(root: Shape, data: dict[str, Any], key: str, value: Value) -> list[Conf
             held[step] = {}
         held = held.setdefault(step, {}) if isinstance(held, dict) else None
     if not isinstance(held, dict):
-        rule = f"unknown key {abbreviated(last)}; {'.'.join(over)} is a single value"
-        return [ConfigFault("", None, key, abbreviated(value), rule)]
+        rule = f"unknown key {abbreviate(last)}; {'.'.join(over)} is a single value"
+        return [ConfigFault("", None, key, abbreviate(value), rule)]
     inner = shape.inner if shape is not None and shape.form == "mapping" else None
     if value is None and inner is not None and not inner.optional:
         held.pop(last, None)
     elif isinstance(value, Mapping) and isinstance(held.get(last), dict):
-        held[last] = _laid_over(held[last], value)
+        held[last] = _overlay(held[last], value)
     else:
         held[last] = value
     return []
 
 
-def _laid_over(low: dict[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
+def _overlay(low: dict[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
     out = dict(low)
     for key, value in high.items():
         both = isinstance(value, Mapping) and isinstance(out.get(key), dict)
-        out[key] = _laid_over(out[key], value) if both else value
+        out[key] = _overlay(out[key], value) if both else value
     return out
 
 
-def _frozen(value: Any) -> Any:
+def _freeze(value: Any) -> Any:
     """Return a value with lists as tuples and mappings as dicts."""
     if isinstance(value, list | tuple):
-        return tuple(_frozen(item) for item in value)
+        return tuple(_freeze(item) for item in value)
     if isinstance(value, Mapping):
-        return {str(key): _frozen(item) for key, item in value.items()}
+        return {str(key): _freeze(item) for key, item in value.items()}
     return value

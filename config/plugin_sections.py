@@ -42,7 +42,7 @@ _PARTS: dict[str, Any] = {
 }
 
 
-class Named(NamedTuple):
+class NamedPlugins(NamedTuple):
     """The parts of packages that a rig names, by group."""
 
     bus: tuple[str, ...] = ()
@@ -51,7 +51,7 @@ class Named(NamedTuple):
     camera: tuple[str, ...] = ()
 
 
-NONE = Named()
+NONE = NamedPlugins()
 
 
 class Problem(NamedTuple):
@@ -61,7 +61,7 @@ class Problem(NamedTuple):
     rule: str
 
 
-def extended(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
+def extend_type(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
     """Return the type that a rig's data need, and what keeps parts from being used.
 
     Args:
@@ -72,7 +72,7 @@ def extended(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
         return into, ()
     found: dict[str, list[str]] = {BUS: [], DETECTOR: [], ATTENTION: [], CAMERA: []}
     problems = []
-    for group, key, name in _mentioned(data):
+    for group, key, name in _named_plugins(data):
         if is_ours(group, name) or name in found[group]:
             continue
         try:
@@ -85,11 +85,13 @@ def extended(into: type[T], data: Any) -> tuple[type[T], tuple[Problem, ...]]:
                 found[group].append("")
             continue
         found[group].append(name)
-    named = Named(*(tuple(sorted(set(found[g]))) for g in (BUS, DETECTOR, ATTENTION, CAMERA)))
+    named = NamedPlugins(
+        *(tuple(sorted(set(found[g]))) for g in (BUS, DETECTOR, ATTENTION, CAMERA))
+    )
     return cast(type[T], rig_type(named)), tuple(problems)
 
 
-def _mentioned(data: Any) -> Iterable[tuple[str, str, str]]:
+def _named_plugins(data: Any) -> Iterable[tuple[str, str, str]]:
     """Return group, key and name of what a rig names."""
     buses = _at(data, "buses")
     chosen = [
@@ -114,7 +116,7 @@ def _at(value: Any, *path: str) -> Any:
 
 
 @cache
-def rig_type(named: Named) -> type[Rig]:
+def rig_type(named: NamedPlugins) -> type[Rig]:
     """Return the type of a rig with the sections of some parts; an empty name: only the choices.
 
     Raises:
@@ -125,7 +127,7 @@ def rig_type(named: Named) -> type[Rig]:
     bus = _with_sections(BusConfig, BUS, "kind", named.bus)
     detector = _with_sections(FaceDetectorParams, DETECTOR, "kind", named.detector)
     gaze = _with_sections(GazeConfig, ATTENTION, "chooser", named.attention)
-    says = {field.name: _said(Rig, field.name) for field in dataclasses.fields(Rig)}
+    says = {field.name: _description(Rig, field.name) for field in dataclasses.fields(Rig)}
     fields: list[tuple[str, Any, Any]] = [
         ("bus", Annotated[bus, says["bus"]], dataclasses.field()),
         (
@@ -137,7 +139,7 @@ def rig_type(named: Named) -> type[Rig]:
         ("gaze", Annotated[gaze, says["gaze"]], _default(gaze)),
         *(_section(CAMERA, name) for name in named.camera),
     ]
-    return _made(Rig, fields, (rig_type, named))
+    return _create_type(Rig, fields, (rig_type, named))
 
 
 @cache
@@ -147,10 +149,14 @@ def _with_sections(base: type[T], group: str, key: str, names: tuple[str, ...]) 
     known = Choices(*dict.fromkeys(one.name for one in registrations(group)))
     declared = next(f for f in dataclasses.fields(cast(Any, base)) if f.name == key)
     fields = [
-        (key, Annotated[str, known, _said(base, key)], dataclasses.field(default=declared.default)),
+        (
+            key,
+            Annotated[str, known, _description(base, key)],
+            dataclasses.field(default=declared.default),
+        ),
         *(_section(group, name) for name in names if name),
     ]
-    return _made(base, fields, (_with_sections, base, group, key, names))
+    return _create_type(base, fields, (_with_sections, base, group, key, names))
 
 
 def _section(group: str, name: str) -> tuple[str, Any, Any]:
@@ -177,13 +183,15 @@ def _default(params: type) -> Any:
     return dataclasses.field(default_factory=params, kw_only=True)
 
 
-def _said(params: type, name: str) -> str:
+def _description(params: type, name: str) -> str:
     from gazerig.params import declarations
 
     return declarations(params)[name].description
 
 
-def _made(base: type[T], fields: list[tuple[str, Any, Any]], source: tuple[Any, ...]) -> type[T]:
+def _create_type(
+    base: type[T], fields: list[tuple[str, Any, Any]], source: tuple[Any, ...]
+) -> type[T]:
     """Return a dataclass with more fields; its values can be sent to another process.
 
     source: the function of this module that makes it, and its arguments
@@ -192,7 +200,7 @@ def _made(base: type[T], fields: list[tuple[str, Any, Any]], source: tuple[Any, 
 
     def reduced(value: Any) -> Any:
         kept = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-        return _restored, (make, tuple(given), kept)
+        return _restore, (make, tuple(given), kept)
 
     made = dataclasses.make_dataclass(
         base.__name__, fields, bases=(base,), frozen=True, namespace={"__reduce__": reduced}
@@ -201,5 +209,5 @@ def _made(base: type[T], fields: list[tuple[str, Any, Any]], source: tuple[Any, 
     return cast(type[T], made)
 
 
-def _restored(make: Callable[..., type], given: tuple[Any, ...], kept: dict[str, Any]) -> Any:
+def _restore(make: Callable[..., type], given: tuple[Any, ...], kept: dict[str, Any]) -> Any:
     return make(*given)(**kept)

@@ -36,11 +36,11 @@ class RigFiles(NamedTuple):
     texts: tuple[bytes, ...]
 
     @property
-    def own(self) -> bytes:
+    def own_text(self) -> bytes:
         """The text of the rig's own file."""
         return self.texts[0] if self.texts else b""
 
-    def changed(self) -> bool:
+    def has_changed(self) -> bool:
         """Whether any of them holds something else now, or cannot be read."""
         try:
             return tuple(read_limited(path, _LARGEST) for path in self.paths) != self.texts

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from gazerig.config.bounds import shapes_of
-from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, shipped
+from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, shipped_path
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import EditRefused, Value, edited, written
+from gazerig.config.save_text import EditRefused, Value, edit_text, format_value
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped import SHIPPED
 from gazerig.drivers.files.file_input import read_limited
@@ -48,7 +48,7 @@ def rig_file(name_or_path: Path | str) -> Path:
     text = str(name_or_path)
     if isinstance(name_or_path, Path) or "/" in text or text.endswith((".yaml", ".yml")):
         return Path(name_or_path)
-    return shipped("rigs", text)
+    return shipped_path("rigs", text)
 
 
 def save(
@@ -86,7 +86,7 @@ def save(
     before, text, found = _proposal(target, changes, into, base)
     if text == before:
         return SavedFile(target, None, ())
-    with _errors_named(target), _beside(target, text) as fresh:
+    with _convert_os_errors(target), _replacement_file(target, text) as fresh:
         try:
             loaded = check(str(fresh))
         except ConfigError as error:
@@ -96,7 +96,7 @@ def save(
             ]
             raise ConfigError(named) from None
         for key, value in changes.items():
-            held = _follow(loaded, key)
+            held = _value_at(loaded, key)
             if held is not _ABSENT and isinstance(value, list | tuple):
                 held, value = list(held), list(value)
             if held is not _ABSENT and held != value:
@@ -105,7 +105,7 @@ def save(
                     f"{key} stays {held} whatever this file says: a later layer sets it",
                     key,
                 )
-        if _held(target) != before:
+        if _read_content(target) != before:
             raise _fault(target, "was changed by another program meanwhile; try again")
         backup = _backup(target, before, now) if before is not None else None
         if before is not None:
@@ -132,8 +132,8 @@ def copy_shipped(name: str, to: Path | str, kind: str = "rigs") -> Path:
         gazerig.config.load.ConfigError: none of that name is shipped, or ``to`` exists or cannot
             be written.
     """
-    source, target = shipped(kind, name), Path(to)
-    with _errors_named(target), target.open("xb") as file:
+    source, target = shipped_path(kind, name), Path(to)
+    with _convert_os_errors(target), target.open("xb") as file:
         file.write(source.read_bytes())
     return target
 
@@ -148,10 +148,10 @@ def _proposal(
         base = target.read_bytes()
         raw: bytes | None = base
     else:
-        raw, before = _held(target), _document(base)
+        raw, before = _read_content(target), _document(base)
     mark = b"\xef\xbb\xbf" if base.startswith(b"\xef\xbb\xbf") else b""
     try:
-        text = edited(before.text, changes, into)
+        text = edit_text(before.text, changes, into)
         # An anchor lends its value to other places, which must not change unseen.
         kept, fresh = _leaves(before.data), _leaves(_document(text.encode()).data)
         for key in sorted({*kept, *fresh}):
@@ -163,18 +163,20 @@ def _proposal(
                 )
     except EditRefused as error:
         raise _fault(target, str(error)) from None
-    old = {key: _follow(before.data, key) for key in changes}
+    old = {key: _value_at(before.data, key) for key in changes}
     found = tuple(
-        ParamChange(key, None if old[key] is _ABSENT else written(old[key]), written(value))
+        ParamChange(
+            key, None if old[key] is _ABSENT else format_value(old[key]), format_value(value)
+        )
         for key, value in changes.items()
-        if old[key] is _ABSENT or written(old[key]) != written(value)
+        if old[key] is _ABSENT or format_value(old[key]) != format_value(value)
     )
     return raw, mark + text.encode() if found else base, found
 
 
-def _held(target: Path) -> bytes | None:
+def _read_content(target: Path) -> bytes | None:
     """Return a file's content, None without a file."""
-    with _errors_named(target):
+    with _convert_os_errors(target):
         try:
             return read_limited(target, _LARGEST)
         except FileNotFoundError:
@@ -194,7 +196,7 @@ _ABSENT: Any = object()
 _ANY_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
-def _follow(value: Any, key: str) -> Any:
+def _value_at(value: Any, key: str) -> Any:
     """Return the value at a dotted path through mappings or attributes of frozen values."""
     for step in key.split("."):
         if isinstance(value, Mapping):
@@ -215,7 +217,7 @@ def _leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _beside(target: Path, text: bytes) -> Iterator[Path]:
+def _replacement_file(target: Path, text: bytes) -> Iterator[Path]:
     """Write a new file in the same folder, gone again unless it has taken the target's place."""
     handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".yaml", dir=target.parent)
     try:
@@ -246,7 +248,7 @@ def _backup(target: Path, before: bytes, now: datetime) -> Path:
 
 
 @contextlib.contextmanager
-def _errors_named(target: Path) -> Iterator[None]:
+def _convert_os_errors(target: Path) -> Iterator[None]:
     """Turn errors of the file system into a ConfigError of one line."""
     try:
         yield

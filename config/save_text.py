@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from gazerig.config.bounds import Shape, shape_at
-from gazerig.config.entries import composed
+from gazerig.config.entries import compose_yaml
 from gazerig.config.gestures import GestureSet, gesture_name, gesture_path, load_gesture
 from gazerig.config.load import load
 from gazerig.config.parameters import plain
@@ -43,7 +43,7 @@ class _Edit(NamedTuple):
     new: str
 
 
-def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
+def edit_text(text: str, changes: Mapping[str, Value], into: type) -> str:
     """Return the text with the values at dotted key paths replaced, missing keys added.
 
     into: the Params dataclass of the file; its fields' descriptions explain keys that are added
@@ -51,24 +51,24 @@ def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
     Raises:
         EditRefused: a value cannot be written at its place.
     """
-    root = _top(text)
+    root = _top_node(text)
     edits, absent = [], {}
     for key, value in changes.items():
         place = _find(root, key.split("."))
         if place is None:
             absent[key] = value
         else:
-            edits += _replaced(text, key, place, value)
+            edits += _replace_value(text, key, place, value)
     for edit in sorted(edits, reverse=True):
         text = text[: edit.start] + edit.new + text[edit.end :]
     for key, value in absent.items():
         # One after the other: the first may make the mapping that the next one needs.
-        edit = _added(text, _top(text), key, value, into)
+        edit = _add_key(text, _top_node(text), key, value, into)
         text = text[: edit.start] + edit.new + text[edit.end :]
     return text
 
 
-def written(value: Value) -> str:
+def format_value(value: Value) -> str:
     """Return a value as YAML on one line.
 
     Raises:
@@ -82,7 +82,7 @@ def written(value: Value) -> str:
         plain = _PLAIN_TEXT.fullmatch(value) and value.lower() not in _NO_TEXT
         return value if plain else json.dumps(value, ensure_ascii=False)
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(written, value))}]"
+        return f"[{', '.join(map(format_value, value))}]"
     if isinstance(value, float):
         if not isfinite(value):
             raise EditRefused(f"{value} is not a finite number and is never written")
@@ -93,9 +93,9 @@ def written(value: Value) -> str:
         raise EditRefused(f"{value!r} is no number, text, truth value or list of those") from None
 
 
-def _top(text: str) -> MappingNode:
+def _top_node(text: str) -> MappingNode:
     """Return the top node of the text; nodes hold their places and are not changed."""
-    node = composed(text)
+    node = compose_yaml(text)
     if not isinstance(node, MappingNode):
         raise EditRefused("the top level is no mapping; write 'key: value' lines")
     return node
@@ -157,7 +157,7 @@ def _end(text: str, place: _KeyAndValue) -> int:
 # --- replacing
 
 
-def _replaced(text: str, key: str, place: _KeyAndValue, value: Value) -> list[_Edit]:
+def _replace_value(text: str, key: str, place: _KeyAndValue, value: Value) -> list[_Edit]:
     """Return the edits that replace a value."""
     node = place.node
     if isinstance(node, MappingNode):
@@ -166,10 +166,12 @@ def _replaced(text: str, key: str, place: _KeyAndValue, value: Value) -> list[_E
     block = isinstance(node, SequenceNode) and not node.flow_style and text[start] != "*"
     if block and isinstance(value, list | tuple) and len(value) == len(node.value):
         items = zip(node.value, value, strict=True)
-        return [e for item, v in items for e in _replaced(text, key, _KeyAndValue(node, item), v)]
+        return [
+            e for item, v in items for e in _replace_value(text, key, _KeyAndValue(node, item), v)
+        ]
     if block or getattr(node, "style", None) in ("|", ">"):
         raise EditRefused(f"{key} is spread over several lines; write it on one line first")
-    new = written(value)
+    new = format_value(value)
     if start == end:
         new = f" {new}"
     return [] if text[start:end] == new else [_Edit(start, end, new)]
@@ -178,7 +180,7 @@ def _replaced(text: str, key: str, place: _KeyAndValue, value: Value) -> list[_E
 # --- adding
 
 
-def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> _Edit:
+def _add_key(text: str, root: MappingNode, key: str, value: Value, into: type) -> _Edit:
     """Return the edit that adds a key and missing mappings above it, each with a comment."""
     steps = key.split(".")
     depth = next(n for n in range(len(steps) - 1, -1, -1) if _find(root, steps[:n]) is not None)
@@ -187,7 +189,9 @@ def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> 
         raise EditRefused(f"{key}: its mapping is an alias (*); write it out first")
     node, newline = holder.node, "\r\n" if "\r\n" in text else "\n"
     if isinstance(node, MappingNode) and node.flow_style:
-        new = ": {".join(steps[depth:]) + f": {written(value)}" + "}" * (len(steps) - depth - 1)
+        new = (
+            ": {".join(steps[depth:]) + f": {format_value(value)}" + "}" * (len(steps) - depth - 1)
+        )
         if not node.value:
             at = text.index("{", node.start_mark.index) + 1
             return _Edit(at, at, new)
@@ -204,12 +208,12 @@ def _added(text: str, root: MappingNode, key: str, value: Value, into: type) -> 
     at = end - 1 if end > at and text[end - 1] == "\r" else end
     lines = []
     for n in range(depth, len(steps)):
-        body = f"{steps[n]}:" if n < len(steps) - 1 else f"{steps[n]}: {written(value)}"
-        lines += _explained(body, comment(into, steps[: n + 1]), " " * (indent + 2 * (n - depth)))
+        body = f"{steps[n]}:" if n < len(steps) - 1 else f"{steps[n]}: {format_value(value)}"
+        lines += _add_comment(body, comment(into, steps[: n + 1]), " " * (indent + 2 * (n - depth)))
     return _Edit(at, at, "".join(f"{newline}{line}" for line in lines))
 
 
-def _explained(body: str, description: str, indent: str) -> list[str]:
+def _add_comment(body: str, description: str, indent: str) -> list[str]:
     """Return a line with a comment behind it, or above it if it is too long."""
     line = f"{indent}{body}"
     if not description:
@@ -290,7 +294,7 @@ def changes_text(changes: Mapping[str, Any]) -> str:
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
     """Return mappings as YAML, one key a line."""
     for key, value in values.items():
-        start = f"{'  ' * depth}{written(key)}:"
+        start = f"{'  ' * depth}{format_value(key)}:"
         if isinstance(value, dict) and value:
             yield f"{start}\n"
             yield from _lines(value, depth + 1)
@@ -301,7 +305,7 @@ def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:
 def _flow(value: Any) -> str:
     """Return a value as YAML on one line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{written(k)}: {_flow(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{format_value(k)}: {_flow(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_flow, value)) + "]"
-    return written(value)
+    return format_value(value)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.config.bounds import shapes_of
-from gazerig.config.export import suggestion
+from gazerig.config.export import suggestion_text
 from gazerig.config.gestures import gesture_name, gesture_path, load_gesture, shipped_gestures
-from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped
+from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped_path
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
 from gazerig.drivers.bus.servo_models import SERVOS
@@ -98,7 +98,7 @@ def _find(kind: str, name_or_path: str) -> Path:
     looks_like_path = "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
     if looks_like_path:
         return Path(name_or_path)
-    return shipped(kind, name_or_path)
+    return shipped_path(kind, name_or_path)
 
 
 def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
@@ -161,27 +161,27 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
                 f"a {joint.model} speaks {SERVOS[joint.model].bus}, and its bus is of kind {kind}",
             )
         elif joint.model in SERVOS:
-            yield from _channel(name, rig)
-    yield from _series(rig)
+            yield from _channel_fault(name, rig)
+    yield from _byte_order_faults(rig)
     used = {joint.bus for joint in rig.joints.values()}
     for name in rig.buses:
         if name not in used:
             yield f"buses.{name}", "no joint is on it: take it out, or give joints this bus"
 
 
-def _channel(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
+def _channel_fault(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
     """Find what keeps a joint from its channel of a board of hobby servos."""
     joint, params = rig.joints[name], rig.bus_of(name).section
     if not isinstance(params, HobbyBoardParams):
         return
     try:
-        params.check_servo(_setup(name, rig))
+        params.check_servo(_servo_setup(name, rig))
     except ValueError as error:
         what = str(error).removeprefix(f"channel {joint.id}: ")
         yield f"joints.{name}{'' if what.startswith('its range') else '.id'}", what
 
 
-def _setup(name: str, rig: Rig) -> ServoConfig:
+def _servo_setup(name: str, rig: Rig) -> ServoConfig:
     """Return what the bus must know of a joint's servo, as far as the rig is right."""
     for one in rig.couplings.values():
         known = {one.first, one.second} <= rig.joints.keys() and all(
@@ -193,7 +193,7 @@ def _setup(name: str, rig: Rig) -> ServoConfig:
     return rig.joints[name].setup(name)
 
 
-def _series(rig: Rig) -> Iterable[tuple[str, str]]:
+def _byte_order_faults(rig: Rig) -> Iterable[tuple[str, str]]:
     """Check that servos of one bus have the same byte order."""
     first: dict[str, str] = {}
     for name, joint in rig.joints.items():
@@ -394,7 +394,7 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
             yield f"gesture_files.{i}", f"{file}: {refused}"
     for behaviour, rule in rig.gaze.top_down.rules.items():
         if rule.gesture and rule.gesture not in known:
-            near = suggestion(rule.gesture, sorted(known)) or ";"
+            near = suggestion_text(rule.gesture, sorted(known)) or ";"
             there = ", ".join(sorted(known))
             yield (
                 f"gaze.top_down.rules.{behaviour}.gesture",

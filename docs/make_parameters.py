@@ -7,7 +7,7 @@ from typing import Any
 
 from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import written
+from gazerig.config.save_text import format_value
 
 PAPER = Path(__file__).parent / "parameters.md"
 _HEAD = """# Every parameter of a rig
@@ -67,7 +67,7 @@ def _default(field: Any) -> str:
         return "none"
     if isinstance(value, tuple) and any(is_dataclass(item) for item in value):
         return "none"
-    return _cell(written(value))
+    return _cell(format_value(value))
 
 
 def _limits(shape: Shape) -> str:

@@ -62,7 +62,7 @@ class Feedback(NamedTuple):
     missing: tuple[int, ...]
 
     @classmethod
-    def of_none(cls, count: int) -> "Feedback":
+    def create_missing(cls, count: int) -> "Feedback":
         """Return the feedback of an exchange in which no servo has answered."""
         unknown, never, no = (nan,) * count, (-inf,) * count, (False,) * count
         return cls(
@@ -70,7 +70,7 @@ class Feedback(NamedTuple):
             ("",) * count, (True,) * count, no, tuple(range(count)),
         )  # fmt: skip
 
-    def filled(self, last: "Feedback") -> "Feedback":
+    def fill_missing(self, last: "Feedback") -> "Feedback":
         """Return a copy in which missing servos have their last values and times."""
         gone = frozenset(self.missing)
         columns = (
@@ -216,7 +216,7 @@ class DetectionInCamera(NamedTuple):
         along_sd_m_s: its standard deviations
     size_depth: of a face, ratio of its distance at an adult's size to the measured distance; None
         if the camera measured none
-    mark: the detector's own id, None if it has none
+    detector_id: the detector's own id, None if it has none
     turn_sd_rad: of a face, standard deviation of its turn
     gaze_camera: of a face, unit vector along which the eyes look, None if unknown
     fastest_m, fastest_m_s: of a moving thing, position and velocity of its fastest part, None if
@@ -247,7 +247,7 @@ class DetectionInCamera(NamedTuple):
     across_sd_m_s: float
     along_sd_m_s: float
     size_depth: float | None
-    mark: int | None
+    detector_id: int | None
     turn_sd_rad: float = 0.0
     gaze_camera: tuple[float, float, float] | None = None
     fastest_m: tuple[float, float, float] | None = None
@@ -413,7 +413,7 @@ class CameraTurn(NamedTuple):
         R = np.array(self.R_start_camera, dtype=np.float64)
         return R.shape == (3, 3) and bool(np.abs(R @ R.T - np.eye(3)).max() < 1e-3)
 
-    def since(self, before: "CameraTurn | None") -> NDArray[np.float64] | None:
+    def rotation_since(self, before: "CameraTurn | None") -> NDArray[np.float64] | None:
         """Return R_now_before (3, 3), which turns directions in camera axes; None if unknown."""
         if before is None or before.epoch != self.epoch:
             return None
@@ -458,7 +458,9 @@ class Detections:
     palms: tuple[DetectedPalm, ...] | None = None
     conditions: tuple[str, ...] = ()
 
-    def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
+    def locate_in_camera(
+        self, locate: "Callable[[Detections], LocatedFrame] | None"
+    ) -> "Detections":
         """Return a copy with its contents located in the camera's axes; unchanged for None."""
         if locate is None:
             return self

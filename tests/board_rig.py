@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gazerig.config.load import shipped
+from gazerig.config.load import shipped_path
 
 SECTION = """bus:
   port: /dev/i2c-1
@@ -14,7 +14,7 @@ SECTION = """bus:
 
 def on_pca9685(folder: Path | str, section: str = SECTION) -> str:
     """Write the file into a folder; return its path."""
-    text = shipped("rigs", "maker").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "maker").read_text(encoding="utf-8")
     start, end = text.index("bus:  #"), text.index("geometry:")
     path = Path(folder) / "maker-pca9685.yaml"
     path.write_text(text[:start] + section + text[end:], encoding="utf-8")

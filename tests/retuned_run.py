@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from desk import GAZE_JOINTS
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
@@ -40,7 +40,7 @@ class Running(NamedTuple):
 
     def tune(self, changes: dict[str, Value]) -> None:
         base = self.rig
-        self.made.robot.command(self.made.live_params.prepare(base, changed(base, changes)))
+        self.made.robot.command(self.made.live_params.prepare(base, apply_changes(base, changes)))
 
 
 def started(scene: str = "visitor", rig: Rig = RIG) -> Running:

@@ -9,7 +9,7 @@ import pytest
 from board_rig import on_pca9685
 from mixed_rig import mixed_text
 
-from gazerig.config.load import shipped
+from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import Host
 from gazerig.robot.app.run_bus import emulated_lines
@@ -36,7 +36,7 @@ def served(rig: str) -> Iterator[Served]:
 def rig_files(folder: Path) -> dict[str, str]:
     """Write rigs of one's own; give their paths: desk, feetech, maker, pca9685, mixed."""
     names = ("desk", "feetech", "maker")
-    texts = {name: shipped("rigs", name).read_text("utf-8") for name in names}
+    texts = {name: shipped_path("rigs", name).read_text("utf-8") for name in names}
     texts["mixed"] = mixed_text()
     paths = {"pca9685": on_pca9685(folder)}
     for name, text in texts.items():

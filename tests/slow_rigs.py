@@ -3,14 +3,14 @@
 import re
 from pathlib import Path
 
-from gazerig.config.load import shipped
+from gazerig.config.load import shipped_path
 
 _RATE = re.compile(r"^loop:.*\n  rate_hz: [\d.]+", re.MULTILINE)
 
 
 def at_rate(folder: Path, rig: str, rate_hz: float) -> str:
     """Write a shipped rig with another loop rate; return the file's path."""
-    text = shipped("rigs", rig).read_text(encoding="utf-8")
+    text = shipped_path("rigs", rig).read_text(encoding="utf-8")
     loop = f"loop:\n  rate_hz: {rate_hz}"
     text, count = _RATE.subn(loop, text)
     if count == 0:  # it has the rate of the schema

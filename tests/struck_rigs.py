@@ -5,10 +5,10 @@ from typing import Any
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
-from gazerig.testing.struck_machine import LINE, Case, lasting
+from gazerig.testing.struck_machine import LINE, Case, lasting_cases
 
 PACKETS = [
-    *lasting(
+    *lasting_cases(
         "truncate {i} 5", "truncate all 11", "drop {i} 3", "drop {i} 8", "fragment {i}", "fragment",
         "reorder", "wrong-id {i} {j}", "wrong-id {i} 77", "short {i} 2", "short all 1",
         "long {i} 2", "long all 1", "refuse {i} 7", "refuse {i} 32", "refuse all 7",
@@ -39,8 +39,8 @@ ERRORS = (
     "script-call-stack", "script-counter",
 )  # fmt: skip
 BOARD = [
-    *lasting(*(f"error {name}" for name in ERRORS)),
-    *lasting("lose-bytes 1", "lose-bytes 7", "lose-bytes 1000 for 1"),
+    *lasting_cases(*(f"error {name}" for name in ERRORS)),
+    *lasting_cases("lose-bytes 1", "lose-bytes 7", "lose-bytes 1000 for 1"),
     Case(("set on-error home", "error protocol")),
     Case(("set on-error ignore", "error protocol")),
     Case(("brown-out",)),
@@ -55,7 +55,7 @@ BOARD = [
 """What befalls a Maestro and its servos beside."""
 
 I2C = [
-    *lasting(
+    *lasting_cases(
         "lose-bytes 1", "lose-bytes 7", "lose-bytes 1000 for 1", "nack 1", "nack 40", "nack",
         "nack for 0.5",
     ),

@@ -76,7 +76,7 @@ def test_a_servo_that_cannot_be_set_up_again_is_named_and_keeps_no_other_waiting
     bus, i, j = pair_of(rig, "dynamixel")
     # A second servo has its id, which only shows where both stand apart without torque.
     again = ("collide {i}", "unplug", "brown-out {i}", "brown-out {j}")
-    outcome = machine.strike(bus, i, j, Case(again, ("plug",)))
+    outcome = machine.apply_fault(bus, i, j, Case(again, ("plug",)))
     assert outcome.end == "left, named", outcome
     assert [k for k, heard in enumerate(machine.heard) if not heard] == [i]
 
@@ -85,14 +85,14 @@ def test_a_limp_joint_may_fall_out_of_its_range_under_a_load():
     rig, machine = copied(of_kind("dynamixel"))
     bus, i, j = pair_of(rig, "dynamixel")
     case = Case(("load {i} 0.05", "unplug", "brown-out {i}"), ("load {i} 0", "plug"))
-    assert machine.strike(bus, i, j, case).end == "came back"
+    assert machine.apply_fault(bus, i, j, case).end == "came back"
 
 
 @pytest.mark.parametrize("bit", [3, 9])
 def test_a_hit_bit_is_not_taken_for_the_pulse_of_a_channel_that_gives_none(bit):
     rig, machine = copied(of_kind("maestro"))
     case = Case(("error script-stack", f"corrupt {{i}} {bit}"))
-    assert machine.strike(pair_of(rig, "maestro")[0], 0, 1, case).end == "came back"
+    assert machine.apply_fault(pair_of(rig, "maestro")[0], 0, 1, case).end == "came back"
 
 
 # --- several kinds in one head
@@ -135,7 +135,7 @@ def test_what_befalls_one_bus_leaves_the_joints_of_the_others_moving(
         return well
 
     machine.tick = listened
-    outcome = machine.strike(bus, i, j, case)
+    outcome = machine.apply_fault(bus, i, j, case)
     assert outcome.end == "came back", outcome
     others = [k for k, name in enumerate(mixed.names) if mixed.joints[name].bus != bus]
     assert all(one[k] for one in heard for k in others)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.config.load import load, read_yaml, shipped, shipped_names
+from gazerig.config.load import load, read_yaml, shipped_names, shipped_path
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import rotation
@@ -86,7 +86,7 @@ def test_a_character_lies_over_the_desk_rig_and_changes_all_it_names(name: str) 
             count += differ(value, *inside, f"{key}.{name}")
         return count
 
-    assert differ(read_yaml(shipped("characters", name)).data, plain, other, name) >= 4
+    assert differ(read_yaml(shipped_path("characters", name)).data, plain, other, name) >= 4
 
 
 def test_all_characters_are_known_here() -> None:
@@ -106,7 +106,9 @@ def test_the_bold_look_at_a_face_more_than_the_shy() -> None:
 
 
 def test_shipped_rule_sets_load() -> None:
-    sets = {name: load(shipped("rules", name), TopDownParams) for name in shipped_names("rules")}
+    sets = {
+        name: load(shipped_path("rules", name), TopDownParams) for name in shipped_names("rules")
+    }
     assert set(sets) == {"boxing", "conversation", "greeting", "group"}
     boxing, talk = sets["boxing"], sets["conversation"]
     assert boxing.rules == TopDownParams().rules and boxing.behaviour == "wait"
@@ -133,7 +135,7 @@ def test_a_character_changes_one_rule_of_those_a_rig_has_by_default(
 
 def test_a_rig_of_its_own_rules_keeps_them_alone_under_a_character(tmp_path: Path) -> None:
     own = tmp_path / "own.yaml"
-    text = shipped("rigs", "maker").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "maker").read_text(encoding="utf-8")
     rule = "gaze:\n  top_down: {rules: {wait: {look_at: face, salience: 0.9}}}\n"
     own.write_text(text.replace("gaze:  # what differs", rule + "  # what differs"), "utf-8")
     rules = load_rig(str(own), "sleepy").gaze.top_down.rules

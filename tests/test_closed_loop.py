@@ -11,7 +11,7 @@ import pytest
 from fakes.runs import play
 from numpy.typing import NDArray
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import kinematics_and_oculomotor
@@ -21,7 +21,7 @@ from gazerig.robot.model.frames import NewestPose, PoseHistory
 from gazerig.sim_mock.cameras.rendered import PixelCameraParams
 from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
 
-RIG = changed(
+RIG = apply_changes(
     load_rig("desk"),
     {"gaze.aversion.silent_mutual_s": 0.0, "gaze.head.goal_model": "attention"},
 )

@@ -10,7 +10,7 @@ from fakes.small_config import Camera, Joint, Rig, one_id_each, write
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.load import ConfigError, load, read_yaml, shipped, shipped_names
+from gazerig.config.load import ConfigError, load, read_yaml, shipped_names, shipped_path
 
 GOOD = """\
 # a rig
@@ -159,12 +159,12 @@ def test_a_document_knows_its_lines_and_keeps_its_text(tmp_path: Path) -> None:
 
 def test_shipped_files_are_found_by_name() -> None:
     with pytest.raises(ConfigError, match=r"^config/rigs: nothing named '\.\./x' is shipped"):
-        shipped("rigs", "../x")
+        shipped_path("rigs", "../x")
     with pytest.raises(ConfigError, match="there are none of this kind"):
-        shipped("hats", "top")
+        shipped_path("hats", "top")
     for kind in ("rigs", "profiles", "scanpaths"):
         for name in shipped_names(kind):
-            assert shipped(kind, name).is_file()
+            assert shipped_path(kind, name).is_file()
 
 
 def test_an_unknown_shipped_name_lists_those_that_exist(
@@ -175,9 +175,9 @@ def test_an_unknown_shipped_name_lists_those_that_exist(
         write(tmp_path / "rigs", GOOD, name)
     for module in ("load", "shipped"):
         monkeypatch.setattr(f"gazerig.config.{module}.SHIPPED", tmp_path)
-    assert shipped("rigs", "nod") == tmp_path / "rigs" / "nod.yaml"
+    assert shipped_path("rigs", "nod") == tmp_path / "rigs" / "nod.yaml"
     with pytest.raises(ConfigError) as caught:
-        shipped("rigs", "nood")
+        shipped_path("rigs", "nood")
     assert str(caught.value) == (
         "config/rigs: nothing named 'nood' is shipped; did you mean 'nod'? there are nod, shake"
     )

@@ -12,9 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from present import present
 
-from gazerig.config.load import ConfigError, load, read_yaml, shipped
+from gazerig.config.load import ConfigError, load, read_yaml, shipped_path
 from gazerig.config.save import copy_shipped, propose, rig_file, save, save_rig
-from gazerig.config.save_text import EditRefused, edited, written
+from gazerig.config.save_text import EditRefused, edit_text, format_value
 from gazerig.config.schema import Rig, load_rig
 from gazerig.params import Bounds, Unit
 from gazerig.robot.model.parameter import ParamChange
@@ -259,12 +259,12 @@ def test_a_disk_that_fails_loses_nothing(small, monkeypatch):
 
 
 def test_shipped_rigs_are_copied_not_changed(tmp_path):
-    before = shipped("rigs", "desk").read_bytes()
-    for name in ("desk", shipped("rigs", "desk")):
+    before = shipped_path("rigs", "desk").read_bytes()
+    for name in ("desk", shipped_path("rigs", "desk")):
         with pytest.raises(ConfigError, match=r"copy it \(cp .*desk\.yaml mydesk\.yaml\)"):
             save_rig(name, {"joints.neck_yaw.zero_step": 1}, NOW)
     mine = copy_shipped("desk", tmp_path / "mine.yaml")
-    assert mine.read_bytes() == before == shipped("rigs", "desk").read_bytes()
+    assert mine.read_bytes() == before == shipped_path("rigs", "desk").read_bytes()
     with pytest.raises(ConfigError, match="already exists"):
         copy_shipped("desk", mine)
     with pytest.raises(ConfigError, match="nothing named 'dsk'"):
@@ -313,7 +313,7 @@ SCALARS = st.one_of(
 @settings(max_examples=150, deadline=None)
 def test_what_is_written_is_read_back(tmp_path_factory, value):
     path = tmp_path_factory.getbasetemp() / "written.yaml"
-    path.write_bytes(f"a: {written(value)}\n".encode())
+    path.write_bytes(f"a: {format_value(value)}\n".encode())
     read = read_yaml(path).data["a"]
     wanted = tuple(value) if isinstance(value, list) else value
     assert read == wanted and type(read) is type(wanted)
@@ -360,7 +360,7 @@ def test_any_path_into_any_tree(tmp_path_factory, tree, path, value, flow_below)
     possible = possible and not isinstance(holder.get(path[-1]), dict)
     file = tmp_path_factory.getbasetemp() / "any.yaml"
     try:
-        new = edited(text, {key: value}, Head)
+        new = edit_text(text, {key: value}, Head)
     except EditRefused:
         assert not possible
         return

@@ -12,8 +12,8 @@ from fakes.runs import ticks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.load import shipped
-from gazerig.config.parameters import changed
+from gazerig.config.load import shipped_path
+from gazerig.config.parameters import apply_changes
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Feedback
@@ -264,7 +264,7 @@ def test_a_lost_servo_of_a_pair_makes_both_joints_stale() -> None:
 
     def silent(t_s: float) -> Feedback:
         whole = read(t_s)
-        nothing = Feedback.of_none(len(rig.names))
+        nothing = Feedback.create_missing(len(rig.names))
         columns = [
             (*column[:k], none[k], *column[k + 1 :])
             for column, none in zip(whole[:9], nothing[:9], strict=True)
@@ -287,7 +287,7 @@ def test_a_measured_table_may_be_of_any_two_joints() -> None:
 
 
 def coupled_file(tmp_path: Path) -> str:
-    text = shipped("rigs", "feetech").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "feetech").read_text(encoding="utf-8")
     text += "\ncouplings:\n  neck: {kind: differential, first: neck_pitch, second: neck_roll}\n"
     path = tmp_path / "coupled.yaml"
     path.write_text(text, encoding="utf-8")
@@ -318,7 +318,7 @@ def test_coupled_joints_keep_their_gears_until_the_next_start() -> None:
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
     made.robot.start(made.clock)
     changes = {"joints.neck_pitch.zero_step": 2100, "joints.neck_roll.max_deg": 20.0}
-    made.robot.command(made.live_params.prepare(rig, changed(rig, changes)))
+    made.robot.command(made.live_params.prepare(rig, apply_changes(rig, changes)))
     made.clock.sleep_until(made.clock.now_s() + 0.005)
     before = made.robot.body.angles((2048,) * 9)
     tick = made.robot.tick(made.clock.now_s(), 0.005)

@@ -123,7 +123,7 @@ def test_a_camera_without_the_count_of_scenes_goes_on_as_ever() -> None:
 def test_the_scene_comes_through_the_pipe_and_the_locator() -> None:
     found = Detections(0.0, 1, 640, 400, scene=3)
     assert pickle.loads(pickle.dumps(found)).scene == 3
-    assert found.located_by(FrameLocator(None, radians(69.0))).scene == 3
+    assert found.locate_in_camera(FrameLocator(None, radians(69.0))).scene == 3
 
 
 def test_six_who_walk_to_and_fro_keep_their_identities_by_their_clothes() -> None:

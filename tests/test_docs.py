@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 import gazerig
 from gazerig.config.bounds import Shape, shapes_of
 from gazerig.config.load import ConfigError, shipped_names
-from gazerig.config.parameters import NEXT_TICK, changed, parameters, value_of
+from gazerig.config.parameters import NEXT_TICK, apply_changes, parameters, value_of
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.bus.servo_models import SERVOS
@@ -101,7 +101,7 @@ def test_values_set_in_the_papers_are_allowed() -> None:
         pairs += [(key, float(value)) for key, value in found]
     assert len(pairs) >= 4
     for key, value in pairs:
-        assert changed(RIGS["desk"], {key: value}) != RIGS["desk"], key
+        assert apply_changes(RIGS["desk"], {key: value}) != RIGS["desk"], key
     for words in COMMANDS:
         if words.startswith("get ") and "--" not in words:
             assert is_key(words.split()[1]), words

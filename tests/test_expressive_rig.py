@@ -9,8 +9,8 @@ from command_line import answers_in, invoked
 from expressive_rig import started
 from fakes.runs import record, ticks
 
-from gazerig.config.load import shipped
-from gazerig.config.parameters import changed, parameters
+from gazerig.config.load import shipped_path
+from gazerig.config.parameters import apply_changes, parameters
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
@@ -101,7 +101,7 @@ def test_doctor_names_the_jaw_and_mends_its_limits() -> None:
 def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
     pytest.importorskip("gazerig.features.bringup")
     rig = tmp_path / "face.yaml"
-    text = shipped("rigs", "expressive").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "expressive").read_text(encoding="utf-8")
     rig.write_text(text, encoding="utf-8")
     done = invoked(
         "calibrate", "joints", str(rig), "--joint", "jaw", "--by", "motion", "--mock", "--dry-run",
@@ -115,7 +115,7 @@ def test_every_joint_has_a_key_a_table_and_a_chart() -> None:
     rig = load_rig("expressive")
     keys = {one.key for one in parameters(rig, rig)}
     assert {"joints.jaw.max_deg", "expressions.sad.neck_pitch", "levels.mouth.high_deg"} <= keys
-    tuned = changed(rig, {"expressions.happy.jaw": 5.0, "levels.mouth.smoothing_ms": 120.0})
+    tuned = apply_changes(rig, {"expressions.happy.jaw": 5.0, "levels.mouth.smoothing_ms": 120.0})
     assert tuned.expressions["happy"]["jaw"] == 5.0
     assert tuned.levels["mouth"].smoothing_ms == 120.0
 
@@ -128,7 +128,7 @@ def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
         "second": "jaw", "second_min_deg": 4.0, "second_max_deg": 25.0,
     }  # fmt: skip
     low: dict[str, Value] = {"expressions.sulky": {"neck_pitch": -20.0, "jaw": 15.0}}
-    made: Assembly = started(changed(rig, {"guard.collisions": (pair,), **low}))
+    made: Assembly = started(apply_changes(rig, {"guard.collisions": (pair,), **low}))
     made.robot.command(Express("sulky"))
     worst = -90.0
     for tick in ticks(made, 600):
@@ -170,7 +170,7 @@ def test_an_expression_tuned_while_it_is_in_force_moves_without_a_jump() -> None
     for k in range(600):
         if k == 300:
             made.robot.command(
-                made.live_params.prepare(rig, changed(rig, {"expressions.happy.jaw": 10.0}))
+                made.live_params.prepare(rig, apply_changes(rig, {"expressions.happy.jaw": 10.0}))
             )
         now = degrees(ticks(made, 1)[0].desired_rad[jaw])
         largest, last = max(largest, abs(now - last)), now
@@ -180,7 +180,7 @@ def test_an_expression_tuned_while_it_is_in_force_moves_without_a_jump() -> None
 
 
 def test_a_wrong_expression_is_named_with_its_file_and_line(tmp_path: Path) -> None:
-    text = shipped("rigs", "expressive").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "expressive").read_text(encoding="utf-8")
     path = tmp_path / "face.yaml"
     path.write_text(text.replace("happy: {jaw: 4.0", "happy: {jaw: 44.0"), encoding="utf-8")
     done = invoked("check", str(path))

@@ -8,7 +8,7 @@ from seeing.row_05_finding_and_placing import after_frames
 from gazerig.drivers.types import ImageArray
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import grey_range, with_contrast
+from gazerig.drivers.vision.face.preprocess import grey_range, improve_contrast
 
 PHOTO = portrait("astronaut").image[40:240, 100:340]
 
@@ -20,19 +20,19 @@ def paled(share: float) -> ImageArray:
 
 
 def test_an_image_with_contrast_is_left_as_it_is() -> None:
-    assert with_contrast(PHOTO) is PHOTO
+    assert improve_contrast(PHOTO) is PHOTO
 
 
 @pytest.mark.parametrize("image", [paled(0.15), (0.12 * PHOTO).astype(np.uint8)])
 def test_a_pale_or_dark_one_gets_the_contrast_of_others(image: ImageArray) -> None:
-    dark, bright = grey_range(with_contrast(image)[..., 1])
+    dark, bright = grey_range(improve_contrast(image)[..., 1])
     assert dark < 25.0 and 150.0 < bright < 256.0
 
 
 def test_a_wall_stays_a_wall() -> None:
     """Noise is raised by no more than the gain, and smoothed."""
     wall = noisy(np.full((120, 160, 3), 200, np.uint8), 2.0, np.random.default_rng(1))
-    assert with_contrast(wall).std() < 8.0 * wall.std()
+    assert improve_contrast(wall).std() < 8.0 * wall.std()
     assert after_frames(face_detector(FaceDetectorParams()), wall) == 0
 
 

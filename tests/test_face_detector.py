@@ -233,8 +233,8 @@ def test_what_is_no_picture_is_refused(mtcnn, not_a_picture):
 def test_pictures_are_never_scaled_up():
     prepared = prepare(np.zeros((60, 80, 3), np.uint8), 320)
     assert prepared is not None
-    assert prepared.small.shape == (60, 80, 3)
-    assert prepared.stretch.tolist() == [1.0, 1.0]
+    assert prepared.working_size.shape == (60, 80, 3)
+    assert prepared.full_per_working.tolist() == [1.0, 1.0]
 
 
 def test_model_package_is_found_without_importing_it():

@@ -15,7 +15,7 @@ def row(steps, at_s, torque=True, rearmed=False):
 
 
 def test_nothing_of_a_missing_servo_can_pass_for_an_answer():
-    none = Feedback.of_none(3)
+    none = Feedback.create_missing(3)
     assert none.missing == (0, 1, 2) and rows(none) == (None,) * 3
     for column in (none.position_steps, none.velocity_steps_s, none.load):
         assert all(isnan(value) for value in column)
@@ -26,14 +26,14 @@ def test_nothing_of_a_missing_servo_can_pass_for_an_answer():
 def test_a_missing_servo_keeps_its_last_values_of_their_own_age():
     first = feedback_of([row(10, 1.0, torque=False, rearmed=True), row(20, 1.0), row(30, 1.0)])
     now = feedback_of([None, row(21, 2.0, rearmed=True), None])
-    kept = now.filled(first)
+    kept = now.fill_missing(first)
     assert kept.position_steps == (10, 21, 30)
     assert kept.at_s == (1.0, 2.0, 1.0)
     assert kept.torque == (False, True, True)
     # Rearmed is news of this exchange alone, and who is missing stays so.
     assert kept.rearmed == (False, True, False)
     assert kept.missing == (0, 2)
-    assert now.filled(kept) == kept
+    assert now.fill_missing(kept) == kept
 
 
 @pytest.fixture

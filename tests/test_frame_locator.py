@@ -149,7 +149,7 @@ def test_a_locator_and_what_it_locates_pass_between_processes() -> None:
 def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:
     found = offset_ids(located(picture(1, blobs=(BALL,))), 2)
     assert [blob.id for blob in found.blobs] == [2_000_003]
-    assert [thing.mark for thing in present(found.located).things] == [2_000_003]
+    assert [thing.detector_id for thing in present(found.located).things] == [2_000_003]
 
 
 class Frames(QuietCamera):

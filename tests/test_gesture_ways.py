@@ -6,7 +6,7 @@ import pytest
 from ticked_rig import Outbox, TickedRig, connected, gazerig
 
 from gazerig.config.load import ConfigError
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import RULES, load_rig
 from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
@@ -132,5 +132,5 @@ def test_a_visitor_who_waves_is_nodded_to() -> None:
 
 def test_a_rule_that_names_no_gesture_is_refused_with_those_there_are() -> None:
     with pytest.raises(ConfigError, match=r"rules\.wait\.gesture: no gesture 'nodd'.*nod"):
-        changed(load_rig("desk"), {"gaze.top_down.rules.wait.gesture": "nodd"})
+        apply_changes(load_rig("desk"), {"gaze.top_down.rules.wait.gesture": "nodd"})
     assert not [1 for rule in RULES for _ in rule(load_rig("desk"))]

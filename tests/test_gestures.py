@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.gestures import gestures_of, load_gesture, shipped_gestures
-from gazerig.config.load import ConfigError, shipped, shipped_names
+from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.gaze.gesture import minimum_jerk_curve
 from gazerig.gaze.gesture.gesture import POSE_TRACKS, Gesture, KeyFrame, keys_of
@@ -252,7 +252,7 @@ def test_paths_of_gestures_begin_at_the_rig_s_file_and_bare_names_stay(
         "description: x\nframes:\n  - {time_s: 0.5, head_yaw_deg: 5}\n", encoding="utf-8"
     )
     mine = tmp_path / "rigs" / "mine.yaml"
-    whole = shipped("rigs", "desk").read_text(encoding="utf-8")
+    whole = shipped_path("rigs", "desk").read_text(encoding="utf-8")
     mine.write_text(f"{whole}\ngesture_files: [hello.yaml]\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)  # not where the rig is
     rig = load_rig("rigs/mine.yaml")

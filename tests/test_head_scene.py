@@ -12,7 +12,7 @@ import trimesh
 from shown_page import SNAPSHOT
 from viser import transforms
 
-from gazerig.config.load import shipped
+from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import rig_kinematics
@@ -28,7 +28,7 @@ from gazerig.robot.description.parts import LOWER_LID, UPPER_LID
 from gazerig.robot.description.person_shape import hand, head, torso
 from gazerig.robot.model.types import JointState, Snapshot
 
-RIGS = sorted(path.stem for path in shipped("rigs", "desk").parent.glob("*.yaml"))
+RIGS = sorted(path.stem for path in shipped_path("rigs", "desk").parent.glob("*.yaml"))
 CANVASES = (1.6, 1280 / 720, 1.0, 0.9, 390 / 380)
 
 

@@ -130,7 +130,7 @@ def test_pictures_too_small_or_narrow_are_silent(shape: tuple[int, int]) -> None
     detector = MotionDetector(MotionParams())
     for k in range(3):
         assert look(detector, np.full(shape, 9 * k, dtype=np.uint8), k * DT_S) == ()
-    assert detector.report.silent == "frame too small"
+    assert detector.report.no_result_reason == "frame too small"
 
 
 @pytest.mark.parametrize("preset", ["ultrafast", "fast", "medium"])
@@ -142,7 +142,7 @@ def test_the_smallest_allowed_are_borne(
     detector = MotionDetector(MotionParams(preset=preset, finest_level=finest_level))
     for k in range(3):
         look(detector, GROUND[k : k + shape[0], : shape[1]], k * DT_S)
-    assert detector.report.silent != "frame too small"
+    assert detector.report.no_result_reason != "frame too small"
 
 
 def test_a_change_of_size_begins_anew() -> None:
@@ -150,7 +150,7 @@ def test_a_change_of_size_begins_anew() -> None:
     for k in range(3):
         look(detector, scene(k), k * DT_S)
     assert look(detector, scene(3)[:200], 3 * DT_S) == ()
-    assert detector.report.silent == "first frame"
+    assert detector.report.no_result_reason == "first frame"
     for k in range(4, 7):
         blobs = look(detector, scene(k)[:200], k * DT_S)
     assert len(blobs) == 1
@@ -178,7 +178,7 @@ def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]) -
     look(detector, scene(0), times[0])
     assert detector.before_s == times[0]
     assert look(detector, scene(1), times[1]) == ()
-    assert detector.report.silent == "no frame shortly before"
+    assert detector.report.no_result_reason == "no frame shortly before"
 
 
 def test_joints_without_a_number_count_as_unknown() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazerig.drivers.vision.motion.clustering import cluster_motion, inscribed_px
+from gazerig.drivers.vision.motion.clustering import cluster_motion, inscribed_radius_px
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import MotionMask
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
@@ -86,15 +86,15 @@ def test_who_keeps_moving_keeps_the_number_and_two_are_not_mixed_up() -> None:
     for k in range(1, 6):
         found = follow(tracks, k, (200 + 10 * k, 50), (50 + 10 * k, 50), v=(100, 0))
         assert [f.id for f in found] == first[::-1]
-        assert all(tracks.confirmed(f) for f in found)
+        assert all(tracks.is_confirmed(f) for f in found)
 
 
 def test_first_sight_is_not_told_yet_and_a_flicker_never() -> None:
     tracks = MotionTracks(MotionParams(confirm_frames=3))
     for k in range(6):
         found = follow(tracks, k, (50, 50), *(((200, 50),) if k % 2 == 0 else ()))
-        assert tracks.confirmed(found[0]) == (k >= 2)
-        assert not any(tracks.confirmed(f) for f in found[1:])
+        assert tracks.is_confirmed(found[0]) == (k >= 2)
+        assert not any(tracks.is_confirmed(f) for f in found[1:])
 
 
 @pytest.mark.parametrize(("gap", "same"), [(4, True), (8, False)])
@@ -119,17 +119,17 @@ def test_the_camera_s_turn_moves_what_is_expected() -> None:
 def test_the_largest_disc_within_a_patch_tells_how_thick_it_is() -> None:
     """An arm is as thick as it is wide, however long; small holes and the edge change nothing."""
     (arm,) = cluster_motion(things(((100, 50, 90, 24), (2, 0))), MotionParams())
-    assert inscribed_px(arm, SHAPE) == pytest.approx(12.0, abs=1.0)
+    assert inscribed_radius_px(arm, SHAPE) == pytest.approx(12.0, abs=1.0)
     holed = things(((100, 50, 90, 24), (2, 0)))
     holed.mask[60:62, 120:122] = False
-    assert inscribed_px(cluster_motion(holed, MotionParams())[0], SHAPE) == pytest.approx(
+    assert inscribed_radius_px(cluster_motion(holed, MotionParams())[0], SHAPE) == pytest.approx(
         12.0, abs=1.0
     )
     plain = things(((0, 50, 90, 24), (2, 0)))
     plain.mask[54:70, :3] = plain.mask[56:68, :70] = False
     (sleeve,) = cluster_motion(plain, MotionParams())
-    assert inscribed_px(sleeve, SHAPE) == pytest.approx(12.0, abs=1.0), "only its edges show"
+    assert inscribed_radius_px(sleeve, SHAPE) == pytest.approx(12.0, abs=1.0), "only its edges show"
     (cut,) = cluster_motion(things(((0, 50, 90, 24), (2, 0))), MotionParams())
-    assert inscribed_px(cut, SHAPE) == pytest.approx(12.0, abs=1.0)
+    assert inscribed_radius_px(cut, SHAPE) == pytest.approx(12.0, abs=1.0)
     (corner,) = cluster_motion(things(((0, 0, 40, 30), (2, 0))), MotionParams())
-    assert inscribed_px(corner, SHAPE) > 25.0, "it goes on beyond both edges"
+    assert inscribed_radius_px(corner, SHAPE) > 25.0, "it goes on beyond both edges"

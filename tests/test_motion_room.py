@@ -132,7 +132,7 @@ def watch(
                 now.T @ (before - now) @ LEVER_M if depth_known else None,
             )
         )
-        silent.append(detector.report.silent)
+        silent.append(detector.report.no_result_reason)
     return found, silent
 
 

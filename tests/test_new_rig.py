@@ -10,7 +10,7 @@ from command_line import figures as figures_of
 from command_line import invoked, typed
 from matplotlib.figure import Figure
 
-from gazerig.config.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, params_text
+from gazerig.config.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
 from gazerig.config.save import save_rig
 from gazerig.config.save_text import Value
 from gazerig.config.schema import load_rig
@@ -49,7 +49,7 @@ def test_every_board_with_every_mechanism_and_camera_is_good(board: str) -> None
     for mechanism, camera in itertools.product(MECHANISMS, CAMERAS):
         new = NewRig("mine", board, joints_of(mechanism), camera, 55.5)
         file = Path("mine.yaml")
-        file.write_text(params_text(new), "utf-8")
+        file.write_text(rig_text(new), "utf-8")
         rig = load_rig(str(file))
         assert set(rig.joints) == set(new.joints)
         assert rig.geometry.interocular_mm == 55.5
@@ -143,7 +143,7 @@ def test_what_cannot_be_is_one_clear_line_and_writes_nothing(
 
 @pytest.mark.parametrize("name", ["on", "12", "a: b", "my rig", "größe", "#x", 'say "hi"'])
 def test_a_name_that_yaml_might_misread_stays_a_name(name: str) -> None:
-    text = params_text(NewRig(name, "none", joints_of("eyes"), "none", port="COM3"))
+    text = rig_text(NewRig(name, "none", joints_of("eyes"), "none", port="COM3"))
     Path("a.yaml").write_text(text, "utf-8")
     rig = load_rig("a.yaml")
     assert rig.name == name and rig.bus.port == "COM3"

@@ -42,7 +42,7 @@ def vector_deg(R):
 
 
 def moved(turn: CameraTurn, before: CameraTurn):
-    found = turn.since(before)
+    found = turn.rotation_since(before)
     assert found is not None
     return vector_deg(found.T)
 
@@ -114,7 +114,7 @@ def test_gap_begins_another_epoch():
     fed([(t + 2.5, rates) for t, rates in at_rest(rng, 1.0)], gyro)
     second = gyro.orientation_at(3.4)
     assert first is not None and second is not None
-    assert second.epoch == first.epoch + 1 and second.since(first) is None
+    assert second.epoch == first.epoch + 1 and second.rotation_since(first) is None
     assert gyro.orientation_at(2.2) is None and gyro.events() == ()
 
 

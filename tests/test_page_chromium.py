@@ -27,7 +27,7 @@ from present import present
 from shown_page import wait_for
 
 from gazerig.config.allowed_folder import AllowedFolder
-from gazerig.config.load import shipped
+from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Ask, LookAt, Stop
 
@@ -322,7 +322,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     person.press("\r", "Enter", 13)
     wait_for(lambda: person.reads(f"saved in {file}", "all saved"), "the words")
     assert load_rig(str(file)).park_deg["neck_pitch"] == -3.0
-    before = shipped("rigs", "desk").read_text(encoding="utf-8")
+    before = shipped_path("rigs", "desk").read_text(encoding="utf-8")
     saved = file.read_text(encoding="utf-8")
     comments = [line for line in before.splitlines() if line.startswith("#")]
     assert comments and all(line in saved for line in comments)

@@ -11,9 +11,9 @@ from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.parameters import (
     NEXT_START,
     NEXT_TICK,
-    changed,
+    apply_changes,
     differences,
-    flattened,
+    flatten_changes,
     parameters,
     value_of,
     values,
@@ -102,13 +102,15 @@ def test_what_is_wrong_is_refused_in_the_words_of_a_file(
     changes: dict[str, object], words: str
 ) -> None:
     with pytest.raises(ConfigError) as refused:
-        changed(RIG, changes)  # type: ignore[arg-type]
+        apply_changes(RIG, changes)  # type: ignore[arg-type]
     assert words in str(refused.value)
 
 
 def test_all_faults_are_told_at_once() -> None:
     with pytest.raises(ConfigError) as refused:
-        changed(RIG, {"loop.rate_hz": 5.0, "guard.soft_start_ms": -1.0, "gaze.lids.close_ms": "x"})
+        apply_changes(
+            RIG, {"loop.rate_hz": 5.0, "guard.soft_start_ms": -1.0, "gaze.lids.close_ms": "x"}
+        )
     assert len(refused.value.faults) == 3
 
 
@@ -119,7 +121,7 @@ def test_the_words_are_those_of_the_loaded_file(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as loading:
         load_rig(str(file))
     with pytest.raises(ConfigError) as changing:
-        changed(RIG, {"loop.rate_hz": 5000.0})
+        apply_changes(RIG, {"loop.rate_hz": 5000.0})
     assert loading.value.faults[0].rule == changing.value.faults[0].rule
     assert loading.value.faults[0].key == changing.value.faults[0].key
 
@@ -128,13 +130,13 @@ def test_the_words_are_those_of_the_loaded_file(tmp_path: Path) -> None:
 def test_differences_turn_one_rig_into_the_other_and_back(name: str) -> None:
     other = load_rig("desk", name)
     found = differences(RIG, other)
-    assert found and changed(RIG, found) == other
-    assert changed(other, differences(other, RIG)) == RIG
+    assert found and apply_changes(RIG, found) == other
+    assert apply_changes(other, differences(other, RIG)) == RIG
 
 
 def test_entries_and_groups_come_and_go() -> None:
     rule: dict[str, Value] = {"look_at": "hand", "salience": 1.0}
-    other = changed(
+    other = apply_changes(
         RIG,
         {
             "gaze.top_down.rules.point": rule,
@@ -145,9 +147,9 @@ def test_entries_and_groups_come_and_go() -> None:
     )
     assert other.face_parts_mm == {"N": (1.0, 2.0, 3.0)}
     assert value_of(other, "gaze.top_down.rules.point.salience") == 1.0
-    assert changed(RIG, differences(RIG, other)) == other
-    assert changed(other, differences(other, RIG)) == RIG
-    flat = flattened(other, differences(RIG, other))
+    assert apply_changes(RIG, differences(RIG, other)) == other
+    assert apply_changes(other, differences(other, RIG)) == RIG
+    flat = flatten_changes(other, differences(RIG, other))
     assert flat["gaze.top_down.rules.point.look_at"] == "hand"
     assert flat["camera.lens.fx_px"] == 500.0
 
@@ -171,7 +173,7 @@ def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(data: st.DataO
         whole if parameter.kind == "whole" else st.floats(parameter.low, parameter.high)
     )
     try:
-        other = changed(RIG, {parameter.key: value})
+        other = apply_changes(RIG, {parameter.key: value})
     except ConfigError as refused:
         assert all(fault.rule for fault in refused.faults)
         return
@@ -181,7 +183,7 @@ def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(data: st.DataO
 
 def test_a_changed_rig_shares_what_did_not_change_and_leaves_the_old_one_alone() -> None:
     before = values(RIG)
-    other = changed(RIG, {"gaze.head.align": 0.61, "joints.neck_yaw.max_deg": 60.0})
+    other = apply_changes(RIG, {"gaze.head.align": 0.61, "joints.neck_yaw.max_deg": 60.0})
     assert values(RIG) == before
     assert other.gaze.lids is RIG.gaze.lids and other.guard is RIG.guard
     assert other.joints["neck_pitch"] is RIG.joints["neck_pitch"]
@@ -197,9 +199,9 @@ def test_only_what_changed_is_checked_anew(monkeypatch: pytest.MonkeyPatch) -> N
         once(joint)
 
     monkeypatch.setattr(JointParams, "__post_init__", counting)
-    changed(RIG, {"gaze.head.align": 0.61})
+    apply_changes(RIG, {"gaze.head.align": 0.61})
     assert not checked
-    changed(RIG, {"joints.neck_yaw.max_deg": 60.0})
+    apply_changes(RIG, {"joints.neck_yaw.max_deg": 60.0})
     assert len(checked) == 1
 
 
@@ -215,8 +217,8 @@ def test_only_what_changed_is_checked_anew(monkeypatch: pytest.MonkeyPatch) -> N
     ],
 )
 def test_changes_that_overlap_come_one_over_the_other(changes: dict[str, Value]) -> None:
-    made = changed(RIG, changes)
-    assert changed(RIG, differences(RIG, made)) == made != RIG
+    made = apply_changes(RIG, changes)
+    assert apply_changes(RIG, differences(RIG, made)) == made != RIG
     lens = made.camera.lens
     assert "camera.lens" not in changes or (lens is not None and lens.width_px == 640)
     assert all(isinstance(x, float) for x in made.face_parts_mm.get("N", ()))
@@ -235,7 +237,7 @@ def test_changes_that_overlap_come_one_over_the_other(changes: dict[str, Value])
     ],
 )
 def test_values_follow_changes_there_and_back(changes: dict[str, Value]) -> None:
-    made = changed(RIG, changes)
+    made = apply_changes(RIG, changes)
     there = values_after(values(RIG), RIG, made)
     assert there == values(made) and list(there) == list(values(made))
     back = values_after(there, made, RIG)

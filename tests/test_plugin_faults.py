@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from outside_package import install, on_path
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.drivers.bus.checked_bus import CheckedBus
 from gazerig.drivers.camera.camera_plugins import CheckedSource
@@ -173,7 +173,7 @@ def test_a_whole_rig_runs_on_without_a_rule_and_nan_reaches_no_joint(tmp_path, n
     """
     with on_path(tmp_path):
         install(tmp_path, "odd", {ATTENTION: {"odd": "odd_rule:Rule"}}, {"odd_rule": source})
-        rig = changed(load_rig("desk"), {"gaze.chooser": "odd"})
+        rig = apply_changes(load_rig("desk"), {"gaze.chooser": "odd"})
         made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         events: list[str] = []
         kinds: set[str] = set()
@@ -337,7 +337,7 @@ def test_a_detector_that_fails_is_replaced_by_ours(answer, reported):
 
 
 SERVOS = (ServoConfig(1, "m", 0, 1000, 500.0, "neck"), ServoConfig(2, "m", 0, 1000, 500.0, "jaw"))
-GOOD: Any = Feedback.of_none(2)._replace(
+GOOD: Any = Feedback.create_missing(2)._replace(
     position_steps=(500.0, 400.0), velocity_steps_s=(0.0, 0.0), load=(0.0, 0.0), at_s=(1.0, 1.0),
     torque=(True, True), missing=(),
 )  # fmt: skip
@@ -353,7 +353,7 @@ def checked(**methods):
     [
         (lambda now_s: None, "read returned a NoneType, wanted Feedback"),
         (lambda now_s: (1, 2, 3), "read returned a tuple, wanted Feedback"),
-        (lambda now_s: Feedback.of_none(1), "1 values of position_steps for 2 servos"),
+        (lambda now_s: Feedback.create_missing(1), "1 values of position_steps for 2 servos"),
         (lambda now_s: GOOD._replace(torque=(True,)), "1 values of torque for 2 servos"),
         (lambda now_s: GOOD._replace(load=7), "object of type 'int' has no len"),
         (lambda now_s: GOOD._replace(missing=(5,)), "missing [5] of 2 servos"),

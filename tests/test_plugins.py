@@ -14,7 +14,7 @@ from outside_package import install, on_path
 
 from gazerig.config.gestures import gestures_of
 from gazerig.config.load import ConfigError
-from gazerig.config.parameters import changed, parameters
+from gazerig.config.parameters import apply_changes, parameters
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers import plugins
 from gazerig.drivers.errors import PluginError
@@ -207,16 +207,16 @@ def test_a_rule_nobody_brings_is_refused_at_its_key_with_all_there_are(folder, t
 def test_a_rig_with_a_section_is_changed_listed_and_sent_to_other_processes(folder, tmp_path):
     install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
     rig: Any = load_rig(with_chooser(tmp_path, "tallest"))
-    other: Any = changed(rig, {"gaze.tallest.height_m": 2.5})
+    other: Any = apply_changes(rig, {"gaze.tallest.height_m": 2.5})
     assert other.gaze.tallest.height_m == 2.5 and type(other) is type(rig)
     with pytest.raises(ConfigError, match="9.0 is above 3"):
-        changed(rig, {"gaze.tallest.height_m": 9.0})
+        apply_changes(rig, {"gaze.tallest.height_m": 9.0})
     (found,) = [one for one in parameters(other, rig) if one.key == "gaze.tallest.height_m"]
     assert (found.unit, found.low, found.high, found.default) == ("m", 0.0, 3.0, 1.0)
     assert pickle.loads(pickle.dumps(other)) == other != rig
     assert type(load_rig("desk")) is Rig
     # From the plain rig to it and back, as a file that is edited does.
-    chosen: Any = changed(load_rig("desk"), {"gaze.chooser": "tallest"})
+    chosen: Any = apply_changes(load_rig("desk"), {"gaze.chooser": "tallest"})
     assert chosen.gaze.tallest.height_m == 1.0
 
 

@@ -8,7 +8,7 @@ from human.measured_run import MeasuredRun, half_rate_run
 from human.profile_trace import PAGE, PROFILES, as_told, claims, ran
 from human.row_03_rests import visits
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.options import RunOptions
 
@@ -101,7 +101,7 @@ def test_a_conversation_changes_the_rate_of_blinks_of_a_running_head(
         True, True, 0, "face-to-face", seconds=8.0, bus="ideal", conversation=conversation
     )
     simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
-    figures = simulate(changed(load_rig("desk"), rates), options).figures
+    figures = simulate(apply_changes(load_rig("desk"), rates), options).figures
     blinks = figures["blinks"]
     assert isinstance(blinks, int)
     assert blinks >= 3 if conversation else blinks == 0

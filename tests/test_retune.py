@@ -11,8 +11,8 @@ import pytest
 from desk import GAZE_JOINTS
 from retuned_run import DT_S, RIG, Judge, Running, fresh, inside, put, started
 
-from gazerig.config.load import ConfigError, shipped, shipped_names
-from gazerig.config.parameters import NEXT_START, changed, parameters, value_of
+from gazerig.config.load import ConfigError, shipped_names, shipped_path
+from gazerig.config.parameters import NEXT_START, apply_changes, parameters, value_of
 from gazerig.config.schema import Rig
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
@@ -81,7 +81,7 @@ COLLISION: dict[str, Value] = {
 @pytest.fixture
 def walk(tmp_path: Path) -> str:
     """Return a walk that begins elsewhere."""
-    text = shipped("scanpaths", shipped_names("scanpaths")[0]).read_text(encoding="utf-8")
+    text = shipped_path("scanpaths", shipped_names("scanpaths")[0]).read_text(encoding="utf-8")
     path = tmp_path / "walk.yaml"
     path.write_text(text.replace("start: FR", "start: N"), encoding="utf-8")
     return str(path)
@@ -169,7 +169,7 @@ def test_every_live_knob_has_an_effect_on_the_running_parts(
     made, in_force = fresh(RIG), RIG
     first = running_parameters(made, names)
     for knob in of_section(section):
-        base = changed(RIG, in_use(knob.key))
+        base = apply_changes(RIG, in_use(knob.key))
         other = acceptable(knob, base, dice, walk)
         if base != in_force:  # nearly every knob has the same one, which the last left in force
             put(made, base)
@@ -190,7 +190,7 @@ def test_parts_retuned_go_by_what_new_parts_would_go_by(
     for knob in of_section(section):
         for changes in some_changes(knob, other, dice, walk):
             try:
-                other = changed(other, changes)
+                other = apply_changes(other, changes)
                 break
             except ConfigError:
                 continue
@@ -222,7 +222,7 @@ def acceptable(knob: Parameter, base: Rig, dice: np.random.Generator, walk: str)
     """Return the rig with another value of a knob."""
     for changes in some_changes(knob, base, dice, walk):
         try:
-            other = changed(base, changes)
+            other = apply_changes(base, changes)
         except ConfigError:
             continue
         if value_of(other, knob.key) != value_of(base, knob.key):
@@ -378,10 +378,10 @@ def test_another_rate_goes_on_from_the_last_slot() -> None:
 def test_what_looks_at_pictures_is_retuned_too() -> None:
     made = assemble(RIG, RunOptions(True, True, 0, "visitor", pixels=True))
     camera = made.live_params.parts.camera
-    other = changed(RIG, {"detector.min_face_px": 60, "motion.max_blobs": 3})
+    other = apply_changes(RIG, {"detector.min_face_px": 60, "motion.max_blobs": 3})
     put(made, other)
     held = inside(vars(camera), "", {})
     assert 60 in [v for k, v in held.items() if k.endswith("_params.min_face_px")]
     assert 3 in [v for k, v in held.items() if k.endswith("_params.max_blobs")]
-    said = put(made, changed(other, {"detector.kind": "yunet"}))
+    said = put(made, apply_changes(other, {"detector.kind": "yunet"}))
     assert "the detector is unchanged" in said[-1]

@@ -12,7 +12,7 @@ from features_there import skip_without
 from mixed_rig import mixed_rig, mixed_text
 from typer.core import TyperGroup
 
-from gazerig.config.load import ConfigError, shipped, shipped_names
+from gazerig.config.load import ConfigError, shipped_names, shipped_path
 from gazerig.config.save_text import comment
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 from gazerig.drivers.bus.multi_bus import MultiBus
@@ -22,7 +22,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.command_list import PANELS
 from gazerig.robot.cli.main import app
 
-DESK = shipped("rigs", "desk")
+DESK = shipped_path("rigs", "desk")
 
 
 def broken(tmp_path: Path, *changes: tuple[str, str]) -> tuple[str, ...]:

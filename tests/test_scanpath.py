@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.config.load import load, shipped
+from gazerig.config.load import load, shipped_path
 from gazerig.gaze.scanpath.dwell import stationary
 from gazerig.gaze.scanpath.fit import FitParams, PartFixation, fit_walk
 from gazerig.gaze.scanpath.models import MarkovWalk
@@ -23,7 +23,7 @@ from gazerig.gaze.scanpath.scanpath import (
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
-WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
+WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
 PRINTED = ScanpathParams(
     min_dwell_ms=0.0, diagonal="refixation", start="as_walk", least_shift_deg=0.0
 )
@@ -370,7 +370,7 @@ def test_what_cannot_be_trusted_is_refused() -> None:
 
 # ---- the average observer, and one observer --------------------------------------------
 
-PEOPLE = load(shipped("scanpaths", "people"), Walk)
+PEOPLE = load(shipped_path("scanpaths", "people"), Walk)
 
 
 def visited(face: Face, params: ScanpathParams | None = None, seed: int = 1) -> dict[str, float]:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from gazerig.config.load import load, shipped
+from gazerig.config.load import load, shipped_path
 from gazerig.gaze.scanpath.dwell import dwell_distribution
 from gazerig.gaze.scanpath.scanpath import Walk
 
-WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
+WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
 TABLE_1 = list(zip(WALK.order, WALK.dwell_mean_s, WALK.dwell_sd_s, strict=True))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gazerig.config.load import load, shipped
+from gazerig.config.load import load, shipped_path
 from gazerig.gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
 from gazerig.gaze.angles import rotate_back as seen_from
 from gazerig.gaze.scanpath.scanpath import (
@@ -21,7 +21,7 @@ from gazerig.gaze.scanpath.scanpath import (
 )
 from gazerig.gaze.types import PARTS, Face, Percept, Target, Vec3
 
-WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
+WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
 HEAD: Vec3 = (0.02, -0.01, 0.25)
 FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -44,7 +44,7 @@ def test_eyes_at_rest_are_looked_at_in_every_eighth_frame(light: float) -> None:
     eyes, network = EyeLandmarkCache(), Network()
     for k in range(33):
         crops = [eye(seed=2 * k, light=light), eye(seed=2 * k + 1, light=light)]
-        assert eyes.read(crops, network) is not None
+        assert eyes.analyze(crops, network) is not None
     assert network.looks == 2 * (1 + 32 // 8)
 
 
@@ -53,11 +53,11 @@ def test_eyes_at_rest_are_looked_at_in_every_eighth_frame(light: float) -> None:
 def test_a_glance_and_a_blink_are_seen_in_their_first_frame(other: ImageArray, which: int) -> None:
     eyes, network = EyeLandmarkCache(), Network()
     for k in range(7):
-        eyes.read([eye(seed=2 * k), eye(seed=2 * k + 1)], network)
+        eyes.analyze([eye(seed=2 * k), eye(seed=2 * k + 1)], network)
     assert network.looks == 2
     changed = [eye(seed=20), eye(seed=21)]
     changed[which] = other
-    read = eyes.read(changed, network)
+    read = eyes.analyze(changed, network)
     assert network.looks == 4 and read is not None and read[which] is not None
 
 
@@ -65,7 +65,7 @@ def test_eyes_that_never_rest_are_looked_at_in_every_fourth_frame_and_unknown_be
     eyes, network, known = EyeLandmarkCache(), Network(), []
     for k in range(80):
         at = 32.0 + 8.0 * np.sin(2.0 * k)
-        known.append(eyes.read([eye(at, 2 * k), eye(at, 2 * k + 1)], network) is not None)
+        known.append(eyes.analyze([eye(at, 2 * k), eye(at, 2 * k + 1)], network) is not None)
     assert known[:2] == [True, True]
     assert 2 * 18 <= network.looks <= 2 * 22
     assert sum(known) <= 26  # now and then they look by chance as they did

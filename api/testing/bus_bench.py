@@ -41,7 +41,7 @@ def rows(feedback: Feedback) -> tuple[Row | None, ...]:
 
 def feedback_of(given: list[Row | None]) -> Feedback:
     """Return the feedback that consists of these rows."""
-    none = Feedback.of_none(1)
+    none = Feedback.create_missing(1)
     columns: Any = (column[0] for column in none[:-1])
     blank = Row(*columns)
     every: Any = zip(*[blank if row is None else row for row in given], strict=True)
@@ -49,7 +49,7 @@ def feedback_of(given: list[Row | None]) -> Feedback:
     return Feedback(*(*every, missing))
 
 
-def well(readings: Sequence[Row | None]) -> bool:
+def are_healthy(readings: Sequence[Row | None]) -> bool:
     """Return whether all servos have answered with their torque on."""
     return all(row is not None and row.torque for row in readings)
 
@@ -76,7 +76,7 @@ class Absence(NamedTuple):
 
     begin: str
     end: str
-    told: str
+    message_pattern: str
 
 
 class Fault(NamedTuple):
@@ -84,12 +84,12 @@ class Fault(NamedTuple):
 
     command: starts it; ``{id}`` is replaced by the servo's
     times: number of calls of the command, a third of a second apart
-    cause: the text of the bus for it, after the servo's or board's name
+    cause_text: the text of the bus for it, after the servo's or board's name
     board: name in messages of a board with the fault; "": the fault is one servo's
     """
 
     command: str
-    cause: str
+    cause_text: str
     times: int = 1
     board: str = ""
 
@@ -183,15 +183,15 @@ class BusBench:
         """Return whether a servo is a channel of a board."""
         return self.kinds[self.on[place]].board
 
-    def smart(self) -> list[int]:
+    def smart_indices(self) -> list[int]:
         """Return the indices of servos that answer for themselves."""
         return [place for place in self.on if not self.is_board(place)]
 
-    def starts(self) -> list[float]:
+    def start_shares(self) -> list[float]:
         """Return the initial positions, as shares."""
         return [SHARES[place % 4] for place in range(self.count)]
 
-    def away(self) -> tuple[float, ...]:
+    def away_shares(self) -> tuple[float, ...]:
         """Return goals away from the initial positions."""
         return AWAY[: self.count]
 
@@ -209,7 +209,7 @@ class BusBench:
             for s, at in zip(self.setups, steps, strict=True)
         ]
 
-    def seen(self, readings: Sequence[Row | None]) -> list[float]:
+    def measured_shares(self, readings: Sequence[Row | None]) -> list[float]:
         """Return the positions in readings, as shares."""
         return self.shares([None if r is None else r.position_steps for r in readings])
 
@@ -220,7 +220,7 @@ class BusBench:
         for one in [name] if name else self.buses:
             self.wires.command(text, one)
 
-    def strike(self, verb: str, place: int) -> None:
+    def apply_fault(self, verb: str, place: int) -> None:
         """Apply a fault to one servo; a brown-out of a board affects all its channels."""
         name = self.on[place]
         board = self.kinds[name].board and verb == "brown-out"
@@ -234,11 +234,11 @@ class BusBench:
             by_bus[name] = {one["id"]: one for one in servos}
         return [by_bus[self.on[p]][self.setups[p].id] for p in range(self.count)]
 
-    def truth(self) -> list[float]:
+    def true_shares(self) -> list[float]:
         """Return the true positions, as shares."""
         return self.shares([one.get("place", one.get("position")) for one in self.reports()])
 
-    def goals(self) -> list[int | None]:
+    def true_goals_steps(self) -> list[int | None]:
         """Return the true goals in steps, None for a servo without a goal."""
         found = [one.get("target", one.get("goal")) for one in self.reports()]
         return [goal or None for goal in found]
@@ -270,7 +270,7 @@ class BusBench:
                 return readings
             self.wait(TICK_S)
 
-    def until(
+    def run_until(
         self,
         bus: ServoBus,
         done: Callable[[tuple[Row | None, ...]], bool],
@@ -286,7 +286,7 @@ class BusBench:
             self.wait(TICK_S)
         raise AssertionError(f"not in {timeout_s} s: {readings}, {bus.faults()}, {bus.events()}")
 
-    def near(self, shares: Sequence[float], goals: Sequence[float]) -> bool:
+    def are_near(self, shares: Sequence[float], goals: Sequence[float]) -> bool:
         """Return whether all servos are near their goals."""
         return all(abs(x - goal) <= NEAR_SHARE for x, goal in zip(shares, goals, strict=True))
 

@@ -20,11 +20,11 @@ from gazerig.testing.bus_bench import (
     BusBench,
     BusUnderTest,
     InProcessBench,
+    are_healthy,
     create_in_process_bench,
     held_bus,
     present,
     rows,
-    well,
 )
 
 ANY = st.integers(-(2**40), 2**40) | st.floats(allow_nan=True, allow_infinity=True)
@@ -75,24 +75,24 @@ class BusSuite(BusBenches):
     def test_open_finds_all_and_nothing_moves(self, twin):
         twin.pulses_on()
         bus = twin.bus()
-        before = twin.truth()
+        before = twin.true_shares()
         bus.open()
         readings = rows(bus.read(twin.now_s()))
-        assert twin.near(twin.seen(readings), twin.starts())
+        assert twin.are_near(twin.measured_shares(readings), twin.start_shares())
         # A Maestro that already sends pulses continues; no other servo holds its position.
         assert [present(r).torque for r in readings] == [
             twin.is_board(p) for p in range(twin.count)
         ]
-        bus.write(twin.steps(twin.away()))
-        twin.run(bus, 0.1, twin.away())
-        assert twin.near(twin.truth(), before)
+        bus.write(twin.steps(twin.away_shares()))
+        twin.run(bus, 0.1, twin.away_shares())
+        assert twin.are_near(twin.true_shares(), before)
         bus.close()
 
     def test_readings_are_fresh_in_order_and_say_whether_they_are_measured(self, here, held_here):
         here.run(held_here, 0.05)
         before_s = here.now_s()
         readings = rows(held_here.read(before_s))
-        assert here.near(here.seen(readings), here.starts())
+        assert here.are_near(here.measured_shares(readings), here.start_shares())
         assert all(before_s <= present(r).at_s <= here.now_s() for r in readings)
         assert [present(r).measured for r in readings] == [
             not here.is_board(p) for p in range(here.count)
@@ -103,13 +103,13 @@ class BusSuite(BusBenches):
         here.pulses_on()
         bus = here.bus()
         bus.open()
-        before = here.truth()
+        before = here.true_shares()
         goals = bus.enable_torque()
-        assert here.near(here.shares(goals), before)
+        assert here.are_near(here.shares(goals), before)
         for _ in range(10):
             readings = here.run(bus, 0.02)
-            assert here.near(here.truth(), before)
-        assert well(readings)
+            assert here.are_near(here.true_shares(), before)
+        assert are_healthy(readings)
         assert here.holding() == [True] * here.count
         bus.disable_torque()
         bus.close()
@@ -117,12 +117,12 @@ class BusSuite(BusBenches):
     def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(self, here):
         bus = here.bus()
         bus.open()
-        before = here.truth()
+        before = here.true_shares()
         bus.enable_torque()
         hobby = [here.is_board(p) for p in range(here.count)]
         wanted = [0.5 if one else at for one, at in zip(hobby, before, strict=True)]
         here.run(bus, 0.3, wanted)
-        assert here.near(here.truth(), wanted)
+        assert here.are_near(here.true_shares(), wanted)
         told = bus.events()
         limp = [
             line for line in told if "had no pulses: they move to their goals immediately" in line
@@ -134,27 +134,34 @@ class BusSuite(BusBenches):
         bus.close()
 
     def test_goals_are_followed_and_told(self, twin, held):
-        readings = twin.until(
-            held, lambda r: twin.near(twin.seen(r), twin.away()), twin.away(), timeout_s=5.0
+        readings = twin.run_until(
+            held,
+            lambda r: twin.are_near(twin.measured_shares(r), twin.away_shares()),
+            twin.away_shares(),
+            timeout_s=5.0,
         )
-        twin.run(held, 0.3, twin.away())
-        assert twin.near(twin.truth(), twin.away())
-        assert well(readings)
+        twin.run(held, 0.3, twin.away_shares())
+        assert twin.are_near(twin.true_shares(), twin.away_shares())
+        assert are_healthy(readings)
 
     def test_goals_are_clipped_to_the_limits(self, here, held_here):
         ends = [(-40.0, 60.0, -1e-3, 1.001)[place % 4] for place in range(here.count)]
         inside = [min(1.0, max(0.0, end)) for end in ends]
-        here.until(held_here, lambda r: here.near(here.seen(r), inside), ends, timeout_s=5.0)
+        here.run_until(
+            held_here, lambda r: here.are_near(here.measured_shares(r), inside), ends, timeout_s=5.0
+        )
         here.run(held_here, 0.3, ends)
-        assert here.near(here.truth(), inside)
-        for place, (goal, wanted) in enumerate(zip(here.goals(), here.steps(inside), strict=True)):
+        assert here.are_near(here.true_shares(), inside)
+        for place, (goal, wanted) in enumerate(
+            zip(here.true_goals_steps(), here.steps(inside), strict=True)
+        ):
             assert abs(goal - wanted) <= here.kinds[here.on[place]].grain_steps
 
     def test_what_is_no_number_is_refused_and_nothing_is_sent(self, here, held_here):
-        here.run(held_here, 0.05, here.starts())
+        here.run(held_here, 0.05, here.start_shares())
         before = held_here.health().tx_bytes
         for place in range(here.count):
-            goals = here.steps(here.away())
+            goals = here.steps(here.away_shares())
             goals[place] = nan
             with pytest.raises(ValueError, match="not a number"):
                 held_here.write(goals)
@@ -163,16 +170,16 @@ class BusSuite(BusBenches):
                 held_here.write(wrong)
         assert held_here.health().tx_bytes == before
         here.run(held_here, 0.2)
-        assert here.near(here.truth(), here.starts())
+        assert here.are_near(here.true_shares(), here.start_shares())
 
     def test_release_takes_the_torque_of_all_and_is_confirmed(self, twin, held):
         twin.run(held, 0.05)
         assert all(twin.holding())
         held.disable_torque()
         assert twin.holding() == [False] * twin.count
-        readings = twin.run(held, 0.1, twin.away())
+        readings = twin.run(held, 0.1, twin.away_shares())
         assert not any(r.torque for r in readings)
-        assert twin.near(twin.truth(), twin.starts())
+        assert twin.are_near(twin.true_shares(), twin.start_shares())
         assert "refused" not in held.health().errors
         # A busy machine may delay the emulator, which is not a fault of the bus.
         assert [
@@ -185,14 +192,16 @@ class BusSuite(BusBenches):
             here.pulses_on()
             bus.open()
             bus.enable_torque()
-            assert here.near(here.seen(rows(bus.read(here.now_s()))), here.starts())
+            assert here.are_near(
+                here.measured_shares(rows(bus.read(here.now_s()))), here.start_shares()
+            )
             bus.disable_torque()
             bus.close()
             bus.close()
 
     def test_bytes_are_counted_and_no_errors(self, here, held_here):
         before = held_here.health()
-        here.run(held_here, 0.1, here.starts())
+        here.run(held_here, 0.1, here.start_shares())
         after = held_here.health()
         assert after.tx_bytes > before.tx_bytes > 0
         assert after.rx_bytes > before.rx_bytes > 0
@@ -211,14 +220,14 @@ class BusSuite(BusBenches):
             for s, at in zip(here.setups, here.steps([0.5] * here.count), strict=True)
         ]
         bus.retune(narrow)
-        here.run(bus, 1.5, here.away())
-        assert here.near(here.truth(), here.away())
+        here.run(bus, 1.5, here.away_shares())
+        assert here.are_near(here.true_shares(), here.away_shares())
         bus.disable_torque()
         goals = bus.enable_torque()
         for setup, goal in zip(narrow, goals, strict=True):
             assert setup.min_steps <= goal <= setup.max_steps
-        here.run(bus, 1.0, here.away())
-        for setup, goal in zip(narrow, here.goals(), strict=True):
+        here.run(bus, 1.0, here.away_shares())
+        for setup, goal in zip(narrow, here.true_goals_steps(), strict=True):
             assert setup.min_steps <= goal <= setup.max_steps
         with pytest.raises(ValueError, match="other servos need another bus"):
             bus.retune([s._replace(id=s.id + 1) for s in narrow])
@@ -237,8 +246,8 @@ class BusSuite(BusBenches):
         middle = [(setup.min_steps + setup.max_steps) // 2 for setup in twin.setups]
         bus.write([steps + 0.4 for steps in middle])
         twin.wait(0.02)
-        for place in twin.smart():
-            assert twin.goals()[place] == middle[place]
+        for place in twin.smart_indices():
+            assert twin.true_goals_steps()[place] == middle[place]
 
     @settings(
         max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -263,8 +272,8 @@ class BusSuite(BusBenches):
             except ValueError:
                 assert any(goal != goal for goal in goals)
                 assert len(inside.sent) == before
-            for setup, goal in zip(twin.setups, twin.goals(), strict=True):
+            for setup, goal in zip(twin.setups, twin.true_goals_steps(), strict=True):
                 assert goal is None or setup.min_steps <= goal <= setup.max_steps
             twin.wait(0.02)
         # No servo goes beyond, except by its own inertia.
-        assert all(-0.02 <= share <= 1.02 for share in twin.truth())
+        assert all(-0.02 <= share <= 1.02 for share in twin.true_shares())

@@ -52,13 +52,13 @@ class Case(NamedTuple):
         return "; ".join(self.begins)
 
 
-def lasting(*texts: str) -> list[Case]:
+def lasting_cases(*texts: str) -> list[Case]:
     """Return faults that each last until they are cleared."""
     return [Case((text,)) for text in texts]
 
 
 LINE = [
-    *lasting(
+    *lasting_cases(
         "lose {i}", "lose all", "delay {i} 5", "delay {i} 60", "delay all 3",
         "delay all 30 count 12", "delay all 300 count 3", "truncate {i} 0", "truncate {i} 1",
         "truncate all 1", "duplicate {i}", "duplicate all", "corrupt {i}", "corrupt {i} 20",
@@ -89,13 +89,13 @@ class FaultOutcome(NamedTuple):
         each is named with its cause; any other text is an error
     after_s: time from the end of the fault until then
     longest_s: the longest read
-    said: messages about it
+    messages: messages about it
     """
 
     end: str
     after_s: float
     longest_s: float
-    said: tuple[str, ...]
+    messages: tuple[str, ...]
 
     @property
     def survived(self) -> bool:
@@ -292,7 +292,7 @@ class Machine:
 
     # --- faults
 
-    def strike(
+    def apply_fault(
         self, bus: str, i: int, j: int, case: Case, struck_s: float = STRUCK_S
     ) -> FaultOutcome:
         """Apply a fault to a bus for a while; return how it ends.

@@ -106,7 +106,7 @@ class CheckedBus:
             names = ", ".join(self._setups[i].label() for i in sorted(wrong))
             text = f"{self._label}: no finite position, speed, load or time of {names}: taken as missing"
             self._seldom.add(text, now_s, "not finite")
-            empty = Feedback.of_none(self._count)
+            empty = Feedback.create_missing(self._count)
             columns = [
                 tuple([none[i] if i in wrong else column[i] for i in range(self._count)])
                 for column, none in zip(feedback[:_COLUMNS], empty[:_COLUMNS], strict=True)

@@ -75,7 +75,7 @@ class MultiBus:
         order = sorted(range(len(given)), key=given.__getitem__)
         # None if the buses' servos are already in the order of the rig.
         self._pick: Any = itemgetter(*order) if order != sorted(order) else None
-        self._nothing = [Feedback.of_none(len(share.servo_indices)) for share in shares]
+        self._nothing = [Feedback.create_missing(len(share.servo_indices)) for share in shares]
 
     def open(self) -> None:
         """Open every bus; if one cannot be opened, close those opened before it.

@@ -154,7 +154,7 @@ class FrameAnalyzer:
         )
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)
-        return found.located_by(self._locate)
+        return found.locate_in_camera(self._locate)
 
     def events(self) -> tuple[str, ...]:
         """Return events of detector and calibration since the last call, one line each."""

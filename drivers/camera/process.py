@@ -389,7 +389,9 @@ def offset_ids(found: Detections, starts: int) -> Detections:
     located, first = found.located, starts * _BLOB_IDS
     if located is not None:
         things = [
-            thing if thing.mark is None else thing._replace(mark=first + thing.mark)
+            thing
+            if thing.detector_id is None
+            else thing._replace(detector_id=first + thing.detector_id)
             for thing in located.things
         ]
         located = located._replace(things=tuple(things))

@@ -63,7 +63,7 @@ class BoardTiming(NamedTuple):
     """Times and rates of a board.
 
     baud: baud rate of its port, bit/s
-    watch_s: period of its status requests
+    status_period_s: period of its status requests
     stagger_s: time between the first pulses of two servos
     give_up_s: longest silence or loss
     longest_ramp_s: longest time for which the driver's ramps advance while nothing is sent; inf if
@@ -71,7 +71,7 @@ class BoardTiming(NamedTuple):
     """
 
     baud: int
-    watch_s: float
+    status_period_s: float
     stagger_s: float
     give_up_s: float
     longest_ramp_s: float

@@ -55,7 +55,7 @@ class HobbyBoardBus(PortBus):
         if len(set(self._ids)) < len(self._ids):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
-        self._nothing = Feedback.of_none(len(self._ids))
+        self._nothing = Feedback.create_missing(len(self._ids))
         self._loads, self._unmeasured = (0.0,) * len(self._ids), (False,) * len(self._ids)
         self._apply_limits()
         self._reported = False
@@ -234,7 +234,10 @@ class HobbyBoardBus(PortBus):
 
     def _check_board(self, now_s: float) -> bool:
         """Read the board's status if it is due; return whether the board is known to be alive."""
-        if self._supervisor.may_send_goals and now_s - self._heard_s < self._board.timing.watch_s:
+        if (
+            self._supervisor.may_send_goals
+            and now_s - self._heard_s < self._board.timing.status_period_s
+        ):
             self._supervisor.advance(self._port.now_s())
             self._supervisor.advance_pulses()
             return True

@@ -71,7 +71,7 @@ class SmartServoBus(PortBus):
         self._lowest = tuple(setup.min_steps for setup in setups)
         self._highest = tuple(setup.max_steps for setup in setups)
         self._goals = family.create_goal_packets(self._ids)
-        self._nothing = Feedback.of_none(len(self._ids))
+        self._nothing = Feedback.create_missing(len(self._ids))
         self._log = EventLog()
         self._line = Transactions(
             port,

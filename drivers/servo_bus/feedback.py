@@ -68,7 +68,7 @@ class FeedbackColumns:
         self._signs = [1 << family.sign_bits[name] for name in _SIGNED if family.sign_bits]
         self._engaged = False
         self.places = Plausibility([model.no_load_steps_s for model in models])
-        self._none = self.now = Feedback.of_none(len(setups))
+        self._none = self.now = Feedback.create_missing(len(setups))
         self._tenth_volts: tuple[int, ...] = ()
         self.set_limits(setups)
 

@@ -38,7 +38,7 @@ _LEAST_PX = 3.0
 _MISSED_S = 0.15
 
 
-def _shares(middles: NDArray[np.float64], sd: float) -> Floats:
+def _bin_shares(middles: NDArray[np.float64], sd: float) -> Floats:
     """Return (256, bins): share of each value in each bin, with a sum of 1."""
     near = np.exp(-0.5 * ((np.arange(256.0)[:, None] - middles) / sd) ** 2)
     return np.asarray(near / near.sum(axis=1, keepdims=True), np.float32)
@@ -46,8 +46,8 @@ def _shares(middles: NDArray[np.float64], sd: float) -> Floats:
 
 # Bins of lightness, wide because people walk from light to shade, and of a* and b*, whose values
 # for clothes are near that of grey.
-_OF_LIGHT = _shares(np.linspace(0.0, 255.0, 8), 36.0)
-_OF_CHROMA = _shares(128.0 + np.array([-30.0, -10.0, 10.0, 30.0]), 10.0)
+_OF_LIGHT = _bin_shares(np.linspace(0.0, 255.0, 8), 36.0)
+_OF_CHROMA = _bin_shares(128.0 + np.array([-30.0, -10.0, 10.0, 30.0]), 10.0)
 
 
 class _Head(NamedTuple):
@@ -72,7 +72,7 @@ class ClothingReader:
         people: tuple[DetectedPerson, ...] = (),
     ) -> tuple[tuple[DetectedFace, ...], tuple[DetectedPerson, ...]]:
         """Return faces and people with the colours of their clothes, if visible."""
-        of_faces = [_of_face(one) for one in faces]
+        of_faces = [_face_head(one) for one in faces]
         now = [(captured_s, head) for head in of_faces if head is not None]
         self._before = now + [
             (t_s, head)
@@ -82,7 +82,7 @@ class ClothingReader:
         ]
         if not (faces or people) or image.ndim != 3 or image.size == 0:
             return faces, people
-        heads = [*of_faces, *[_of_person(one) for one in people]]
+        heads = [*of_faces, *[_person_head(one) for one in people]]
         found = clothing_colours(image, heads, [head for _, head in self._before])
         return (
             tuple([replace(one, clothing=of) for one, of in zip(faces, found, strict=False)]),
@@ -167,7 +167,7 @@ def _covered_mask(
     return np.asarray(head | ((below > _HEAD_HALF_M)[:, None] & (aside < _BODY_HALF_M)))
 
 
-def _of_face(face: DetectedFace) -> _Head | None:
+def _face_head(face: DetectedFace) -> _Head | None:
     """Return the position and scale of a face; turning away shortens one of its lengths."""
     points: list[list[float]] = face.landmarks_px.tolist()
     if len(points) != 5:
@@ -178,7 +178,7 @@ def _of_face(face: DetectedFace) -> _Head | None:
     return _Head(x, y, px_m) if 0.0 < px_m < 1e6 and abs(x) + abs(y) < 1e6 else None
 
 
-def _of_person(person: DetectedPerson) -> _Head | None:
+def _person_head(person: DetectedPerson) -> _Head | None:
     """Return the position and scale of a person's head."""
     (x, y), px_m = person.head_px, person.trunk_px / _TRUNK_M
     return _Head(x, y + _NOSE_BELOW_M * px_m, px_m) if px_m > 0.0 else None

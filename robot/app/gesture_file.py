@@ -15,7 +15,7 @@ import numpy as np
 
 from gazerig.config.gestures import gesture_name, load_gesture
 from gazerig.config.rig import Rig
-from gazerig.config.save_text import written
+from gazerig.config.save_text import format_value
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_input import read_limited
 from gazerig.drivers.files.file_output import write_file
@@ -81,7 +81,7 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
     for track, found in keys.items():
         for time_s, value in found:
             frames.setdefault(time_s, {})[track] = value
-    lines = [f"description: {written(description)}", "space: joint", "fit: slow", "frames:"]
+    lines = [f"description: {format_value(description)}", "space: joint", "fit: slow", "frames:"]
     lines += [f"  - {{{', '.join(_frame_lines(t, frames[t]))}}}" for t in sorted(frames)]
     return "\n".join(lines) + "\n"
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.parameters import changed, differences, start_note
+from gazerig.config.parameters import apply_changes, differences, start_note
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_walk
 from gazerig.drivers.types import Camera
@@ -163,7 +163,9 @@ class LiveParams:
         ready = self._ready.pop(id(command.changes), None)
         if ready is None or ready.changes is not command.changes or ready.base is not self.rig:
             try:
-                ready = _prepare_change(command, self.rig, changed(self.rig, dict(command.changes)))
+                ready = _prepare_change(
+                    command, self.rig, apply_changes(self.rig, dict(command.changes))
+                )
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         before, self.rig = self.rig, ready.rig

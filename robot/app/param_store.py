@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 from gazerig.config.parameters import (
-    changed,
+    apply_changes,
     differences,
-    flattened,
+    flatten_changes,
     start_note,
     value_of,
     values,
@@ -38,7 +38,7 @@ from gazerig.config.rig_files import (
     save_over,
 )
 from gazerig.config.save import rig_file
-from gazerig.config.save_text import EditRefused, written
+from gazerig.config.save_text import EditRefused, format_value
 from gazerig.config.schema import load_rig
 from gazerig.config.subprocess_call import in_subprocess
 from gazerig.robot.app.live_params import LiveParams
@@ -168,7 +168,7 @@ class ParamStore:
             gazerig.config.load.ConfigError: with every fault; nothing changes.
         """
         with self._changing:
-            return self._apply(self._state, changed(self._state.rig, changes))
+            return self._apply(self._state, apply_changes(self._state.rig, changes))
 
     def unsaved(self) -> tuple[ParamChange, ...]:
         """Return the present values that differ from the files."""
@@ -198,12 +198,12 @@ class ParamStore:
             copied = path is not None and os.path.realpath(path) != os.path.realpath(self.path)
             if copied:
                 refuse_copy(str(path))  # checked before another process is started
-            if self._state.files.changed():
+            if self._state.files.has_changed():
                 # A valid edit that is not applied yet counts; one with faults does not.
                 with contextlib.suppress(ConfigError):
                     self._reload()
             state = self._state
-            wanted = flattened(state.rig, differences(state.saved, state.rig))
+            wanted = flatten_changes(state.rig, differences(state.saved, state.rig))
             # These do not fit in a single line.
             faults = [
                 ConfigFault(
@@ -214,7 +214,7 @@ class ParamStore:
             ]
             if faults:
                 raise ConfigError(faults)
-            layers, good = self._layers(state), state.files.own
+            layers, good = self._layers(state), state.files.own_text
             target = rig_file(state.name)
             if copied:
                 done = self._elsewhere(save_copy, layers, good, str(path), wanted, self._now())
@@ -246,7 +246,7 @@ class ParamStore:
             state = self._state
             wanted = None if name in (NO_CHARACTER, "") else name
             state = self._read(state._replace(character=wanted))
-            rig = changed(state.saved, differences(self._state.saved, self._state.rig))
+            rig = apply_changes(state.saved, differences(self._state.saved, self._state.rig))
             return self._apply(state, rig)
 
     def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
@@ -271,7 +271,7 @@ class ParamStore:
                 for other in edited
             )
         }
-        return self._apply(state, changed(state.saved, kept))
+        return self._apply(state, apply_changes(state.saved, kept))
 
     def _layers(self, state: _RigState) -> RigLayers:
         return RigLayers(state.name, state.character, self._profile)
@@ -279,7 +279,7 @@ class ParamStore:
     def _read(self, state: _RigState) -> _RigState:
         """Read the files, with the options over them; the present rig stays."""
         rig, files = self._elsewhere(read_all, self._layers(state))
-        saved = changed(rig, self._options)
+        saved = apply_changes(rig, self._options)
         return state._replace(saved=saved, file_values=values(saved), files=files)
 
     def _apply(self, state: _RigState, rig: Rig) -> tuple[str, ...]:
@@ -305,7 +305,7 @@ def _defaults(rig: Rig) -> Rig:
 
 def _changes(before: Rig, after: Rig, was: Mapping[str, Value]) -> tuple[ParamChange, ...]:
     """Return each value that differs, as YAML; was: the former values."""
-    found = flattened(after, differences(before, after))
+    found = flatten_changes(after, differences(before, after))
     return tuple(
         ParamChange(key, _text(was[key]) if key in was else None, _text(value))
         for key, value in found.items()
@@ -319,6 +319,6 @@ def _text(value: Value) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_text, value))}]"
     try:
-        return written(value)
+        return format_value(value)
     except EditRefused:
         return str(value)

@@ -12,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from gazerig.config.load import ConfigError, load, shipped
+from gazerig.config.load import ConfigError, load, shipped_path
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import gesture_files, params_text
 from gazerig.config.schema import load_rig
@@ -290,7 +290,7 @@ def _resimulation_rig(
     found = base
     if character is not None:
         by_path = "/" in character or character.endswith((".yaml", ".yml"))
-        file = Path(character) if by_path else shipped("characters", character)
+        file = Path(character) if by_path else shipped_path("characters", character)
         found = load(file, Rig, defaults=(whole,))
     if rig is None and recording.info.gestures_yaml:
         # The files of gestures may have changed since, too.

@@ -3,7 +3,7 @@
 from functools import lru_cache
 from pathlib import Path
 
-from gazerig.config.load import load, shipped
+from gazerig.config.load import load, shipped_path
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.sim_mock.scenes.faces_scene import FacesScene, faults
@@ -51,7 +51,7 @@ def script_file(
     Raises:
         gazerig.config.load.ConfigError: none of that name is shipped.
     """
-    path = Path(name_or_path) if is_path(name_or_path) else shipped(kind, name_or_path, home)
+    path = Path(name_or_path) if is_path(name_or_path) else shipped_path(kind, name_or_path, home)
     try:
         facts = path.stat()
     except OSError:

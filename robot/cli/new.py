@@ -16,7 +16,7 @@ from gazerig.config.new_rig import (
     MECHANISMS,
     NewRig,
     joints_of,
-    params_text,
+    rig_text,
     usual_port,
 )
 from gazerig.drivers.errors import SetupError
@@ -76,7 +76,7 @@ def new(
         )
         from gazerig.robot.cli.rig_check import checked_line
 
-        write_file(file, params_text(rig), force)
+        write_file(file, rig_text(rig), force)
         try:
             say(checked_line(str(file)))
         except ConfigError:  # a faulty one is not left there

@@ -68,7 +68,7 @@ class Body:
         self._set_up = tuple(joints[name] for name in self.names)
         self._set_joints(self._set_up)
         # Before the first answer: the centre, infinitely old.
-        self._nothing = Feedback.of_none(len(self.names))
+        self._nothing = Feedback.create_missing(len(self.names))
         self._last = self._nothing._replace(
             position_steps=tuple(self._steps((0.0,) * len(self.names))),
             velocity_steps_s=(0.0,) * len(self.names),
@@ -137,7 +137,7 @@ class Body:
                 raise
             feedback = self._nothing
         if feedback.missing:
-            feedback = feedback.filled(self._last)
+            feedback = feedback.fill_missing(self._last)
         self._last = feedback
         if self._coupled is not None:
             feedback = self._coupled.share_feedback(feedback, self._torque_off)

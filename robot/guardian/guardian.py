@@ -231,7 +231,7 @@ class GuardedBus:
     def __init__(self, bus: ServoBus, count: int, guardian: Guardian, plan: int) -> None:
         self._bus, self._guardian, self._plan = bus, guardian, plan
         self._beat = guardian.beat
-        self._silent = Feedback.of_none(count)
+        self._silent = Feedback.create_missing(count)
         self._holding = self._lost_hold = False
         self._retry_s = 0.0
         self._rearmed: set[int] = set()

@@ -58,7 +58,7 @@ class MotionSource:
         before_s = self._detector.before_s
         if before_s is None:
             return None
-        if shot.turn is not None and (by_gyro := shot.turn.since(before)) is not None:
+        if shot.turn is not None and (by_gyro := shot.turn.rotation_since(before)) is not None:
             return by_gyro
         return (
             None if self._turns is None else self._turns.rotation_between(shot.captured_s, before_s)

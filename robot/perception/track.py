@@ -317,7 +317,7 @@ def place_in_world(
         found.across_sd_m_s,
         found.along_sd_m_s,
         found.size_depth,
-        found.mark,
+        found.detector_id,
         found.turn_sd_rad,
         None if gaze is None else rotate(R_world_camera, gaze),
         None if fastest is None else add(p_world_m, rotate(R_world_camera, fastest)),

@@ -122,7 +122,7 @@ class SceneCamera:
             found = Detections(
                 now_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
             )
-            self._on_the_way.append(found.located_by(self._locate))
+            self._on_the_way.append(found.locate_in_camera(self._locate))
             self._due_s = self._start_s + self._number / self._params.rate_hz - 1e-9
             self._arrives_s = self._arrival_s()
         while now_s >= self._arrives_s:

@@ -157,7 +157,7 @@ class PixelCamera:
                 now_s, self._number, image.shape[1], image.shape[0], faces, blobs, image=image,
                 depth_m=depth,
             )  # fmt: skip
-            self._on_the_way.append(found.located_by(self._locate))
+            self._on_the_way.append(found.locate_in_camera(self._locate))
         self._before = now_s, R, p
         late_s = self._params.latency_ms / 1e3
         while self._on_the_way and now_s >= self._on_the_way[0].captured_s + late_s - 1e-9:

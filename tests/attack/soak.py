@@ -212,7 +212,7 @@ def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> 
                 watch.where = f"{kind} {seed} {nth}: {case.name} ({machine.names[i]})"
                 machine.noisy = "static" in case.name
                 machine.room_rad = NOISE_ROOM_RAD.get(kind, ROOM_RAD) if machine.noisy else ROOM_RAD
-                outcome = machine.strike(bus, i, j, case, dice.uniform(0.05, 2.0))
+                outcome = machine.apply_fault(bus, i, j, case, dice.uniform(0.05, 2.0))
                 faults += len(case.begins)
                 ends[outcome.end if outcome.survived else "unnamed"] += 1
                 if not outcome.survived:

@@ -63,7 +63,7 @@ def of_kind(kind: str, rates: list[float]) -> list[dict[str, object]]:
             machine.volts = struck.VOLTS[kind]
             try:
                 machine.start()
-                outcome = machine.strike(*pair_of(rig, kind), case)
+                outcome = machine.apply_fault(*pair_of(rig, kind), case)
             except (AssertionError, DriverError) as error:
                 ends["broken"] += 1
                 out.print(f"{kind}, {rate_hz:g} Hz, {case.name}: {error}")

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.vision.motion.clustering import cluster_motion
-from gazerig.drivers.vision.motion.detector import MotionDetector, at_level
+from gazerig.drivers.vision.motion.detector import MotionDetector, scale_to_level
 from gazerig.drivers.vision.motion.ego_motion import estimate_ego_motion, predicted_ego_motion
 from gazerig.drivers.vision.motion.image import scale_down
 from gazerig.drivers.vision.motion.optical_flow import (
     FlowSearch,
-    align,
+    align_images,
+    changed_windows,
     turn_homography,
-    windows_of,
 )
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import image_difference, segment_motion
@@ -66,17 +66,19 @@ def measured(width: int, height: int, turn_rad: float, people: int) -> dict[str,
         now = timed(times, "small and grey", scale_down, *given)
         if before is not None:
             H = turn_homography(R, now, before)
-            pair, still = align(now, before, H), None
+            pair, still = align_images(now, before, H), None
             ego = None
             if not turn_rad:
                 still = timed(times, "unlike", image_difference, pair)
-                ego = timed(times, "stands", predicted_ego_motion, pair, still.changed)
+                ego = timed(times, "stands", predicted_ego_motion, pair, still.changed_mask)
             if ego is not None and still is not None:
-                pair = timed(times, "flow", search.search, pair, windows_of(still.changed))
+                pair = timed(
+                    times, "flow", search.search, pair, changed_windows(still.changed_mask)
+                )
             else:
                 still, pair = None, timed(times, "flow", search.search, pair)
                 ego = timed(times, "own motion", estimate_ego_motion, pair, now.K, True)
-            given_level = at_level(params, now)
+            given_level = scale_to_level(params, now)
             things = timed(
                 times, "what moves", segment_motion, pair, ego, given_level, False, still
             )

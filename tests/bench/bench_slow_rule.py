@@ -20,7 +20,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from outside_package import install, on_path
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.drivers.plugins import ATTENTION
 from gazerig.robot.app.assemble import assemble
@@ -43,7 +43,7 @@ def lateness_s(rule: str, seconds: float) -> tuple[list[float], int, list[str]]:
     """Return how late each tick began, how many slots were missed, and what was said."""
     rig = load_rig("desk")
     if rule:
-        rig = changed(rig, {"gaze.chooser": "slow"})
+        rig = apply_changes(rig, {"gaze.chooser": "slow"})
     made = assemble(rig, RunOptions(mock=True, seed=0, scene="visitor"))
     period_s, late, said, missed = 1.0 / rig.loop.rate_hz, [], [], 0
     made.robot.start(made.clock)

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 import pytest
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
 from gazerig.robot.app import run_rig
@@ -214,7 +214,7 @@ def _run(
         RunOptions(True, True, seed, scene, profile=profile, seconds=seconds, bus="emulated"),
         **more,
     ).check_and_complete()
-    rig = changed(
+    rig = apply_changes(
         with_options(load_rig(options.rig, options.character, options.profile), options), overrides
     )
     columns, held = _Columns(), run_rig.load_scene(scene, seed)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import pytest
 
-from gazerig.config.parameters import changed, value_of
+from gazerig.config.parameters import apply_changes, value_of
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.app import run_rig
 from gazerig.robot.app.options import RunOptions
@@ -98,7 +98,7 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
-    rig = changed(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
+    rig = apply_changes(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
     run_rig.load_scene = lambda name, seed: scene
     calls.enable()
     try:

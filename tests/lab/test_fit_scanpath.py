@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazerig.config.load import ConfigError, load, shipped
+from gazerig.config.load import ConfigError, load, shipped_path
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.eye_tracker_csv import Samples, read_recording
 from gazerig.features.lab.analysis.fit_scanpath import fit
@@ -21,7 +21,7 @@ from gazerig.gaze.scanpath.scanpath import (
 )
 from gazerig.gaze.types import PARTS
 
-WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
+WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
 
 # A face of about 400 by 560 px in a picture of 800 by 800; y runs down.
 BOXES_YAML = """\

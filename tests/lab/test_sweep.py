@@ -21,8 +21,8 @@ from command_line import Invoked, invoked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.load import ConfigError, shipped
-from gazerig.config.parameters import changed
+from gazerig.config.load import ConfigError, shipped_path
+from gazerig.config.parameters import apply_changes
 from gazerig.config.save_text import params_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
@@ -54,7 +54,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.tune import read_value
 
 pytestmark = pytest.mark.usefixtures("branched_children")
-RIG, DESK = load_rig("desk"), shipped("rigs", "desk")
+RIG, DESK = load_rig("desk"), shipped_path("rigs", "desk")
 COMFORT = "gaze.head.comfort_deg"
 LOW, HIGH = "gaze.head.min_salience", "gaze.head.max_salience"
 QUICK = ("--seconds", "1", "--bus", "ideal", "--jobs", "1")
@@ -206,8 +206,8 @@ def test_a_process_that_dies_costs_its_run_alone_and_the_end_comes_when_asked() 
     pool = WorkerPool(job, 1, lambda: ends[0] if ends else None)
     with pool:
         outcomes = pool.outcomes([({}, 0), ({}, 1), ({}, 2)])
-        changed = next(outcomes)[1]  # "" is no rig's configuration
-        assert changed.failed == "the files of desk changed while the sweep ran"
+        apply_changes = next(outcomes)[1]  # "" is no rig's configuration
+        assert apply_changes.failed == "the files of desk changed while the sweep ran"
         os.kill(pool.pids[0], signal.SIGSTOP)
         killed = pool.pids[0]
         os.kill(killed, signal.SIGKILL)
@@ -524,7 +524,7 @@ def test_a_share_of_an_axis_is_a_value_of_it_and_back(share: float, axis: Axis) 
 
 def test_points_are_changes_of_a_rig() -> None:
     (point,) = latin_hypercube(read(f"{COMFORT}=4:16"), 2, 0)[:1]
-    assert changed(RIG, point).gaze.head.comfort_deg == point[COMFORT]
+    assert apply_changes(RIG, point).gaze.head.comfort_deg == point[COMFORT]
 
 
 FITTED = (

@@ -37,7 +37,7 @@ def crowd(people: int, count: int, seed: int = 0, things: int = 0) -> list[Detec
             faces.append(detected(np.array([x, 0.35 * (row - 1.5), 2.4 + 0.1 * row]), rng))
         blobs = tuple(moving(k, number / RATE_HZ) for k in range(things))
         found = Detections(number / RATE_HZ, number, *SIZE, faces=tuple(faces), blobs=blobs)
-        out.append(found.located_by(locate))
+        out.append(found.locate_in_camera(locate))
     return out
 
 

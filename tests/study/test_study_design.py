@@ -14,7 +14,7 @@ from command_line import typed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.schema import Rig
 from gazerig.config.shipped import SHIPPED, shipped_names
 from gazerig.drivers.errors import SetupError
@@ -207,7 +207,7 @@ def test_the_conditions_of_shipped_studies_move_the_head_differently(name: str) 
 def _desired(rig: Rig, asked: RunOptions) -> list[tuple[float, ...]]:
     """Return the joint angles that every tick of a run wanted."""
     found: list[tuple[float, ...]] = []
-    slower = changed(rig, {"loop.rate_hz": 100.0})
+    slower = apply_changes(rig, {"loop.rate_hz": 100.0})
     simulate(slower, asked, watch=lambda tick: found.append(tick.desired_rad))
     return found
 
@@ -351,8 +351,8 @@ def test_comments_format_defaults_and_folders_change_no_hash(tmp_path: Path) -> 
 )
 def test_every_value_changes_the_hash(tmp_path: Path, old: str, new: str) -> None:
     assert old in TEXT
-    changed = study_of(tmp_path, TEXT.replace(old, new))
-    assert changed.sha256 != load_study("nakamoto_1").sha256
+    apply_changes = study_of(tmp_path, TEXT.replace(old, new))
+    assert apply_changes.sha256 != load_study("nakamoto_1").sha256
 
 
 def test_a_value_of_the_rig_that_is_seen_changes_the_hash_and_a_port_does_not(

@@ -36,7 +36,7 @@ from posed_people import (  # noqa: E402
 )
 from rendering import why_not  # noqa: E402
 
-from gazerig.config.load import load, shipped  # noqa: E402
+from gazerig.config.load import load, shipped_path  # noqa: E402
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view  # noqa: E402
 from gazerig.drivers.types import FaceDetector  # noqa: E402
 from gazerig.drivers.vision.face.detector import face_detector  # noqa: E402
@@ -268,7 +268,7 @@ def scripts(args: argparse.Namespace) -> None:
     for name in ("living-room", "conversation", "boxing", "crowd"):
         found = {key: np.zeros(3, int) for key in _detectors(args.yunet) if "640" not in key}
         rng = np.random.default_rng(0)
-        script = load(shipped("worlds", name, HOME), SceneScript)
+        script = load(shipped_path("worlds", name, HOME), SceneScript)
         picture = _played(script)
         scene = WorldScene(name, Figures(script, 0))
         detectors = _detectors(args.yunet)

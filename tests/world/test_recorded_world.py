@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
 
-from gazerig.config.load import load, shipped, shipped_names
+from gazerig.config.load import load, shipped_names, shipped_path
 from gazerig.config.save_text import params_text
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.room import HOME
@@ -67,7 +67,7 @@ def test_a_recording_has_its_world_and_the_same_room_and_people_come_of_it(
 
 @pytest.mark.parametrize("name", shipped_names("worlds", HOME))
 def test_a_script_is_the_same_after_a_recording(name: str, tmp_path: Path) -> None:
-    script = load(shipped("worlds", name, HOME), SceneScript)
+    script = load(shipped_path("worlds", name, HOME), SceneScript)
     file = tmp_path / "again.yaml"
     file.write_text(params_text(script), encoding="utf-8")
     assert load(file, SceneScript) == script

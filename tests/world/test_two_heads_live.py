@@ -19,7 +19,7 @@ pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.
 if sys.platform != "linux":
     pytest.skip("terminals are emulated on Linux alone", allow_module_level=True)
 
-from gazerig.config.load import shipped
+from gazerig.config.load import shipped_path
 from gazerig.drivers.errors import SetupError
 from gazerig.features.world.run.head_group import HeadGroup, compose_group
 from gazerig.robot.app.options import RunOptions
@@ -42,7 +42,7 @@ branched = pytest.mark.usefixtures("branched_children_here")
 def group(tmp_path: Path) -> HeadGroup:
     """Return two heads whose loops are slow, and whose buses are given up after a second."""
     file = tmp_path / "quick.yaml"
-    text = shipped("rigs", "minimal").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "minimal").read_text(encoding="utf-8")
     file.write_text(
         text.replace("kind: dynamixel,", "kind: dynamixel, dynamixel: {give_up_s: 1.0},")
         + "loop: {rate_hz: 100}\n"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.load import load, shipped
+from gazerig.config.load import load, shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
@@ -119,7 +119,7 @@ def test_a_script_is_read_once_until_it_is_changed(
 
 def test_a_mesh_that_is_lost_is_said_with_file_line_and_key(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
-    text = shipped("rigs", "minimal").read_text(encoding="utf-8")
+    text = shipped_path("rigs", "minimal").read_text(encoding="utf-8")
     file.write_text(text + "meshes:\n  head:\n    file: lost.stl\n")
     with pytest.raises(ConfigError) as found:
         compose(replace(ASKED, rig=str(file), world=None, scene="visitor", fast=True))

@@ -13,7 +13,7 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 
 import mujoco
 
-from gazerig.config.load import shipped
+from gazerig.config.load import shipped_path
 from gazerig.config.schema import load_rig
 from gazerig.features.world.figure_model import PeoplePlacer
 from gazerig.features.world.rig_in_world import RigInWorld
@@ -26,7 +26,9 @@ from gazerig.robot.description.mesh import Painted
 from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.description.world_shapes import WorldPart
 
-WORLDS = sorted(path.stem for path in shipped("worlds", "living-room", HOME).parent.glob("*.yaml"))
+WORLDS = sorted(
+    path.stem for path in shipped_path("worlds", "living-room", HOME).parent.glob("*.yaml")
+)
 HEAD_TRIANGLES = 31_000  # of the expressive rig's
 MOST_TRIANGLES, MOST_BYTES = 150_000, 3_000_000
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gazerig.config.load import load, shipped
+from gazerig.config.load import load, shipped_path
 from gazerig.config.shipped import shipped_names
 from gazerig.features.world.room import HOME
 from gazerig.features.world.timeline import CHECKS
@@ -16,4 +16,4 @@ def read(path: Path) -> SceneScript:
 
 
 def shipped_world(name: str) -> SceneScript:
-    return read(shipped("worlds", name, HOME))
+    return read(shipped_path("worlds", name, HOME))

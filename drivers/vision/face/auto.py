@@ -32,8 +32,8 @@ from gazerig.drivers.vision.face.preprocess import (
     PreparedImage,
     as_bgr,
     crop_square,
-    largest_first,
     prepare,
+    sort_by_size,
 )
 from gazerig.drivers.vision.face.yunet import YunetNetwork, face_of_row
 from gazerig.drivers.vision.model_files import yunet_file
@@ -82,7 +82,7 @@ def far_tiles(
     while scale > near_scale / _SHRINK**0.5:
         if min(width_px, height_px) * scale >= WINDOW_PX:
             # Tiles of equal size cover the frame at one scale.
-            across, down = _spans(width_px, scale), _spans(height_px, scale)
+            across, down = _tile_spans(width_px, scale), _tile_spans(height_px, scale)
             width = round((across[0][1] - across[0][0]) * scale)
             height = round((down[0][1] - down[0][0]) * scale)
             level = [Tile(x0, y0, x1, y1, width, height) for y0, y1 in down for x0, x1 in across]
@@ -91,7 +91,7 @@ def far_tiles(
     return tuple(tiles)
 
 
-def _spans(length_px: int, scale: float) -> list[tuple[int, int]]:
+def _tile_spans(length_px: int, scale: float) -> list[tuple[int, int]]:
     """Return equal, overlapping spans that cover a length in pixels of the frame."""
     scaled = length_px * scale
     count = max(1, ceil((scaled - _SHARED_PX) / (_TILE_PX - _SHARED_PX)))
@@ -187,7 +187,7 @@ class AutoDetector:
                 boxes = propose_faces(self._networks, prepared, self._params.min_face_px)
                 boxes = self._networks.refine(frame, boxes[_is_new(boxes, [*known, *found])])
                 least = self._params.min_confidence
-                found += self._accept(frame, [*known, *found], boxes, least)
+                found += self._confirm_new_faces(frame, [*known, *found], boxes, least)
             known += found
         elif tiles:
             self._next_tile = (self._next_tile + 1) % len(tiles)
@@ -195,7 +195,7 @@ class AutoDetector:
         for tile in tiles if first else ():
             known += self._search_tile(frame, known, tile)
         self._known = known
-        return largest_first([one.face for one in known])
+        return sort_by_size([one.face for one in known])
 
     def events(self) -> tuple[str, ...]:
         """Return the events since the last call, one line each."""
@@ -214,37 +214,41 @@ class AutoDetector:
         if not self._known:
             return []
         boxes = np.array([one.box for one in self._known])
-        judged = self._score(frame, boxes, self._params.keep_confidence)
+        judged = self._place_faces(frame, boxes, self._params.keep_confidence)
         for row, (one, now) in enumerate(zip(self._known, judged, strict=True)):
             if now is None:
-                around = None if one.by_yunet else self._around(frame, one)
-                judged[row] = around or self._by_yunet(frame, one)
+                around = None if one.by_yunet else self._search_around(frame, one)
+                judged[row] = around or self._place_by_yunet(frame, one)
             else:
                 # The search box is predicted by the motion between frames: the network places a
                 # face that is off the centre of its box too near to that centre.
                 moved = (now.face.landmarks_px - one.face.landmarks_px).mean(axis=0)
                 judged[row] = now._replace(box=now.box + np.tile(moved, 2))
-        return _distinct([one for one in judged if one is not None], [])
+        return _new_faces([one for one in judged if one is not None], [])
 
-    def _score(self, frame: ImageArray, boxes: Floats, least: float) -> list[_KnownFace | None]:
+    def _place_faces(
+        self, frame: ImageArray, boxes: Floats, least: float
+    ) -> list[_KnownFace | None]:
         """Return the face in each square box, None if the last network finds none."""
         placed = self._networks.place(frame, boxes)
-        again = to_squares(placed.tight)
+        again = to_squares(placed.boxes)
         return [
             _KnownFace(again[row], face_of(placed, row), False) if score >= least else None
             for row, score in enumerate(placed.scores)
         ]
 
-    def _around(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
+    def _search_around(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
         """Search for a lost face around its previous position."""
         part, where = crop_square(frame, _widen(one.box, _AROUND), _AROUND_PX)
         boxes, _ = self._networks.propose(part, _PROPOSE_AT)
         boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
         boxes = self._networks.refine(frame, to_squares(boxes))
-        found = [face for face in self._score(frame, boxes, self._params.min_confidence) if face]
+        found = [
+            face for face in self._place_faces(frame, boxes, self._params.min_confidence) if face
+        ]
         return max(found, key=lambda face: face.face.confidence, default=None)
 
-    def _by_yunet(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
+    def _place_by_yunet(self, frame: ImageArray, one: _KnownFace) -> _KnownFace | None:
         """Place a face that only YuNet finds."""
         if self._yunet is None:
             return None
@@ -256,24 +260,24 @@ class AutoDetector:
         row[:14] *= (where[2] - where[0]) / _YUNET_PX
         row[:2] += where[:2]
         row[4:14] += np.tile(where[:2], 5)
-        return _KnownFace(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
+        return _KnownFace(_landmark_square(row[4:14].reshape(5, 2)), face_of_row(row), True)
 
     def _search_frame_by_yunet(
         self, yunet: YunetNetwork, prepared: PreparedImage, known: list[_KnownFace]
     ) -> list[_KnownFace]:
         """Search the whole frame with YuNet; MTCNN's last network places faces it also finds."""
         least = self._params.min_confidence
-        rows = yunet.search(prepared.small, least)
-        rows[:, :14] *= np.tile(prepared.stretch, 7)
+        rows = yunet.search(prepared.working_size, least)
+        rows[:, :14] *= np.tile(prepared.full_per_working, 7)
         points = rows[:, 4:14].reshape(-1, 5, 2)
-        boxes = np.array([_square_of(five) for five in points]).reshape(-1, 4)
+        boxes = np.array([_landmark_square(five) for five in points]).reshape(-1, 4)
         fresh = np.flatnonzero(_is_new(boxes, known))
-        judged = self._score(prepared.full, boxes[fresh], least)
+        judged = self._place_faces(prepared.full_size, boxes[fresh], least)
         found = [
             now if now is not None else _KnownFace(boxes[row], face_of_row(rows[row]), True)
             for row, now in zip(fresh, judged, strict=True)
         ]
-        return _distinct(found, known)
+        return _new_faces(found, known)
 
     def _search_tile(
         self, frame: ImageArray, known: list[_KnownFace], tile: Tile
@@ -289,14 +293,14 @@ class AutoDetector:
         boxes = to_squares(boxes)
         boxes = self._networks.refine(frame, boxes[_is_new(boxes, known)])
         least = max(_FAR_CONFIDENCE, self._params.min_confidence)
-        return self._accept(frame, known, boxes, least)
+        return self._confirm_new_faces(frame, known, boxes, least)
 
-    def _accept(
+    def _confirm_new_faces(
         self, frame: ImageArray, known: list[_KnownFace], boxes: Floats, least: float
     ) -> list[_KnownFace]:
         """Return the new faces in square boxes that the last network confirms."""
-        found = [one for one in self._score(frame, boxes, least) if one is not None]
-        return _distinct(found, known)
+        found = [one for one in self._place_faces(frame, boxes, least) if one is not None]
+        return _new_faces(found, known)
 
 
 def _widen(box: Floats, times: float) -> Floats:
@@ -305,7 +309,7 @@ def _widen(box: Floats, times: float) -> Floats:
     return np.concatenate([middle - half, middle + half])
 
 
-def _square_of(points: Floats) -> Floats:
+def _landmark_square(points: Floats) -> Floats:
     """Return the square in which the last network best detects a face with these landmarks."""
     middle = points.mean(axis=0)
     spread = float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
@@ -319,7 +323,7 @@ def _is_new(boxes: Floats, known: list[_KnownFace]) -> NDArray[np.bool_]:
     return np.asarray(~(overlap_shares(boxes, others) > _SAME).any(axis=1))
 
 
-def _distinct(found: list[_KnownFace], known: list[_KnownFace]) -> list[_KnownFace]:
+def _new_faces(found: list[_KnownFace], known: list[_KnownFace]) -> list[_KnownFace]:
     """Return the found faces that are not known and not duplicates of a more confident one."""
     kept: list[_KnownFace] = []
     for one in sorted(found, key=lambda face: (face.by_yunet, -face.face.confidence)):

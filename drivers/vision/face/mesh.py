@@ -56,7 +56,7 @@ class EyeLandmarkCache:
         self._frames = 0
         self._allowed = _MOST_LOOKS
 
-    def read(
+    def analyze(
         self, crops: list[ImageArray], look: Callable[[ImageArray, int], EyePoints | None]
     ) -> tuple[EyePoints | None, ...] | None:
         """Return the points of both eyes, None if they have changed and are not analysed.
@@ -71,7 +71,7 @@ class EyeLandmarkCache:
             [cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY)[_EYE] for crop in crops], np.float32
         )
         last = self._last
-        changed = last is None or any(map(_differs, last.eyes, eyes))
+        changed = last is None or any(map(_has_changed, last.eyes, eyes))
         if last is not None and not changed and self._frames < _LONGEST_FRAMES:
             return last.points
         if self._allowed < 1.0:
@@ -84,7 +84,7 @@ class EyeLandmarkCache:
         return self._last.points
 
 
-def _differs(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
+def _has_changed(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
     """Return whether the appearance of an eye has changed."""
     change = cv2.blur(now - before, _AVERAGED_PX)
     return float(np.abs(change).max()) > max(_LEAST_GREY, _CHANGED * float(before.std()))
@@ -189,11 +189,11 @@ class MeshNetworks:
         grid = points.reshape(_POINTS, 3)
         depth = grid[:, 2:] * (side / _MESH_PX)
         found = np.hstack([_to_image(grid[:, :2], to_image), depth]).astype(np.float32)
-        seen = self._eyes(image, found, eyes) if apart > _LEAST_IRIS_EYES_PX else None
+        seen = self._eye_landmarks(image, found, eyes) if apart > _LEAST_IRIS_EYES_PX else None
         irises, lids = seen if seen is not None else (None, None)
         return FaceMesh(found, irises, lids, sure)
 
-    def _eyes(
+    def _eye_landmarks(
         self, image: ImageArray, points: NDArray[np.float32], eyes: EyeLandmarkCache | None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
         """Return irises and lids of both eyes in pixels of the image, None if unknown."""
@@ -204,7 +204,7 @@ class MeshNetworks:
         crops = [_crop(image, to_image, _IRIS_PX) for to_image in placed]
         if eyes is None:
             eyes = EyeLandmarkCache()
-        seen = [eye for eye in eyes.read(crops, self._eye_points) or () if eye is not None]
+        seen = [eye for eye in eyes.analyze(crops, self._eye_points) or () if eye is not None]
         if len(seen) < len(maps):
             return None
         irises, lids = (

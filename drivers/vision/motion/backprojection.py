@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.clustering import Group
+from gazerig.drivers.vision.motion.clustering import PixelGroup
 from gazerig.drivers.vision.motion.image import Floats, Plane
 from gazerig.drivers.vision.motion.optical_flow import Flow
 from gazerig.drivers.vision.motion.params import MotionParams
@@ -30,10 +30,10 @@ class Distance(NamedTuple):
 
     z_m: float
     sd_m: float
-    known: bool
+    is_measured: bool
 
 
-def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane | None:
+def shrink_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane | None:
     """Resize a depth image to the small image's size; invalid distances become NaN."""
     if depth_m is None or depth_m.ndim != 2 or depth_m.size == 0:
         return None
@@ -45,12 +45,12 @@ def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane |
     return out
 
 
-def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distance:
+def distance(group: PixelGroup, depth: Plane | None, params: MotionParams) -> Distance:
     """Return a thing's distance from the depth image, or the assumed one."""
     if depth is not None:
-        values = depth[group.y, group.x]
+        values = depth[group.rows, group.columns]
         values = values[np.isfinite(values)]
-        if len(values) >= max(_LEAST_PIXELS, _LEAST_SHARE * len(group.x)):
+        if len(values) >= max(_LEAST_PIXELS, _LEAST_SHARE * len(group.columns)):
             z = float(np.median(values))
             spread = _MAD * float(np.median(np.abs(values - z)))
             return Distance(z, max(_LEAST_SD_M, spread), True)

@@ -35,39 +35,39 @@ _CUT_PX = 3
 _HOLES = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
 
 
-class Group(NamedTuple):
+class PixelGroup(NamedTuple):
     """Pixels that move together.
 
-    x, y: (n,) columns and rows
+    columns, rows: (n,) columns and rows
     flow: (n, 2) their motion from the older image to the newer, pixels
     """
 
-    x: Indices
-    y: Indices
+    columns: Indices
+    rows: Indices
     flow: Floats
 
     @property
     def box(self) -> tuple[int, int, int, int]:
         """Return x, y, width and height of the pixels' box."""
-        x, y = int(self.x.min()), int(self.y.min())
-        return x, y, int(self.x.max()) - x + 1, int(self.y.max()) - y + 1
+        x, y = int(self.columns.min()), int(self.rows.min())
+        return x, y, int(self.columns.max()) - x + 1, int(self.rows.max()) - y + 1
 
 
-def fastest_quarter(group: Group) -> tuple[Floats, Floats]:
+def fastest_quarter(group: PixelGroup) -> tuple[Floats, Floats]:
     """Return the mean position and the mean motion, (2,) each, of a group's fastest quarter."""
     speed = (group.flow * group.flow).sum(axis=1)
     fast = speed >= np.partition(speed, (3 * len(speed)) // 4)[(3 * len(speed)) // 4]
-    at: Floats = np.array((group.x[fast].mean(), group.y[fast].mean()))
+    at: Floats = np.array((group.columns[fast].mean(), group.rows[fast].mean()))
     flow: Floats = group.flow[fast].mean(axis=0).astype(np.float64)
     return at, flow
 
 
-def cluster_motion(things: MotionMask, params: MotionParams) -> list[Group]:
+def cluster_motion(things: MotionMask, params: MotionParams) -> list[PixelGroup]:
     """Return the moving things, the largest first."""
     least = max(4, round(params.min_area_share * things.mask.size))
     pieces = [
         piece
-        for group in _components(
+        for group in _connected_groups(
             things.mask, things.flow, params.close_px, least, _LOOKED_AT * params.max_blobs
         )
         for piece in _split(group, things, least, _MOST_SPLITS)
@@ -77,10 +77,10 @@ def cluster_motion(things: MotionMask, params: MotionParams) -> list[Group]:
         pieces = [
             piece
             for piece in pieces
-            if _percentile_97(things.change[piece.y, piece.x])
-            > (_LEAST_CHANGE * min(1.0, small / len(piece.x))) ** 2
+            if _percentile_97(things.change[piece.rows, piece.columns])
+            > (_LEAST_CHANGE * min(1.0, small / len(piece.columns))) ** 2
         ]
-    pieces.sort(key=lambda group: (-len(group.x), group.x[0], group.y[0]))
+    pieces.sort(key=lambda group: (-len(group.columns), group.columns[0], group.rows[0]))
     return pieces[: params.max_blobs]
 
 
@@ -90,7 +90,9 @@ def _percentile_97(values: NDArray[np.float32]) -> float:
     return float(np.partition(values, at)[at])
 
 
-def _components(mask: Mask, flow: Flow, close_px: int, least: int, most: int = 100) -> list[Group]:
+def _connected_groups(
+    mask: Mask, flow: Flow, close_px: int, least: int, most: int = 100
+) -> list[PixelGroup]:
     """Return the connected components of the mask; gaps up to ``close_px`` are bridged.
 
     Of very many, the ``most`` largest are returned.
@@ -108,13 +110,13 @@ def _components(mask: Mask, flow: Flow, close_px: int, least: int, most: int = 1
         y, x = np.nonzero((labels[window] == k) & mask[window])
         if len(x) >= least:
             x, y = x + left, y + top
-            groups.append(Group(x, y, flow[y, x].astype(np.float64)))
+            groups.append(PixelGroup(x, y, flow[y, x].astype(np.float64)))
     return groups
 
 
-def _split(group: Group, things: MotionMask, least: int, splits: int) -> list[Group]:
+def _split(group: PixelGroup, things: MotionMask, least: int, splits: int) -> list[PixelGroup]:
     """Split a group of several motions recursively."""
-    if splits == 0 or len(group.x) < 2 * least:
+    if splits == 0 or len(group.columns) < 2 * least:
         return [group]
     sides = _first_thing_mask(group, things.threshold_px)
     if sides is None:
@@ -123,20 +125,20 @@ def _split(group: Group, things: MotionMask, least: int, splits: int) -> list[Gr
     parts = []
     for side in (sides, ~sides):
         mask = np.zeros((height, width), dtype=np.uint8)
-        mask[group.y[side] - top, group.x[side] - left] = 255
+        mask[group.rows[side] - top, group.columns[side] - left] = 255
         own = cv2.medianBlur(mask, _SMOOTH_PX) > 0
         flow = things.flow[top : top + height, left : left + width]
-        for piece in _components(own, flow, _SMOOTH_PX, least):
-            parts.append(Group(piece.x + left, piece.y + top, piece.flow))
+        for piece in _connected_groups(own, flow, _SMOOTH_PX, least):
+            parts.append(PixelGroup(piece.columns + left, piece.rows + top, piece.flow))
     if len(parts) < 2:
         return [group]
     return [piece for part in parts for piece in _split(part, things, least, splits - 1)]
 
 
-def _first_thing_mask(group: Group, threshold_px: float) -> Mask | None:
+def _first_thing_mask(group: PixelGroup, threshold_px: float) -> Mask | None:
     """Return a mask of the first of two things; None if there is only one."""
-    step = max(1, len(group.x) // _SAMPLE)
-    places = np.column_stack((group.x, group.y)).astype(np.float64)
+    step = max(1, len(group.columns) // _SAMPLE)
+    places = np.column_stack((group.columns, group.rows)).astype(np.float64)
     flow = group.flow
     together = affine_residual(places[::step], flow[::step])
     if together < threshold_px:
@@ -156,7 +158,7 @@ def _first_thing_mask(group: Group, threshold_px: float) -> Mask | None:
     return sides if apart < _BETTER_SHARE * together else None
 
 
-def inscribed_px(group: Group, shape: tuple[int, ...]) -> float:
+def inscribed_radius_px(group: PixelGroup, shape: tuple[int, ...]) -> float:
     """Return the radius of the largest disc within a patch, continued beyond the image's edge.
 
     Args:
@@ -166,23 +168,23 @@ def inscribed_px(group: Group, shape: tuple[int, ...]) -> float:
     x, y, width, height = group.box
     mask = np.zeros((height + 2, width + 2), np.uint8)
     inner = mask[1:-1, 1:-1]
-    inner[group.y - y, group.x - x] = 1
+    inner[group.rows - y, group.columns - x] = 1
     inner[:] = cv2.morphologyEx(inner, cv2.MORPH_CLOSE, _HOLES)
     if x <= _CUT_PX:
-        _extend(mask[:, 0], mask[:, 1])
+        _extend_beyond_edge(mask[:, 0], mask[:, 1])
     if x + width >= shape[1] - _CUT_PX:
-        _extend(mask[:, -1], mask[:, -2])
+        _extend_beyond_edge(mask[:, -1], mask[:, -2])
     if y <= _CUT_PX:
-        _extend(mask[0], mask[1])
+        _extend_beyond_edge(mask[0], mask[1])
     if y + height >= shape[0] - _CUT_PX:
-        _extend(mask[-1], mask[-2])
+        _extend_beyond_edge(mask[-1], mask[-2])
     # Plain skin shows no flow: an area surrounded by motion moves too.
     outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(mask, outlines, -1, 1, cv2.FILLED)
     return float(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_3).max())
 
 
-def _extend(beyond: NDArray[np.uint8], edge: NDArray[np.uint8]) -> None:
+def _extend_beyond_edge(beyond: NDArray[np.uint8], edge: NDArray[np.uint8]) -> None:
     """Extend a patch that the image's edge cuts beyond it in one piece."""
     at = np.flatnonzero(edge)
     beyond[at[0] : at[-1] + 1] = 1
@@ -197,7 +199,7 @@ _LEAST_SHARE = 0.25
 _KEPT = 0.5
 
 
-def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
+def thing_pixel(group: PixelGroup, grey: Grey, middle: Floats, offset: Floats) -> Floats:
     """Return a pixel of the thing, (2,), near its centre.
 
     Plain background between two people who walk together, or between legs, moves with them in the
@@ -212,7 +214,7 @@ def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
     left, top = max(0, x - _MARGIN_PX), max(0, y - _MARGIN_PX)
     crop = grey[top : y + height + _MARGIN_PX, left : x + width + _MARGIN_PX].astype(np.float32)
     outside = np.ones(crop.shape, dtype=np.float32)
-    outside[group.y - top, group.x - left] = 0.0
+    outside[group.rows - top, group.columns - left] = 0.0
     window = width + 2 * _MARGIN_PX, 2 * _MARGIN_PX + 1  # background is in horizontal strips
     edge = cv2.BORDER_CONSTANT
     count = np.maximum(cv2.blur(outside, window, borderType=edge), 1e-6)
@@ -220,10 +222,10 @@ def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
     square = cv2.blur(crop * crop * outside, window, borderType=edge) / count
     spread = np.sqrt(np.maximum(square - mean * mean, 0.0))
     unlike = np.abs(cv2.blur(crop, (3, 3)) - mean) > np.maximum(_UNLIKE * spread, _LEAST_LEVELS)
-    apart: Mask = unlike[group.y - top, group.x - left]
+    apart: Mask = unlike[group.rows - top, group.columns - left]
     if apart.mean() < _LEAST_SHARE:
         apart[:] = True
-    places = np.column_stack((group.x[apart], group.y[apart])).astype(np.float64)
+    places = np.column_stack((group.columns[apart], group.rows[apart])).astype(np.float64)
     wanted = middle + _KEPT * offset
     out: Floats = places[int(np.argmin(((places - wanted) ** 2).sum(axis=1)))]
     return out

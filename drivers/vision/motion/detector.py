@@ -24,15 +24,15 @@ from gazerig.drivers.vision.motion.backprojection import (
     distance,
     parallax,
     radius_m,
-    small_depth,
+    shrink_depth,
     velocity,
 )
 from gazerig.drivers.vision.motion.clustering import (
-    Group,
-    anchor,
+    PixelGroup,
     cluster_motion,
     fastest_quarter,
-    inscribed_px,
+    inscribed_radius_px,
+    thing_pixel,
 )
 from gazerig.drivers.vision.motion.ego_motion import (
     EgoMotion,
@@ -50,8 +50,8 @@ from gazerig.drivers.vision.motion.image import (
 )
 from gazerig.drivers.vision.motion.lucas_kanade import (
     BackgroundWarp,
-    Level,
     PatchMotion,
+    PyramidLevel,
     blur_images,
     fit_affine_warp,
     patch_motion,
@@ -61,10 +61,10 @@ from gazerig.drivers.vision.motion.optical_flow import (
     Flow,
     FlowSearch,
     ImagePair,
-    align,
+    align_images,
+    changed_windows,
     is_searchable,
     turn_homography,
-    windows_of,
 )
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import (
@@ -94,7 +94,7 @@ class MotionReport(NamedTuple):
     """Result for one image, for the page and the summary.
 
     blobs: moving things
-    silent: reason why nothing could be detected, "" for none
+    no_result_reason: reason why nothing could be detected, "" for none
     turn_deg_s: the camera's own turn rate, as measured in the image
     background_share: share of the image's texture with common motion
     noise_px, threshold_px: flow noise of the still room, and the smallest detectable motion, in
@@ -102,7 +102,7 @@ class MotionReport(NamedTuple):
     """
 
     blobs: tuple[MovingBlob, ...] = ()
-    silent: str = ""
+    no_result_reason: str = ""
     turn_deg_s: float = 0.0
     background_share: float = 0.0
     noise_px: float = 0.0
@@ -158,7 +158,7 @@ class MotionDetector:
         """
         now = scale_down(image, self._params.work_px, lens, captured_s, self._params.finest_level)
         before, self._before = self._before, now
-        self.report = self._look(now, before, R_now_before, depth_m, t_now_before_m)
+        self.report = self._compare_images(now, before, R_now_before, depth_m, t_now_before_m)
         if self._params.gloves:
             gloves = self._gloves.find(image, captured_s, lens, self._params.work_px)
             self.report = self.report._replace(
@@ -172,7 +172,7 @@ class MotionDetector:
         self._tracks.forget()
         self._gloves.forget()
 
-    def _look(
+    def _compare_images(
         self,
         now: SmallImage,
         before: SmallImage | None,
@@ -182,32 +182,32 @@ class MotionDetector:
     ) -> MotionReport:
         """Compare two images; return the motion, or the reason why they cannot be compared."""
         if not is_searchable(now.grey):
-            return MotionReport(silent="frame too small")
+            return MotionReport(no_result_reason="frame too small")
         if before is None or before.grey.shape != now.grey.shape:
             self._tracks.forget()
-            return MotionReport(silent="first frame")
+            return MotionReport(no_result_reason="first frame")
         dt_s = now.captured_s - before.captured_s
         if not 0.0 < dt_s <= self._params.max_gap_ms / 1e3:
-            return MotionReport(silent="no frame shortly before")
-        depth = small_depth(depth_m, now.grey.shape)
+            return MotionReport(no_result_reason="no frame shortly before")
+        depth = shrink_depth(depth_m, now.grey.shape)
         shift = parallax(depth, now.K, t_now_before_m)
-        pair, ego, still = self._compared(now, before, R_now_before, shift)
+        pair, ego, still = self._measure_flow(now, before, R_now_before, shift)
         turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
-        why = self._cannot_tell(pair, ego, turn)
+        why = self._separation_fault(pair, ego, turn)
         if why:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
-            return MotionReport((), why, turn, ego.share, ego.noise_px)
-        params = at_level(self._params, now)
+            return MotionReport((), why, turn, ego.background_share, ego.noise_px)
+        params = scale_to_level(self._params, now)
         things = segment_motion(pair, ego, params, R_now_before is None, still)
         groups = cluster_motion(things, params)
         frames = blur_images(pair) if groups else ()
-        moving: list[tuple[Group, Floats, PatchMotion]] = []
+        moving: list[tuple[PixelGroup, Floats, PatchMotion]] = []
         for group in groups:
             # The map of a still patch there to the older image.
             off = np.zeros(2)
             if pair.shift is not None:
-                off = np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64)
-            centre, motion = _measure(group, frames, BackgroundWarp(ego.B, off))
+                off = np.median(pair.shift[group.rows, group.columns], axis=0).astype(np.float64)
+            centre, motion = _centre_and_motion(group, frames, BackgroundWarp(ego.B, off))
             if _motion_px(group, motion, now.grey.shape) > params.min_flow_px:
                 moving.append((group, centre, motion))
         follows = self._tracks.step(
@@ -221,11 +221,13 @@ class MotionDetector:
         blobs = tuple(
             self._blob(group, motion, follow, now, depth, dt_s)
             for (group, _, motion), follow in zip(moving, follows, strict=True)
-            if self._tracks.confirmed(follow)
+            if self._tracks.is_confirmed(follow)
         )
-        return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
+        return MotionReport(
+            blobs, "", turn, ego.background_share, ego.noise_px, things.threshold_px
+        )
 
-    def _compared(
+    def _measure_flow(
         self, now: SmallImage, before: SmallImage, R_now_before: Floats | None, shift: Flow | None
     ) -> tuple[ImagePair, EgoMotion, ImageDifference | None]:
         """Compute the flow and the camera's own motion; a large unpredicted one is removed first.
@@ -233,35 +235,40 @@ class MotionDetector:
         If the camera moved as predicted, flow is computed only where the images differ, and their
         difference is returned too.
         """
-        pair = align(now, before, turn_homography(R_now_before, now, before))._replace(shift=shift)
+        pair = align_images(now, before, turn_homography(R_now_before, now, before))._replace(
+            shift=shift
+        )
         moved_before = now.captured_s - self._moved_s < _SHAKES_ON_S
         if shift is None and not moved_before:
             still = image_difference(pair)
-            ego = predicted_ego_motion(pair, still.changed)
+            ego = predicted_ego_motion(pair, still.changed_mask)
             if ego is not None:
-                return self._search.search(pair, windows_of(still.changed)), ego, still
+                return self._search.search(pair, changed_windows(still.changed_mask)), ego, still
         pair = self._search.search(pair)
         ego = estimate_ego_motion(pair, now.K, R_now_before is not None, moved_before)
         if ego.unforeseen_px > 0.0:
             self._moved_s = now.captured_s
-        if ego.share < self._params.min_background_share or ego.unforeseen_px < _SEARCH_AGAIN_PX:
+        if (
+            ego.background_share < self._params.min_background_share
+            or ego.unforeseen_px < _SEARCH_AGAIN_PX
+        ):
             return pair, ego, None
-        again = self._search.search(align(now, before, ego.total)._replace(shift=shift))
+        again = self._search.search(align_images(now, before, ego.total)._replace(shift=shift))
         return again, estimate_ego_motion(again, now.K, True), None
 
-    def _cannot_tell(self, pair: ImagePair, ego: EgoMotion, turn_deg_s: float) -> str:
+    def _separation_fault(self, pair: ImagePair, ego: EgoMotion, turn_deg_s: float) -> str:
         """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""
         if not turn_deg_s <= self._params.max_turn_deg_s:
             return "the camera turns too fast"
-        if pair.known.mean() < _LEAST_KNOWN:
+        if pair.valid_mask.mean() < _LEAST_KNOWN:
             return "too little of the last frame in view"
-        if ego.share < self._params.min_background_share:
+        if ego.background_share < self._params.min_background_share:
             return "no common motion of the background"
         return ""
 
     def _blob(
         self,
-        group: Group,
+        group: PixelGroup,
         motion: PatchMotion,
         follow: PatchTrack,
         now: SmallImage,
@@ -270,13 +277,13 @@ class MotionDetector:
     ) -> MovingBlob:
         """Combine the measurements of one thing."""
         far = distance(group, depth, self._params)
-        point = anchor(group, now.grey, follow.centre, follow.offset)
+        point = thing_pixel(group, now.grey, follow.centre, follow.offset)
         follow.offset = point - follow.centre
         p = back_project(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
         # A thing that the edge of the image cuts does not grow when more of it becomes visible.
         growth_sd = np.inf if _is_cut(group, now.grey.shape) else motion.growth_sd
-        loom = _shrink(motion.growth, growth_sd) / dt_s
+        loom = _shrink_by_noise(motion.growth, growth_sd) / dt_s
         fastest_px, fastest_flow = fastest_quarter(group)
         at = back_project(fastest_px, far.z_m, now.K)
         fx, fy = (fastest_flow / dt_s).tolist()
@@ -287,28 +294,31 @@ class MotionDetector:
             follow.id,
             _KIND,
             p,
-            radius_m(len(group.x), far.z_m, now.K),
-            spin_rad_s=_shrink(motion.spin_rad, motion.spin_sd) / dt_s,
+            radius_m(len(group.columns), far.z_m, now.K),
+            spin_rad_s=_shrink_by_noise(motion.spin_rad, motion.spin_sd) / dt_s,
             loom_1_s=loom,
             v_camera_m_s=velocity(p, flow_px_s, loom, now.K),
-            depth_known=far.known,
+            depth_known=far.is_measured,
             depth_sd_m=far.sd_m,
             spin_sd_rad_s=motion.spin_sd / dt_s,
             loom_sd_1_s=growth_sd / dt_s,
             box_px=(left, top, width / sx, height / sy),
             centre_px=to_original_px((float(point[0]), float(point[1])), now.scale),
-            area_px=len(group.x) / (sx * sy),
+            area_px=len(group.columns) / (sx * sy),
             flow_px_s=(flow_px_s[0] / sx, flow_px_s[1] / sy),
             fastest_m=at,
             fastest_m_s=velocity(at, (fx, fy), loom, now.K),
-            thickness_m=2.0 * far.z_m * inscribed_px(group, now.grey.shape) / float(now.K[0, 0]),
+            thickness_m=2.0
+            * far.z_m
+            * inscribed_radius_px(group, now.grey.shape)
+            / float(now.K[0, 0]),
             from_side=x <= edge_px or x + width >= now.grey.shape[1] - edge_px,
         )
 
 
-def at_level(params: MotionParams, now: SmallImage) -> MotionParams:
+def scale_to_level(params: MotionParams, now: SmallImage) -> MotionParams:
     """Return the parameters with lengths in pixels of the searched image."""
-    shrink = now.fine.shape[0] // now.grey.shape[0]
+    shrink = now.fine_grey.shape[0] // now.grey.shape[0]
     return replace(
         params,
         min_flow_px=params.min_flow_px / shrink,
@@ -316,19 +326,19 @@ def at_level(params: MotionParams, now: SmallImage) -> MotionParams:
     )
 
 
-def _motion_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> float:
+def _motion_px(group: PixelGroup, motion: PatchMotion, shape: tuple[int, ...]) -> float:
     """Return the approximate root mean square motion of a patch's pixels."""
     slide = float(np.hypot(*motion.slide_px))
     if _is_cut(group, shape):
         return slide  # its growth is unknown
-    growth = _shrink(motion.growth, motion.growth_sd)
-    spin = _shrink(motion.spin_rad, motion.spin_sd)
+    growth = _shrink_by_noise(motion.growth, motion.growth_sd)
+    spin = _shrink_by_noise(motion.spin_rad, motion.spin_sd)
     return float(
         np.hypot(slide, 0.3 * np.sqrt(group.box[2] * group.box[3]) * np.hypot(growth, spin))
     )
 
 
-def _is_cut(group: Group, shape: tuple[int, ...]) -> bool:
+def _is_cut(group: PixelGroup, shape: tuple[int, ...]) -> bool:
     """Return whether a patch continues beyond an edge of the small image."""
     x, y, width, height = group.box
     across, down = shape[1] - _CUT_PX, shape[0] - _CUT_PX
@@ -342,19 +352,19 @@ def relative_rotation(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -
     return out
 
 
-def _measure(
-    group: Group, frames: tuple[Level, ...], room: BackgroundWarp
+def _centre_and_motion(
+    group: PixelGroup, frames: tuple[PyramidLevel, ...], room: BackgroundWarp
 ) -> tuple[Floats, PatchMotion]:
     """Return a patch's centre, and the motion there."""
-    places = np.column_stack((group.x, group.y)).astype(np.float64)
+    places = np.column_stack((group.columns, group.rows)).astype(np.float64)
     middle = places.mean(axis=0)
     step = max(1, len(places) // _SAMPLE)
     places, flow = places[::step], group.flow[::step]
-    start, rest = fit_affine_warp(places, flow, middle, float(len(group.x)))
+    start, rest = fit_affine_warp(places, flow, middle, float(len(group.columns)))
     return middle, patch_motion(refine_warp(start, places, middle, frames, room), rest)
 
 
-def _shrink(value: float, sd: float) -> float:
+def _shrink_by_noise(value: float, sd: float) -> float:
     """Shrink a measurement towards 0 by its noise; one within the noise is 0.
 
     This is the positive part of the James-Stein estimator for one number. Attention uses the

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, upper_median, without_illumination
+from gazerig.drivers.vision.motion.image import Floats, Grey, remove_illumination, upper_median
 from gazerig.drivers.vision.motion.optical_flow import (
     ImagePair,
     Mask,
@@ -66,13 +66,14 @@ _REST_SHARE, _REST_PX = 0.6, 0.05
 class _MotionThresholds(NamedTuple):
     """Requirements for accepting that the whole image moved.
 
-    share: share of the textured points that moved together; cells: number of image cells with them
-    kept: largest share of the points at the edge that may have kept their position
+    moved_share: share of the textured points that moved together; moved_cells: number of image
+        cells with them
+    kept_edge_share: largest share of the points at the edge that may have kept their position
     """
 
-    share: float
-    cells: int
-    kept: float
+    moved_share: float
+    moved_cells: int
+    kept_edge_share: float
 
 
 # A person close to the lens fills most of the image; a strip of wall that keeps its position shows
@@ -87,13 +88,13 @@ _AGAINST_JOINTS, _STOOD, _MOVES = (
 class HomographyFit(NamedTuple):
     """Homography (3, 3), share of the points that agree with it, and their noise in pixels.
 
-    free: whether it was found independently of the prediction
+    is_independent: whether it was found independently of the prediction
     """
 
     B: Floats
-    share: float
+    agreeing_share: float
     noise_px: float
-    free: bool
+    is_independent: bool
 
 
 class EgoMotion(NamedTuple):
@@ -101,20 +102,21 @@ class EgoMotion(NamedTuple):
 
     B: (3, 3) pixels of the newer image to those of the older one, turned as predicted
     total: (3, 3) pixels of the older image to those of the newer
-    share: share of the textured points that moved with the room; 0 if they only agree on noise
+    background_share: share of the textured points that moved with the room; 0 if they only agree on
+        noise
     noise_px: deviation of their flow from it, standard deviation along one axis
     shift_px: median motion of the image by the camera's motion
     unforeseen_px: likewise if only the image shows it, otherwise 0
-    fitted: whether the image had enough texture for a fit
+    is_fitted: whether the image had enough texture for a fit
     """
 
     B: Floats
     total: Floats
-    share: float
+    background_share: float
     noise_px: float
     shift_px: float
     unforeseen_px: float
-    fitted: bool
+    is_fitted: bool
 
 
 def estimate_ego_motion(
@@ -132,7 +134,7 @@ def estimate_ego_motion(
     height, width = pair.now.shape
     y, x = np.mgrid[_EDGE_PX : height - _EDGE_PX : _GRID_PX, _EDGE_PX : width - _EDGE_PX : _GRID_PX]
     x, y = x.ravel(), y.ravel()
-    good = (strength[y, x] > _LEAST_CORNER) & pair.known[y, x]
+    good = (strength[y, x] > _LEAST_CORNER) & pair.valid_mask[y, x]
     points = np.column_stack((x[good], y[good])).astype(np.float64)
     B, share, noise, fitted, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False, False
     if len(points) >= _LEAST_POINTS:
@@ -164,7 +166,7 @@ def predicted_ego_motion(pair: ImagePair, changed: Mask) -> EgoMotion | None:
     window = np.s_[::_REST_STEP, ::_REST_STEP]
     gx, gy = (g[window].ravel() for g in gradients(pair.now))
     off = (pair.now[window].astype(np.float32) - pair.before[window]).ravel()
-    good = (gx * gx + gy * gy > _REST_GRADIENT**2) & pair.known[window].ravel()
+    good = (gx * gx + gy * gy > _REST_GRADIENT**2) & pair.valid_mask[window].ravel()
     if np.count_nonzero(good) < _REST_POINTS:
         return None
     same = good & ~changed[window].ravel()
@@ -193,24 +195,28 @@ def _fit_room(
     shape = pair.now.shape
     off = np.hypot(*(there - points).T)
     near = off < reach_px
-    stands = bool(near.mean() >= _LEAST_SHARE) and _cells(points[near], shape) >= _LEAST_CELLS
+    stands = bool(near.mean() >= _LEAST_SHARE) and _count_cells(points[near], shape) >= _LEAST_CELLS
     asked = stands or need is _AGAINST_JOINTS
     found = _fit_homography(points, there, K, shape, reach_px) if asked else None
-    if found is not None and found.share >= _LEAST_SHARE:
+    if found is not None and found.agreeing_share >= _LEAST_SHARE:
         return found
-    free = _fit_homography(points, there, K, shape, np.inf, need.cells)
+    free = _fit_homography(points, there, K, shape, np.inf, need.moved_cells)
     if free is not None and free.noise_px > _MIXED_PX:
-        free = _fit_two_motions(points, there, K, shape, need.cells) or free
-    if free is None or free.share < need.share:
+        free = _fit_two_motions(points, there, K, shape, need.moved_cells) or free
+    if free is None or free.agreeing_share < need.moved_share:
         return found
     # Points that kept their position although the whole image seems to have moved.
     parted = np.hypot(*(warp_points(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
-    edge = _edge(points, shape)
+    edge = _edge_mask(points, shape)
     kept = float(((off < _STANDING_REACH_PX) & parted)[edge].mean()) if edge.any() else 0.0
-    return free if kept < need.kept and _outlines_kept(pair, free.B) < _KEPT_OUTLINES else found
+    return (
+        free
+        if kept < need.kept_edge_share and _kept_outline_share(pair, free.B) < _KEPT_OUTLINES
+        else found
+    )
 
 
-def _outlines_kept(pair: ImagePair, B: Floats) -> float:
+def _kept_outline_share(pair: ImagePair, B: Floats) -> float:
     """Return the share of the outlines at the edge that did not move although they should have.
 
     Boards and door frames on a plain wall have no corners, so people who walk in front of it have
@@ -223,10 +229,12 @@ def _outlines_kept(pair: ImagePair, B: Floats) -> float:
     moves = warp_points(B, points) - points
     # Beyond one pixel brightness no longer changes as the gradient predicts.
     change = np.abs(gx * moves[:, 0] + gy * moves[:, 1]) / np.maximum(1.0, np.hypot(*moves.T))
-    should = (change > _CLEAR_CHANGE) & pair.known.ravel() & _edge(points, (height, width))
+    should = (
+        (change > _CLEAR_CHANGE) & pair.valid_mask.ravel() & _edge_mask(points, (height, width))
+    )
     if not should.any():
         return 0.0
-    off = without_illumination(pair.now.astype(np.float32) - pair.before)
+    off = remove_illumination(pair.now.astype(np.float32) - pair.before)
     changed = np.abs(cv2.blur(off, (3, 3))).ravel()
     return float((changed[should] < _UNCHANGED * change[should]).mean())
 
@@ -243,7 +251,7 @@ def _fit_two_motions(
     flow = flow - flow.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov(flow.T))
     side = flow @ axes[:, -1] > 0.0
-    edge = _edge(points, shape)
+    edge = _edge_mask(points, shape)
     best, most = None, 0.0
     for mine in (side, ~side):
         if np.count_nonzero(mine) < _LEAST_POINTS:
@@ -259,7 +267,7 @@ def _fit_two_motions(
         off = np.hypot(*(warp_points(B, points) - there).T)
         along = float((off[edge] < _STANDING_REACH_PX).mean()) if edge.any() else 0.0
         if along > most:
-            best, most = HomographyFit(B / B[2, 2], rest.share, rest.noise_px, True), along
+            best, most = HomographyFit(B / B[2, 2], rest.agreeing_share, rest.noise_px, True), along
     return best
 
 
@@ -299,21 +307,23 @@ def _fit_homography(
         belief = np.diag(_SPREADS**-2.0)
         right = weighted.T @ b.T.ravel() + belief @ _PLAIN
         last, h = h, np.asarray(np.linalg.solve(rows.T @ weighted + belief, right))
-        errors = focal * np.hypot(*(_image(h, a) - b).T)
+        errors = focal * np.hypot(*(_apply_homography(h, a) - b).T)
         done = np.abs(h - last).max() * focal < _SMALL_PX and scale < 2 * noise
-        noise = _noise(errors, weights > 0.0)
+        noise = _noise_px(errors, weights > 0.0)
         scale = min(scale, max(0.5 * scale, noise))
         if done:
             break
     near = errors < _TUKEY * scale
-    if _cells(points[near], shape) < least_cells:
+    if _count_cells(points[near], shape) < least_cells:
         return None
     square = np.array([[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]])
     B = square @ np.append(h, 1.0).reshape(3, 3) @ np.linalg.inv(square)
-    return HomographyFit(B / B[2, 2], float(near.mean()), _noise(errors, near), reach_px == np.inf)
+    return HomographyFit(
+        B / B[2, 2], float(near.mean()), _noise_px(errors, near), reach_px == np.inf
+    )
 
 
-def _image(h: Floats, a: Floats) -> Floats:
+def _apply_homography(h: Floats, a: Floats) -> Floats:
     """Return points after the homography."""
     x, y = a.T
     depth = np.maximum(h[6] * x + h[7] * y + 1.0, 1e-3)
@@ -322,19 +332,19 @@ def _image(h: Floats, a: Floats) -> Floats:
     return out
 
 
-def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
+def _noise_px(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
     """Return the standard deviation along one axis: the median length is 1.18 times it."""
     return max(_LEAST_NOISE_PX, upper_median(errors[mask]) / 1.177)
 
 
-def _edge(points: Floats, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _edge_mask(points: Floats, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Return a mask of points at the left, right or upper edge, where the room is most visible."""
     x, y = np.floor(points / (shape[1], shape[0]) * _CELLS).T
     out: NDArray[np.bool_] = (x == 0) | (x == _CELLS[0] - 1) | (y == 0)
     return out
 
 
-def _cells(points: Floats, shape: tuple[int, ...]) -> int:
+def _count_cells(points: Floats, shape: tuple[int, ...]) -> int:
     """Return the number of cells of an image of (height, width) that contain points."""
     cells = np.floor(points / (shape[1], shape[0]) * _CELLS)
     return len(np.unique(cells[:, 0] * _CELLS[1] + cells[:, 1]))

@@ -52,13 +52,13 @@ class Circle(NamedTuple):
     """A circle within a glove, pixels of the frame that was searched.
 
     radius: radius if the glove continues beyond the edge of the image
-    sure: radius of the largest circle that is within the image
+    visible_radius: radius of the largest circle that is within the image
     """
 
     x: float
     y: float
     radius: float
-    sure: float
+    visible_radius: float
 
 
 class _Glove(NamedTuple):
@@ -236,10 +236,12 @@ def exclude_gloves(
     blobs: tuple[MovingBlob, ...], gloves: tuple[MovingBlob, ...]
 ) -> tuple[MovingBlob, ...]:
     """Return the moving things that contain no glove, as arm and trunk move with one."""
-    return tuple(blob for blob in blobs if not any(_holds(blob, glove) for glove in gloves))
+    return tuple(
+        blob for blob in blobs if not any(_contains_glove(blob, glove) for glove in gloves)
+    )
 
 
-def _holds(blob: MovingBlob, glove: MovingBlob) -> bool:
+def _contains_glove(blob: MovingBlob, glove: MovingBlob) -> bool:
     if blob.box_px is None or glove.centre_px is None:
         return False
     (x, y, width, height), (u, v) = blob.box_px, glove.centre_px

@@ -30,14 +30,14 @@ class SmallImage(NamedTuple):
 
     scale: (x, y) small pixels per pixel of the original image
     K: (3, 3) camera matrix of the small image
-    fine: the image before it was halved for the search; ``grey`` itself if it was not
+    fine_grey: the image before it was halved for the search; ``grey`` itself if it was not
     """
 
     grey: Grey
     scale: tuple[float, float]
     K: Floats
     captured_s: float
-    fine: Grey
+    fine_grey: Grey
 
 
 def scale_down(
@@ -85,7 +85,7 @@ def to_grey(image: NDArray[Any]) -> Grey:
     return np.ascontiguousarray(image.reshape(image.shape[:2]))
 
 
-def without_illumination(change: Plane) -> Plane:
+def remove_illumination(change: Plane) -> Plane:
     """Return a change of brightness without that of the light, which covers wider areas."""
     # Clipped, as otherwise a dark coat would darken its surroundings.
     light = cv2.blur(np.clip(change, -_LIGHT_STEP, _LIGHT_STEP), (_LIGHT_PX, _LIGHT_PX))

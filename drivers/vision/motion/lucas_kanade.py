@@ -49,7 +49,7 @@ class AffineWarp(NamedTuple):
     slope_sd: float
 
 
-class Level(NamedTuple):
+class PyramidLevel(NamedTuple):
     """Two blurred images, and their scale relative to the images searched for flow."""
 
     now: Plane
@@ -58,13 +58,13 @@ class Level(NamedTuple):
     steps: int
 
 
-def blur_images(pair: ImagePair) -> tuple[Level, ...]:
+def blur_images(pair: ImagePair) -> tuple[PyramidLevel, ...]:
     """Blur the images once for all patches: at the searched size, then at the fine size."""
     (coarse_px, coarse_steps), (fine_px, fine_steps) = _LEVELS
-    fine, scale = pair.fine, pair.fine[0].shape[0] / pair.now.shape[0]
+    fine, scale = pair.fine_images, pair.fine_images[0].shape[0] / pair.now.shape[0]
     return (
-        Level(_blur(pair.now, coarse_px), _blur(pair.before, coarse_px), 1.0, coarse_steps),
-        Level(_blur(fine[0], fine_px), _blur(fine[1], fine_px), scale, fine_steps),
+        PyramidLevel(_blur(pair.now, coarse_px), _blur(pair.before, coarse_px), 1.0, coarse_steps),
+        PyramidLevel(_blur(fine[0], fine_px), _blur(fine[1], fine_px), scale, fine_steps),
     )
 
 
@@ -77,7 +77,7 @@ class BackgroundWarp(NamedTuple):
     B: Floats
     shift: Floats
 
-    def near(self, centre: Floats) -> tuple[Floats, Floats]:
+    def linearize(self, centre: Floats) -> tuple[Floats, Floats]:
         """Return (2, 2) and (2,): the map around a position, x -> there + slope (x - centre)."""
         at = warp_points(self.B, centre + _AROUND)
         return ((at[1:] - at[0]) / _STEP_PX).T, at[0] + self.shift
@@ -87,7 +87,7 @@ def refine_warp(
     start: AffineWarp,
     places: Floats,
     centre: Floats,
-    frames: tuple[Level, ...],
+    frames: tuple[PyramidLevel, ...],
     room: BackgroundWarp,
 ) -> AffineWarp:
     """Refine a map on the pixels at ``places``, (n, 2); return the start itself if that fails."""
@@ -95,7 +95,7 @@ def refine_warp(
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))
     if len(places) < _LEAST_POINTS:
         return start
-    slope, there = room.near(centre)
+    slope, there = room.linearize(centre)
     best = start
     for level in frames:
         fit = _refine_level(best, arms, centre, size, level, slope, there)
@@ -110,7 +110,7 @@ def _refine_level(
     arms: Floats,
     centre: Floats,
     size: float,
-    level: Level,
+    level: PyramidLevel,
     slope: Floats,
     there: Floats,
 ) -> AffineWarp | None:
@@ -218,7 +218,7 @@ def fit_affine_warp(
     """
     arms = places - centre
     rows = np.column_stack((arms, np.ones(len(arms))))
-    numbers, weights, rest = _fit(rows, flow)
+    numbers, weights, rest = _fit_robustly(rows, flow)
     if numbers is None:
         return AffineWarp(np.eye(2), -np.median(flow, axis=0), np.inf), rest
     # Root mean square of the standard deviations of the map's slopes.
@@ -253,7 +253,7 @@ def affine_residual(places: Floats, flow: Floats) -> float:
     return float(np.sqrt(((flow - rows @ numbers) ** 2).sum(axis=1).mean()))
 
 
-def _fit(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
+def _fit_robustly(rows: Floats, flow: Floats) -> tuple[Floats | None, Floats, float]:
     """Fit (3, 2) numbers by reweighted least squares; return them, the weights and the residual."""
     weights = np.ones(len(rows))
     numbers: Floats | None = None

@@ -40,29 +40,29 @@ class ImagePair(NamedTuple):
 
     now: the newer image
     before: the older one, turned as predicted
-    known: mask of its valid pixels whose flow stays inside
+    valid_mask: mask of its valid pixels whose flow stays inside
     flow: a point at x in ``now`` is at x + flow in ``before``
     H: (3, 3) pixels of the older image to those of ``before``
-    fine: the same two images before they were scaled for the search
+    fine_images: the same two images before they were scaled for the search
     windows: parts in which flow was computed; elsewhere it is 0
     shift: (h, w, 2) flow of still things by parallax; None for none
     """
 
     now: Grey
     before: Grey
-    known: Mask
+    valid_mask: Mask
     flow: Flow
     H: Floats
-    fine: tuple[Grey, Grey]
+    fine_images: tuple[Grey, Grey]
     windows: tuple[Window, ...] = ()
     shift: Flow | None = None
 
-    def part(self, window: Window) -> "ImagePair":
+    def crop(self, window: Window) -> "ImagePair":
         """Return a part of both images with its flow."""
         return self._replace(
             now=self.now[window],
             before=self.before[window],
-            known=self.known[window],
+            valid_mask=self.valid_mask[window],
             flow=self.flow[window],
             shift=None if self.shift is None else self.shift[window],
         )
@@ -80,7 +80,7 @@ class FlowSearch:
         if windows is None:
             windows = ((slice(0, pair.now.shape[0]), slice(0, pair.now.shape[1])),)
         flow: Flow = np.zeros((*pair.now.shape, 2), dtype=np.float32)
-        known = pair.known.copy()
+        known = pair.valid_mask.copy()
         for window in windows:
             now, before = (np.ascontiguousarray(grey[window]) for grey in (pair.now, pair.before))
             found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # initial guess, then result
@@ -92,22 +92,22 @@ class FlowSearch:
             at_x = part[..., 0] + np.arange(width, dtype=np.float32)
             at_y = part[..., 1] + np.arange(height, dtype=np.float32)[:, None]
             known[window] &= (at_x >= 0) & (at_x <= width - 1) & (at_y >= 0) & (at_y <= height - 1)
-        return pair._replace(flow=flow, known=known, windows=windows)
+        return pair._replace(flow=flow, valid_mask=known, windows=windows)
 
 
-def align(now: SmallImage, before: SmallImage, H: Floats) -> ImagePair:
+def align_images(now: SmallImage, before: SmallImage, H: Floats) -> ImagePair:
     """Align two images by turning the older one by ``H``; their flow is still 0."""
     grey, known = _turn_image(before.grey, H)
     fine = grey
-    if before.fine is not before.grey:
+    if before.fine_grey is not before.grey:
         fine, _ = _turn_image(
-            before.fine, _scale_homography(H, before.fine.shape[0] / grey.shape[0])
+            before.fine_grey, _scale_homography(H, before.fine_grey.shape[0] / grey.shape[0])
         )
     flow: Flow = np.zeros((*grey.shape, 2), dtype=np.float32)
-    return ImagePair(now.grey, grey, known, flow, H, (now.fine, fine))
+    return ImagePair(now.grey, grey, known, flow, H, (now.fine_grey, fine))
 
 
-def windows_of(changed: Mask) -> tuple[Window, ...] | None:
+def changed_windows(changed: Mask) -> tuple[Window, ...] | None:
     """Return the parts of an image that changed, None for all of it.
 
     Args:

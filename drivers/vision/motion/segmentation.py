@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.vision.motion.ego_motion import EgoMotion
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, without_illumination
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, remove_illumination
 from gazerig.drivers.vision.motion.optical_flow import Flow, ImagePair, Mask, gradients
 from gazerig.drivers.vision.motion.params import MotionParams
 
@@ -56,17 +56,17 @@ class MotionMask(NamedTuple):
 class ImageDifference(NamedTuple):
     """Difference between the images, with the room at rest.
 
-    squares: (h, w) local mean of squares, grey levels
+    mean_squares: (h, w) local mean of squares, grey levels
     noise: their usual value
     """
 
-    squares: Plane
+    mean_squares: Plane
     noise: float
 
     @property
-    def changed(self) -> Mask:
+    def changed_mask(self) -> Mask:
         """Return a mask of changes above the noise."""
-        return self.squares > _NOISE_RATIO * self.noise
+        return self.mean_squares > _NOISE_RATIO * self.noise
 
 
 def image_difference(pair: ImagePair, there: Flow | None = None) -> ImageDifference:
@@ -76,7 +76,7 @@ def image_difference(pair: ImagePair, there: Flow | None = None) -> ImageDiffere
         pair: The images.
         there: Positions (h, w, 2) of still things in the older one; None: unchanged.
     """
-    squares = _squares(pair.now, pair.before, there)
+    squares = _mean_squares(pair.now, pair.before, there)
     return ImageDifference(squares, _ROUNDING + float(np.quantile(squares[::4, ::4], 0.3)))
 
 
@@ -99,7 +99,7 @@ def segment_motion(
     """
     there = None
     if still is None or pair.shift is not None:
-        there = _background(ego.B, pair.now.shape)
+        there = _background_positions(ego.B, pair.now.shape)
         if pair.shift is not None:
             there += pair.shift
         still = image_difference(pair, there)
@@ -111,23 +111,25 @@ def segment_motion(
     flow = np.zeros((*shape, 2), np.float32)
     things = MotionMask(flow, np.zeros(shape, np.bool_), threshold, change)
     for window in pair.windows:
-        part = pair.part(window)
+        part = pair.crop(window)
         corner = np.array((window[1].start, window[0].start), np.float32)
         at = None if there is None else there[window] - corner
         rest = -part.flow if at is None else at - _add_flow(part.flow, 1.0)
         moves = rest
         if by_image and ego.shift_px > _STANDS_PX:
             moves = rest - _parallax_part(rest, ego, params.parallax_share)
-        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _parallax_jumps(part.shift)
-        mask &= part.known
-        squares = still.squares[window]
+        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _parallax_differences(
+            part.shift
+        )
+        mask &= part.valid_mask
+        squares = still.mean_squares[window]
         mask &= squares > _NOISE_RATIO * still.noise
         if mask.any():
-            mask &= _across(part.now, moves, threshold)
+            mask &= _cross_edge_mask(part.now, moves, threshold)
             # The flow must explain a pixel, and the camera's motion must not. Background that a
             # thing has uncovered changed too, and any flow explains plain background. But its flow
             # begins at unchanged pixels, the flow of a thing at pixels that it has left.
-            moving = _squares(part.now, part.before, _add_flow(part.flow, 1.0))
+            moving = _mean_squares(part.now, part.before, _add_flow(part.flow, 1.0))
             left = cv2.remap(
                 squares, _add_flow(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE
             )
@@ -135,22 +137,22 @@ def segment_motion(
             mask &= moving < _LEFT_SHARE * (squares - still.noise) + still.noise
         things.flow[window], things.mask[window] = rest, mask
         if mask.any():
-            change[window] = _solid_change(part, at)
+            change[window] = _object_change(part, at)
     return things
 
 
-def _solid_change(pair: ImagePair, there: Flow | None) -> Plane:
+def _object_change(pair: ImagePair, there: Flow | None) -> Plane:
     """Return the square of the relative change of brightness, without light, (h, w).
 
     A shadow darkens neighbouring pixels alike; a thing has its own edges.
     """
-    seen = _warp(pair.before, there)
+    seen = _warp_older(pair.before, there)
     change: Plane = np.log((pair.now + _DARK) / (seen + _DARK)).astype(np.float32)
     change -= cv2.blur(change, (_NEAR_PX, _NEAR_PX))
     return np.asarray(change * change, np.float32)
 
 
-def _across(now: Grey, moves: Flow, threshold_px: float) -> Mask:
+def _cross_edge_mask(now: Grey, moves: Flow, threshold_px: float) -> Mask:
     """Return a mask of motion across edges: along a straight edge no motion is visible.
 
     Compression shifts the weak texture along an edge back and forth.
@@ -166,7 +168,7 @@ def _across(now: Grey, moves: Flow, threshold_px: float) -> Mask:
     return out
 
 
-def _parallax_jumps(shift: Flow | None) -> Plane | float:
+def _parallax_differences(shift: Flow | None) -> Plane | float:
     """Return the relative motion of still neighbours, (h, w): flow there may be the neighbour's."""
     if shift is None:
         return 0.0
@@ -185,7 +187,7 @@ def _parallax_part(rest: Flow, ego: EgoMotion, most: float) -> Flow:
         ego: The camera's own motion.
         most: Largest additional motion of a thing, as a share of the room's motion.
     """
-    room = -_background(np.asarray(np.linalg.inv(ego.total)), rest.shape[:2])
+    room = -_background_positions(np.asarray(np.linalg.inv(ego.total)), rest.shape[:2])
     room = _add_flow(room, 1.0)
     squares = np.maximum(_dot(room, room), np.float32(1e-6))
     along = np.asarray(_dot(rest, room) / squares, dtype=np.float32)
@@ -202,7 +204,7 @@ def _dot(a: Flow, b: Flow) -> Plane:
     return out
 
 
-def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
+def _background_positions(B: Floats, shape: tuple[int, ...]) -> Flow:
     """Return the positions of the still room's pixels in the older image, (h, w, 2)."""
     height, width = shape
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
@@ -219,13 +221,13 @@ def _add_flow(flow: Flow, sign: float) -> Flow:
     return out
 
 
-def _squares(now: Grey, before: Grey, there: Flow | None) -> Plane:
+def _mean_squares(now: Grey, before: Grey, there: Flow | None) -> Plane:
     """Return the local mean square difference from the older image, seen through a map."""
-    off = without_illumination(now.astype(np.float32) - _warp(before, there))
+    off = remove_illumination(now.astype(np.float32) - _warp_older(before, there))
     return np.asarray(cv2.blur(off * off, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 
-def _warp(before: Grey, there: Flow | None) -> Plane:
+def _warp_older(before: Grey, there: Flow | None) -> Plane:
     """Return the older image seen through a map; unchanged for None."""
     grey = before.astype(np.float32)
     if there is None:

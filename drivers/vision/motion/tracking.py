@@ -27,7 +27,7 @@ class PatchTrack:
     centre: (2,); velocity_px_s: (2,)
     offset: (2,) from the centre to its last reported point
     size_px: root of the box's area
-    seen: number of consecutive images
+    consecutive_images: number of consecutive images
     """
 
     id: int
@@ -35,7 +35,7 @@ class PatchTrack:
     velocity_px_s: Floats
     size_px: float
     seen_s: float
-    seen: int
+    consecutive_images: int
     offset: Floats
 
 
@@ -44,7 +44,7 @@ class MotionTracks:
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
-        self._follows: list[PatchTrack] = []
+        self._patch_tracks: list[PatchTrack] = []
         self._next_id = 1
 
     def retune(self, params: MotionParams) -> None:
@@ -69,7 +69,7 @@ class MotionTracks:
         taken: set[int] = set()
         # Possible pairs of tracks and patches; their distance is a share of the gate.
         pairs = []
-        for i, follow in enumerate(self._follows):
+        for i, follow in enumerate(self._patch_tracks):
             for j, centre in enumerate(centres):
                 gate = max(_LEAST_GATE_PX, _GATE_SIZES * max(follow.size_px, sizes_px[j]))
                 apart = float(np.hypot(*(centre - follow.centre))) / gate
@@ -77,7 +77,7 @@ class MotionTracks:
                 if apart <= 1.0 and 1.0 / _LARGEST_GROWTH <= ratio <= _LARGEST_GROWTH:
                     pairs.append((apart, i, j))
         for _, i, j in sorted(pairs):
-            follow = self._follows[i]
+            follow = self._patch_tracks[i]
             if follow.id in taken or j in found:
                 continue
             taken.add(follow.id)
@@ -86,31 +86,34 @@ class MotionTracks:
             if j not in found:
                 begun = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
                 self._next_id += 1
-                self._follows.append(begun)
+                self._patch_tracks.append(begun)
                 found[j] = begun
             follow = found[j]
             follow.centre, follow.velocity_px_s = centre, velocities_px_s[j]
             follow.size_px, follow.seen_s = sizes_px[j], t_s
-            follow.seen += 1
+            follow.consecutive_images += 1
         seen_now = {follow.id for follow in found.values()}
-        for follow in self._follows:
-            if follow.id not in seen_now and follow.seen < self._params.confirm_frames:
-                follow.seen = 0  # a flicker, not a thing: count again
+        for follow in self._patch_tracks:
+            if (
+                follow.id not in seen_now
+                and follow.consecutive_images < self._params.confirm_frames
+            ):
+                follow.consecutive_images = 0  # a flicker, not a thing: count again
         return [found[j] for j in range(len(centres))]
 
     def predict(self, total: Floats, t_s: float, dt_s: float) -> None:
         """Predict every track to ``t_s`` and delete those unseen for too long."""
         forget_s = self._params.forget_ms / 1e3
-        self._follows = [f for f in self._follows if t_s - f.seen_s <= forget_s]
-        for follow in self._follows:
+        self._patch_tracks = [f for f in self._patch_tracks if t_s - f.seen_s <= forget_s]
+        for follow in self._patch_tracks:
             at = warp_points(total, follow.centre[None, :])[0] + follow.velocity_px_s * dt_s
             if np.isfinite(at).all():
                 follow.centre = at
 
     def forget(self) -> None:
         """Discard all tracks; ids are not reused."""
-        self._follows = []
+        self._patch_tracks = []
 
-    def confirmed(self, follow: PatchTrack) -> bool:
+    def is_confirmed(self, follow: PatchTrack) -> bool:
         """Return whether a patch has been detected often enough."""
-        return follow.seen >= self._params.confirm_frames
+        return follow.consecutive_images >= self._params.confirm_frames

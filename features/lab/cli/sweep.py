@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gazerig.config.export import suggestion
+from gazerig.config.export import suggestion_text
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.files.file_output import write_file
 from gazerig.robot.app.options import BUSES, DEFAULT_SCENE, RunOptions
@@ -267,7 +267,7 @@ def _column(name: str) -> str:
     if name in _COLUMNS:
         return name
     known = (*_COLUMNS, *BY_KEY)
-    near = suggestion(name, known) or ";"
+    near = suggestion_text(name, known) or ";"
     raise SetupError(f"--show {name}: no such measure{near} there is {', '.join(known)}")
 
 

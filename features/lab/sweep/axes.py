@@ -12,7 +12,7 @@ from math import prod
 import numpy as np
 
 from gazerig.config.load import ConfigError, ConfigFault
-from gazerig.config.parameters import changed, parameters, value_of
+from gazerig.config.parameters import apply_changes, parameters, value_of
 from gazerig.config.rig import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Floats
@@ -185,7 +185,7 @@ def _out_of_bounds(rig: Rig, param: Parameter, end: float) -> Sequence[ConfigFau
     if inside and (whole or param.kind == "number"):
         return ()
     try:
-        changed(rig, {param.key: int(end) if whole else end})
+        apply_changes(rig, {param.key: int(end) if whole else end})
     except ConfigError as error:
         return [fault for fault in error.faults if fault.key == param.key]
     return ()
@@ -253,7 +253,7 @@ def check_points(rig: Rig, axes: Sequence[Axis], points: Sequence[Point]) -> Non
     for point in points:
         levels = [(key, repr(value)) for key, value in point.items()]
         try:
-            changed(rig, point)
+            apply_changes(rig, point)
         except ConfigError as error:
             named = {fault.key: fault for fault in reversed(error.faults)}
             refused |= {level: named[level[0]] for level in levels if level[0] in named}
@@ -263,4 +263,4 @@ def check_points(rig: Rig, axes: Sequence[Axis], points: Sequence[Point]) -> Non
     if faults:
         raise ConfigError(dict.fromkeys(faults))
     if not allowed:
-        changed(rig, points[0])
+        apply_changes(rig, points[0])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.config.parameters import differences, flattened
+from gazerig.config.parameters import differences, flatten_changes
 from gazerig.config.save_text import changes_text
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
@@ -165,5 +165,5 @@ def snippet_of(options: RunOptions, point: Point) -> str:
     if options.character is not None:
         plain = load_rig(options.rig, None, options.profile)
         whole = load_rig(options.rig, options.character, options.profile)
-        changes = flattened(whole, differences(plain, whole)) | changes
+        changes = flatten_changes(whole, differences(plain, whole)) | changes
     return changes_text(changes)

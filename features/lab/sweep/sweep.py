@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import gazerig
-from gazerig.config.export import abbreviated
+from gazerig.config.export import abbreviate
 from gazerig.config.parameters import plain
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import gestures_text, params_text, walk_text
@@ -116,7 +116,7 @@ def _differences(then: object, now: object, key: str = "") -> Iterator[str]:
             below = f"{key}.{name}" if key else str(name)
             yield from _differences(then.get(name), now.get(name), below)
     elif then != now:
-        yield f"{key} was {abbreviated(then)}, is now {abbreviated(now)}"
+        yield f"{key} was {abbreviate(then)}, is now {abbreviate(now)}"
 
 
 def _key(point: Point, seed: int) -> str:

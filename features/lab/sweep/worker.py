@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 
-from gazerig.config.parameters import changed
+from gazerig.config.parameters import apply_changes
 from gazerig.config.rig import Rig
 from gazerig.config.save_text import params_text
 from gazerig.errors import Error
@@ -37,7 +37,7 @@ def figures_at(
         ConfigError: a rule of the rig forbids the point.
         SetupError: the run cannot be started, or ended by a fault.
     """
-    return figures_of(*simulate(changed(rig, point), options, stopped))
+    return figures_of(*simulate(apply_changes(rig, point), options, stopped))
 
 
 def main() -> None:

@@ -8,9 +8,9 @@ from os.path import isfile
 from pathlib import Path
 from typing import cast
 
-from gazerig.config.export import suggestion
-from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped
-from gazerig.config.parameters import NEXT_START, changed, differences, live, values
+from gazerig.config.export import suggestion_text
+from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped_path
+from gazerig.config.parameters import NEXT_START, apply_changes, differences, effect_time, values
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
@@ -164,7 +164,7 @@ def condition_rig(design: StudyDesign, condition: Condition) -> Rig:
         gazerig.config.load.ConfigError: with every fault.
     """
     rig = load_rig(condition.rig or design.presentation.rig, condition.character, condition.profile)
-    return changed(rig, dict(_changes(condition))) if any(_changes(condition)) else rig
+    return apply_changes(rig, dict(_changes(condition))) if any(_changes(condition)) else rig
 
 
 def _changes(condition: Condition) -> Iterator[tuple[str, Value]]:
@@ -194,7 +194,7 @@ def _find(kind: str, name_or_path: str) -> Path:
     return (
         Path(name_or_path).expanduser()
         if _is_path(name_or_path)
-        else shipped(kind, name_or_path, HOME)
+        else shipped_path(kind, name_or_path, HOME)
     )
 
 
@@ -311,7 +311,7 @@ def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator
     if one.rig is not None or design.presentation.on == "film":
         return
     for name in _differences(own, rig):
-        when = live(name)
+        when = effect_time(name)
         if not when.startswith(NEXT_START):
             continue
         given = next((k for k in one.params if f"{name}.".startswith(f"{k}.")), None)
@@ -357,11 +357,11 @@ def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
     scene, world = design.presentation.scene, design.presentation.world
     known = scene_names()
     if scene is not None and scene not in known:
-        near = suggestion(scene, known) or ";"
+        near = suggestion_text(scene, known) or ";"
         yield "presentation.scene", f"no scene {scene!r}{near} there is {', '.join(known)}"
     worlds = surroundings_names()
     if world is not None and "/" not in world and "." not in world and world not in worlds:
-        near = suggestion(world, worlds) or ";"
+        near = suggestion_text(world, worlds) or ";"
         there = ", ".join(worlds) or "none"
         yield "presentation.world", f"no world {world!r}{near} there is {there}"
 
