@@ -4,7 +4,7 @@ from gazerig.robot.cli.command_list import CommandEntry
 
 SCAN = CommandEntry(
     "gazerig.features.bringup.cli.scan",
-    "List serial ports, and who answers on one at every baud rate.",
+    "List serial ports, and the servos that answer on one at any baud rate.",
     "Bring-up",
     examples={
         "scan": (
@@ -19,7 +19,7 @@ SCAN = CommandEntry(
 )
 SETUP = CommandEntry(
     "gazerig.features.bringup.cli.setup",
-    "Set id and baud rate of each servo, one connected at a time; test a Maestro's channels.",
+    "Set id and baud rate of the servos, connected one at a time; test a Maestro's channels.",
     "Bring-up",
     examples={
         "setup": (
@@ -30,7 +30,7 @@ SETUP = CommandEntry(
 )
 DOCTOR = CommandEntry(
     "gazerig.features.bringup.cli.doctor",
-    "Examine every port and servo against the rig's YAML; every finding has its cure.",
+    "Check every port and servo against the rig's YAML; every finding comes with a remedy.",
     "Bring-up",
     examples={
         "doctor": (
@@ -42,7 +42,7 @@ DOCTOR = CommandEntry(
 )
 CALIBRATE = CommandEntry(
     "gazerig.features.bringup.cli.calibrate.group",
-    "Find out and write into the rig's YAML: joints (the default), camera, face.",
+    "Calibrate joints (the default), camera or face, and write the result into the rig's YAML.",
     "Bring-up",
     examples={
         "calibrate": (
@@ -77,7 +77,7 @@ LOOK_AT = CommandEntry(
 )
 MONITOR = CommandEntry(
     "gazerig.features.bringup.cli.monitor",
-    "Watch all servos; reads alone: nothing is written, torque stays as it is.",
+    "Show the readings of all servos; nothing is written to them, the torque stays as it is.",
     "Bring-up",
     examples={"monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),)},
 )
@@ -89,7 +89,7 @@ REBOOT = CommandEntry(
 )
 RECORD_GESTURE = CommandEntry(
     "gazerig.features.bringup.cli.record_gesture",
-    "Record a gesture by hand: torque off, move the head, and it is written as YAML.",
+    "Record a gesture in YAML while you move the head by hand, torque off.",
     examples={
         "record-gesture": (
             ("record-gesture my.yaml greeting", "torque off; move the head by hand, Enter ends it"),

@@ -39,7 +39,7 @@ SWEEP = CommandEntry(
 )
 FIT_SCANPATH = CommandEntry(
     "gazerig.features.lab.cli.fit_scanpath",
-    "Fit a walk over the face to an eye-tracker recording, as YAML that run takes.",
+    "Fit a walk over the face to an eye-tracker recording; write it as YAML for gazerig run.",
     examples={
         "fit-scanpath": (
             ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),

@@ -4,7 +4,7 @@ from gazerig.robot.cli.command_list import CommandEntry
 
 STUDY = CommandEntry(
     "gazerig.features.study.cli.group",
-    "Let people judge two to six gazes, blind: design, run and analyse a study.",
+    "Design, run and analyse a blind study in which people judge two to six styles of gaze.",
     "Study",
     examples={
         "study": (

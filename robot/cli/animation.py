@@ -78,7 +78,7 @@ def play(
     listed: Annotated[bool, typer.Option("--list", help="List the gestures there are.")] = False,
     pid: PidOption = None,
 ) -> None:
-    """Play a gesture on the running head, or list all with what this rig can do of them."""
+    """Play a gesture on the running head, or list all gestures with their fit to this rig."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
         if gesture is None or listed:
             for one in rig.gestures():

@@ -40,12 +40,11 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
         "ctl": CommandEntry(
             "tune",
-            "Speak to a rig that runs in another terminal: parameters, where it looks, "
-            "what it does.",
+            "Control a rig that runs in another terminal: parameters, gaze target, behaviour.",
         ),
         "stop": CommandEntry(
             "tune",
-            "Torque off at once, of every rig that runs here; nothing parks, the programs go on.",
+            "Switch the torque of every running rig off at once; nothing parks, the programs continue.",
         ),
     },
     "Look back": {
@@ -55,7 +54,7 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
         "export": CommandEntry(
             "replay",
-            "Write a recorded run as eye-tracking tools read it: degrees, + left and + up.",
+            "Export a recorded run for eye-tracking tools: degrees, + left and + up.",
         ),
     },
     "Study": {},
@@ -67,7 +66,7 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
         "check": CommandEntry(
             "rig_check",
-            "Check a rig's YAML and nothing else: all faults at once, no servo is touched.",
+            "Check a rig's YAML and list all faults at once; no servo is contacted.",
         ),
         "describe": CommandEntry(
             "describe",
@@ -84,18 +83,18 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
         "models": CommandEntry(
             "models",
-            "List and fetch model files, with which the camera finds more: faces, people, hands, eyes.",
+            "List and download model files that detect faces, people, hands and eyes.",
         ),
         "emulate": CommandEntry(
             "emulate",
-            "Emulate servos on a pseudo-terminal; prints its path as JSON, takes fault commands.",
+            "Emulate servos on a pseudo-terminal; print its path as JSON and accept fault commands.",
         ),
         "record-camera": CommandEntry(
-            "record", "Record what a camera gives, for gazerig run --camera-recording FILE."
+            "record", "Record the frames of a camera, for gazerig run --camera-recording FILE."
         ),
         "import-gesture": CommandEntry(
             "gestures",
-            "Make a gesture of key frames from an animation program, as YAML that rigs take.",
+            "Import key frames of an animation program as a gesture in YAML.",
         ),
     },
 }

@@ -49,7 +49,7 @@ def emulate(
     case: options.Case = None,
     until_eof: options.UntilEof = False,
 ) -> None:
-    """Emulate servos on a pseudo-terminal; prints its path as JSON, takes fault commands.
+    """Emulate servos on a pseudo-terminal; print its path as JSON and accept fault commands.
 
     Type `help` for the commands; Ctrl-C ends it.
     """

@@ -63,7 +63,7 @@ Baud = Annotated[
         "or of a Maestro's pins (default: its USB port, which takes any)."
     ),
 ]
-AnyBaud = Annotated[bool, typer.Option("--any-baud", help="Hear clients at every baud rate.")]
+AnyBaud = Annotated[bool, typer.Option("--any-baud", help="Answer at every baud rate.")]
 WireTime = Annotated[bool, typer.Option("--wire-time", help="Bytes take their time on the line.")]
 TurnaroundUs = Annotated[
     float, typer.Option(min=0.0, max=10_000.0, help="With wire time: before each answer.")
@@ -84,7 +84,7 @@ Device = Annotated[
     ),
 ]
 Crc = Annotated[
-    bool, typer.Option("--crc", help="With --maestro: it wants a CRC behind every command.")
+    bool, typer.Option("--crc", help="With --maestro: it requires a CRC after every command.")
 ]
 Case = Annotated[
     list[str] | None,

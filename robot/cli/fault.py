@@ -21,6 +21,6 @@ def fault(
     ],
     pid: PidOption = None,
 ) -> None:
-    """Order a fault of the emulated servos, or a push against the head in a world."""
+    """Inject a fault into the emulated servos, or push the head in a world."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl fault") as rig:
         print(rig.fault(" ".join(words)))

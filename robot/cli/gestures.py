@@ -29,7 +29,7 @@ def import_gesture(
     folder: FolderOption = Path("."),
     force: ForceOption = False,
 ) -> None:
-    """Make a gesture of key frames from an animation program, as YAML that rigs take."""
+    """Import key frames of an animation program as a gesture in YAML."""
     with clear_errors(rig):
         from gazerig.robot.app.gesture_file import gesture_text, read_table, write_gesture
 

@@ -32,7 +32,7 @@ PidOption = Annotated[
         "--rig",
         "--pid",
         metavar="NAME|N",
-        help="Of several running rigs that of a name or process.",
+        help="The rig of this name or process, if several run.",
     ),
 ]
 
@@ -61,7 +61,7 @@ def look(
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Make the running head look at something while this command runs, or freely again."""
+    """Make the running head look at a target while this command runs, or look freely again."""
     with clear_errors():
         command = read_look(where, head, distance)
         with RobotClient.connect(pid, "gazerig ctl look") as rig:
@@ -94,7 +94,7 @@ def stop(
     why: Annotated[str, typer.Argument(help="Reason, for the log.")] = "gazerig stop",
     pid: PidOption = None,
 ) -> None:
-    """Torque off at once, of every rig that runs here; nothing parks, the programs go on."""
+    """Switch the torque of every running rig off at once; nothing parks, the programs continue."""
     with clear_errors():
         rigs = running(pid, "gazerig stop")
         if not rigs:

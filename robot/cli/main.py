@@ -113,11 +113,11 @@ def begin(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", help="Show the version and end.", callback=_version, is_eager=True
+            "--version", help="Show the version and exit.", callback=_version, is_eager=True
         ),
     ] = False,
 ) -> None:
-    """Makes an animatronic head look at people the way people look at each other."""
+    """Make an animatronic head look at people as people look at each other."""
     if context.invoked_subcommand is None:
         from gazerig.drivers.serial.list_ports import serial_ports
         from gazerig.robot.cli.main import next_steps

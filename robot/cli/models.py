@@ -18,7 +18,7 @@ from gazerig.robot.model.clock import RealClock
 app = typer.Typer()
 models = typer.Typer(
     name="models",
-    help="List and fetch model files, with which the camera finds more: faces, people, hands, eyes.",
+    help="List and download model files that detect faces, people, hands and eyes.",
     no_args_is_help=True,
 )
 app.add_typer(models)

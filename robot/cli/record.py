@@ -32,18 +32,18 @@ def record_camera(
     seconds: Annotated[
         float | None, typer.Option(min=0.0, help="Stop after S seconds; else at Ctrl-C.")
     ] = None,
-    width: Annotated[int, typer.Option(min=16, help="Width asked of the camera.")] = 640,
+    width: Annotated[int, typer.Option(min=16, help="Requested width.")] = 640,
     height: Annotated[
         int | None, typer.Option(min=16, help="Height (default: 400 for --oak, else 480).")
     ] = None,
-    rate: Annotated[float, typer.Option(min=1.0, help="Frames a second asked for.")] = 30.0,
+    rate: Annotated[float, typer.Option(min=1.0, help="Requested frames per second.")] = 30.0,
     jpeg: Annotated[
         int | None,
         typer.Option(min=1, max=100, help="JPEG of this quality; default: PNG, which is exact."),
     ] = None,
-    force: Annotated[bool, typer.Option(help="Write over an existing file.")] = False,
+    force: Annotated[bool, typer.Option(help="Overwrite an existing file.")] = False,
 ) -> None:
-    """Record what a camera gives, for gazerig run --camera-recording FILE."""
+    """Record the frames of a camera, for gazerig run --camera-recording FILE."""
     with clear_errors():
         source, name = _source(oak, camera, video, (width, height, rate))
         with signals() as stopped:

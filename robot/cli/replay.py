@@ -45,9 +45,9 @@ def replay(
         ),
     ] = None,
     page: Annotated[str, typer.Option(help="Where the page is served.")] = "127.0.0.1:8080",
-    play: Annotated[bool, typer.Option(help="Play at once, not only when asked.")] = False,
+    play: Annotated[bool, typer.Option(help="Start to play at once.")] = False,
     rerun: Annotated[
-        bool, typer.Option(help="Feed what was seen through the models of now; no page.")
+        bool, typer.Option(help="Run the recorded input through the present models; no page.")
     ] = False,
     character: Annotated[str | None, typer.Option(help="With --rerun: another character.")] = None,
     joints: Annotated[
@@ -91,7 +91,7 @@ def export(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Write a recorded run as eye-tracking tools read it: degrees, + left and + up."""
+    """Export a recorded run for eye-tracking tools: degrees, + left and + up."""
     with clear_errors():
         if csv == bids:
             raise SetupError("export takes one of --csv and --bids")

@@ -15,7 +15,7 @@ app = typer.Typer()
 
 @app.command()
 def check(rig: RigArgument = "desk") -> None:
-    """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
+    """Check a rig's YAML and list all faults at once; no servo is contacted."""
     with clear_errors(rig):
         say(checked_line(rig))
         for line in collision_lines(rig):

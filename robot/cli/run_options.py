@@ -17,7 +17,7 @@ Scene = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE",
-        help="Look at a simulated scene (default with --mock: visitor), or a script of one's own.",
+        help="Look at a simulated scene (default with --mock: visitor), or your own script.",
         autocompletion=complete_shipped("scenes"),
     ),
 ]
@@ -25,8 +25,8 @@ World = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE",
-        help="Be in a world with physics, seen through a rendered camera (needs --mock): "
-        "living-room, boxing, conversation, crowd, or a file of one's own (YAML, MJCF).",
+        help="Place the rig in a world with physics, seen through a rendered camera (needs --mock): "
+        "living-room, boxing, conversation, crowd, or your own file (YAML, MJCF).",
         autocompletion=complete_world,
     ),
 ]
@@ -46,10 +46,10 @@ NoPictures = Annotated[
     bool,
     typer.Option(
         "--no-pictures",
-        help="Render nothing of the world: detections are computed, as of a scene.",
+        help="Render no images of the world: detections are computed, as in a scene.",
     ),
 ]
-Video = Annotated[Path | None, typer.Option(help="Look at a film or frame, looped.")]
+Video = Annotated[Path | None, typer.Option(help="Look at a film or an image, in a loop.")]
 Camera = Annotated[
     str | None,
     typer.Option(
@@ -59,20 +59,18 @@ Camera = Annotated[
 Oak = Annotated[bool, typer.Option(help="Look through an OAK-D camera.")]
 Replay = Annotated[
     Path | None,
-    typer.Option(
-        "--camera-recording", help="Look at a recording of record-camera, again and again."
-    ),
+    typer.Option("--camera-recording", help="Look at a recording of record-camera, in a loop."),
 ]
 Pixels = Annotated[
-    bool, typer.Option(help="Draw the scene and find faces and motion in the frames.")
+    bool, typer.Option(help="Draw the scene and detect faces and motion in the frames.")
 ]
 Seconds = Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of all rng.")]
-Fast = Annotated[bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
+Fast = Annotated[bool, typer.Option(help="Simulated time: run as fast as possible (needs --mock).")]
 Bus = Annotated[
     str | None,
     typer.Option(
-        help="What replaces the servos: emulated (byte for byte, default with --mock) or ideal "
+        help="Substitute for the servos: emulated (byte for byte, default with --mock) or ideal "
         "(goals in, a lag out: twice as fast)."
     ),
 ]
@@ -120,10 +118,13 @@ Page = Annotated[
 NoPage = Annotated[bool, typer.Option("--no-page", help="Without the live page.")]
 NoBrowser = Annotated[
     bool,
-    typer.Option("--no-browser", help="Leave opening the page to you; else the browser shows it."),
+    typer.Option("--no-browser", help="Do not open the page in a browser."),
 ]
 Verbose = Annotated[
-    bool, typer.Option("--verbose", help="Say also which registers are set and tables adjusted.")
+    bool,
+    typer.Option(
+        "--verbose", help="Also print which registers are set and which tables are adjusted."
+    ),
 ]
 Heatmap = Annotated[
     Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
@@ -137,7 +138,7 @@ RecordPictures = Annotated[
 ]
 Force = Annotated[
     bool,
-    typer.Option("--force", help="Write over an older recording, heat map or summary."),
+    typer.Option("--force", help="Overwrite an existing recording, heat map or summary."),
 ]
 Summary = Annotated[
     str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")

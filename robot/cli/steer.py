@@ -49,7 +49,7 @@ def steer(
     ] = False,
     pid: PidOption = None,
 ) -> None:
-    """Steer the running head by arrow keys or a gamepad; let go, and it looks freely again."""
+    """Steer the running head by arrow keys or a gamepad; released, it looks freely again."""
     with clear_errors():
         with_pad = gamepad or device is not None
         if keyboard and with_pad:

@@ -219,9 +219,7 @@ RigArgument = Annotated[
 ]
 
 
-ForceOption = Annotated[
-    bool, typer.Option("--force", help="Write over files that are there already.")
-]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
 
 
 @contextlib.contextmanager

@@ -23,14 +23,14 @@ from gazerig.robot.remote.client import RobotClient, running
 
 ctl = typer.Typer(
     name="ctl",
-    help="Speak to a rig that runs in another terminal: parameters, where it looks, what it does.",
+    help="Control a rig that runs in another terminal: parameters, gaze target, behaviour.",
     no_args_is_help=True,
 )
 
 
 @ctl.callback()
 def choose(context: typer.Context, rig: PidOption = None) -> None:
-    """Speak to a rig that runs in another terminal: parameters, where it looks, what it does."""
+    """Control a rig that runs in another terminal: parameters, gaze target, behaviour."""
     if rig is not None and isinstance(context.command, TyperGroup):
         context.default_map = {name: {"pid": rig} for name in context.command.commands}
 
@@ -222,7 +222,7 @@ def character(
     ],
     pid: PidOption = None,
 ) -> None:
-    """Lay a character over the running rig in place of the present one."""
+    """Apply another character to the running rig."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         _tell(rig.character(name))
         say(f"character {name} is in force")

@@ -61,11 +61,12 @@ def doctor(
         typer.Option(min=0, metavar="N", help="Look through webcam N for some seconds, too."),
     ] = None,
     fix: Annotated[
-        bool, typer.Option("--fix", help="Mend what is safe; torque stays off, nothing moves.")
+        bool,
+        typer.Option("--fix", help="Apply the safe fixes; the torque stays off, nothing moves."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Examine every port and servo against the rig's YAML; every finding has its cure."""
+    """Check every port and servo against the rig's YAML; every finding comes with a remedy."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         refuse_packages(model, "doctor")

@@ -54,14 +54,16 @@ def monitor(
     rig: RigArgument = "desk",
     seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
     rate: Annotated[
-        float, typer.Option(metavar="HZ", min=0.1, max=50.0, help="Looks a second.")
+        float, typer.Option(metavar="HZ", min=0.1, max=50.0, help="Readings per second.")
     ] = (5.0),
     once: Annotated[bool, typer.Option("--once", help="Print one table.")] = False,
-    as_lines: Annotated[bool, typer.Option("--json", help="Print one JSON line a look.")] = False,
+    as_lines: Annotated[
+        bool, typer.Option("--json", help="Print one line of JSON per reading.")
+    ] = False,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Watch all servos; reads alone: nothing is written, torque stays as it is."""
+    """Show the readings of all servos; nothing is written to them, the torque stays as it is."""
     leaving = contextlib.suppress(KeyboardInterrupt)
     with clear_errors(rig, port, mock), signals() as stopped, leaving:
         stopped.tolerated = 0  # nothing to park: what waits for a stopped terminal ends at once

@@ -42,7 +42,10 @@ YesOption = Annotated[
     bool, typer.Option("--yes", help="Hobby servos: no hand is in the mechanism, do not ask.")
 ]
 NoParkOption = Annotated[
-    bool, typer.Option("--no-park", help="Torque off where it stands, without parking first.")
+    bool,
+    typer.Option(
+        "--no-park", help="Switch the torque off at the present pose, without parking first."
+    ),
 ]
 
 

@@ -25,7 +25,7 @@ host = Host()
 """Source of data about the ports of this computer."""
 
 YesOption = Annotated[bool, typer.Option("--yes", help="Yes to every question.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="One line of JSON instead of words.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one line of JSON instead of text.")]
 
 
 def ports_here() -> tuple[SerialPort, ...]:

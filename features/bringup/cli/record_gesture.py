@@ -53,7 +53,7 @@ def record_gesture(
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Record a gesture by hand: torque off, move the head, and it is written as YAML."""
+    """Record a gesture in YAML while you move the head by hand, torque off."""
     with clear_errors(rig, port, mock):
         from gazerig.robot.app.gesture_file import gesture_text, write_gesture
 

@@ -50,7 +50,7 @@ def scan(
         str | None,
         typer.Argument(
             metavar="RIG",
-            help="Ask the ports of this rig; default: the only port, with --mock rig desk.",
+            help="Search the ports of this rig; default: the only port, with --mock rig desk.",
             autocompletion=complete_rig,
         ),
     ] = None,
@@ -64,12 +64,13 @@ def scan(
     ] = None,
     bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
     thorough: Annotated[
-        bool, typer.Option("--thorough", help="Wait long, and ask every id, at every baud rate.")
+        bool,
+        typer.Option("--thorough", help="Search every id at every baud rate, with long timeouts."),
     ] = False,
     mock: MockOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """List serial ports, and who answers on one at every baud rate.
+    """List serial ports, and the servos that answer on one at any baud rate.
 
     Moves and changes nothing; only a Maestro's list of errors is cleared by asking for it.
     """

@@ -54,7 +54,7 @@ def setup(
         typer.Option(metavar="FILE", help="Write a Maestro's settings as a file of Pololu's."),
     ] = None,
 ) -> None:
-    """Set id and baud rate of each servo, one connected at a time; test a Maestro's channels."""
+    """Set id and baud rate of the servos, connected one at a time; test a Maestro's channels."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         refuse_packages(model, "setup")

@@ -21,7 +21,7 @@ def fit_scanpath(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,
     force: ForceOption = False,
 ) -> None:
-    """Fit a walk over the face to an eye-tracker recording, as YAML that run takes."""
+    """Fit a walk over the face to an eye-tracker recording; write it as YAML for gazerig run."""
     with clear_errors():
         from gazerig.config.load import load
         from gazerig.features.lab.analysis import fit_scanpath as fitting

@@ -8,7 +8,7 @@ from gazerig.features.study.cli.run import delete, film, run
 
 app = typer.Typer(
     name="study",
-    help="Let people judge two to six gazes, blind: design, run and analyse a study.",
+    help="Design, run and analyse a blind study in which people judge two to six styles of gaze.",
     no_args_is_help=True,
 )
 app.command("design")(design)

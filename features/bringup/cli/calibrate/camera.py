@@ -99,7 +99,7 @@ def calibrate_board(
     square: SquareOption = _BOARD.square_mm,
     force: ForceOption = False,
 ) -> None:
-    """Write the ChArUco board as a page to print in true size: gazerig calibrate board."""
+    """Write the ChArUco board as a page to print at true size: gazerig calibrate board."""
     with clear_errors():
         write_page(CharucoBoard(_board(columns, rows, square, RULER_MM)), paper.value, out, force)
         say(f"{out}: print it at 100 % on {paper.value}, glue it on something flat and stiff,")

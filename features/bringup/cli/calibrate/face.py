@@ -65,7 +65,9 @@ def calibrate_face(
     scene: Annotated[
         str | None, typer.Option(help=f"Look at a simulated scene (with --mock: {STILL_SCENE}).")
     ] = None,
-    video: Annotated[Path | None, typer.Option(help="Look at a photo or film, looped.")] = None,
+    video: Annotated[
+        Path | None, typer.Option(help="Look at a photo or a film, in a loop.")
+    ] = None,
     camera: Annotated[int | None, typer.Option(min=0, help="Look through webcam N.")] = None,
     oak: Annotated[bool, typer.Option("--oak", help="Look through an OAK-D camera.")] = False,
     out: OutOption = None,
@@ -87,7 +89,7 @@ def calibrate_face(
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:
-    """Steer the gaze over your face to each of its parts, and write down where they are."""
+    """Steer the gaze over your face to each of its parts, and store their positions."""
     with clear_errors(rig, port, mock), signals() as stopped:
         loaded = load_rig(rig)
         refuse_unwritable(rig, out)

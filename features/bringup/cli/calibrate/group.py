@@ -31,7 +31,7 @@ class DefaultCommandGroup(TyperGroup):
 app = typer.Typer(
     name="calibrate",
     cls=DefaultCommandGroup,
-    help="Find out and write into the rig's YAML: joints (the default), camera, face.",
+    help="Calibrate joints (the default), camera or face, and write the result into the rig's YAML.",
     subcommand_metavar="[joints|camera|board|face] [RIG] ...",
 )
 app.command("joints")(calibrate_joints)

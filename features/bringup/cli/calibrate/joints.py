@@ -248,17 +248,18 @@ def _torque_off_after(
 def calibrate_joints(
     rig: RigArgument = "desk",
     joint: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")
+        list[str] | None, typer.Option(metavar="NAME", help="This joint only; repeatable.")
     ] = None,
     by: Annotated[
-        ActuationMode, typer.Option(help="Turned by hand, torque off, or gently by itself.")
+        ActuationMode,
+        typer.Option(help="By hand with the torque off, or by gentle motion of the servo."),
     ] = ActuationMode.hand,
     margin: Annotated[
-        float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Kept from each end.")
+        float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Margin kept from each end.")
     ] = 2.0,
     zero: Annotated[
         ZeroReference,
-        typer.Option(help="With --by motion: zero half-way, or where a person puts it."),
+        typer.Option(help="With --by motion: zero half-way, or where you put it."),
     ] = ZeroReference.middle,
     strength: Annotated[
         float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")
