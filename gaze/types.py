@@ -28,6 +28,15 @@ def vec(row: Floats) -> Vec3:
     return (x, y, z)
 
 
+FIRST_THING = 1_000_001
+"""Id of the first hand or thing: the ids of people count from 1, and each id is of one body."""
+
+
+def body_name(kind: str, id: int) -> str:
+    """Return the name of a body in messages: its kind and its number among people or things."""
+    return kind if id < 0 else f"{kind} {id - FIRST_THING + 1 if id >= FIRST_THING else id}"
+
+
 Phase = Literal["fixate", "saccade", "pursue"]
 
 # The eight face parts in the order of the transition matrix (Nakamoto & Tsuruno, eq 1);
@@ -49,7 +58,7 @@ PART_NAMES = {
 class Bodies:
     """Possible targets of the gaze, one row per body.
 
-    ids:       stable identity of each body
+    ids:       stable identity of each body; of people from 1, of hands and things from FIRST_THING
     kinds:     "face", "hand", "thing", ... as perception named it
     p_world_m: (n, 3) positions of the centres
     v_world_m_s: (n, 3) velocities

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.drivers.types import Clothing
+from gazerig.gaze.types import FIRST_THING, body_name
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import covariance
 from gazerig.robot.perception.track import LocalisedDetection, Track
@@ -70,7 +71,7 @@ def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker:
 def test_a_face_that_stays_where_it_was_is_known_again_after_long(
     y: float, after_s: float, remember_s: float, same: bool
 ) -> None:
-    tracker = Tracker(TrackParams(remember_face_s=remember_s))
+    tracker = Tracker(TrackParams(remember_face_s=remember_s, remember_person_s=0.0))
     for k in range(10):
         (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, k / 30)
     for k in range(10, round(30 * after_s)):
@@ -292,12 +293,65 @@ def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(
 
 
 def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
-    tracker = Tracker(TrackParams(remember_face_s=5.0))
+    tracker = Tracker(TrackParams(remember_face_s=5.0, remember_person_s=60.0))
     for k in range(15):
         (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
     tracker.step([], CAMERA, 6.0)
-    (back,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, 6.03)
-    assert back.id != gone.id
+    for t_s, same in ((50.0, True), (150.0, False)):
+        (back,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, t_s)
+        assert (back.id == gone.id) is same
+        tracker.step([], CAMERA, t_s + 2.0)
+
+
+def visit(tracker: Tracker, start_s: float, *found: LocalisedDetection) -> list[int]:
+    """Show a person in consecutive frames, then nobody for 2 s; return the numbers."""
+    tracker.step([], CAMERA, start_s - 1.0)
+    shown = [
+        tracker.step([one], CAMERA, start_s + k / 30)[0].id for k, one in enumerate(found)
+    ]  # fmt: skip
+    tracker.step([], CAMERA, start_s + len(found) / 30 + 2.0)
+    return shown
+
+
+def test_people_and_things_count_separately(tracker: Tracker) -> None:
+    found = [across(0.5, kind="thing"), across(-0.5), across(0.0, kind="hand")]
+    ids = [track.id for track in tracker.step(found, CAMERA, 0.0)]
+    assert ids == [FIRST_THING, 1, FIRST_THING + 1]
+    assert [body_name("hand", i) for i in ids] == ["hand 1", "hand 1", "hand 2"]
+
+
+def test_a_person_who_comes_back_at_the_other_side_keeps_the_number(tracker: Tracker) -> None:
+    assert {*visit(tracker, 0.0, *[across(0.5)] * 15)} == {1}
+    assert {*visit(tracker, 40.0, *[across(-0.9)] * 15)} == {1}
+    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.6))
+    assert {*visit(tracker, 80.0, *[taller] * 15)} == {2}
+
+
+def test_nobody_is_faster_than_a_walker(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[across(0.0, 3.0)] * 15)
+    far = replace(across(0.0), p_world_m=(1.5, 20.0, 0.2))
+    assert {*visit(tracker, 4.0, *[far] * 15)} == {2}
+
+
+def test_a_false_detection_gives_its_number_back(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[across(0.5)] * 3)
+    taller = replace(across(0.5), p_world_m=(1.5, 0.5, 0.9))
+    assert {*visit(tracker, 10.0, *[taller] * 15)} == {1}
+
+
+def test_a_false_detection_does_not_keep_the_number_of_a_person_who_left(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[across(0.5)] * 15)
+    assert visit(tracker, 30.0, across(-0.5)) == [1]
+    assert {*visit(tracker, 60.0, *[across(-0.9)] * 15)} == {1}
+
+
+def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker) -> None:
+    visit(tracker, 0.0, *[dressed(across(0.5), 3)] * 15)
+    stranger = visit(tracker, 30.0, across(0.4), *[dressed(across(0.4), 7)] * 15)
+    assert stranger[0] == 1 and stranger[-1] == 2
+    low = replace(across(0.4), p_world_m=(1.5, 0.4, 0.0))
+    known = visit(tracker, 60.0, low, *[dressed(low, 3)] * 15)
+    assert known[0] != 1 and known[-1] == 1
 
 
 def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_clothes(

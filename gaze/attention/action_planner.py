@@ -25,7 +25,7 @@ from gazerig.gaze.attention.opponent import (
     nearest_face,
     places,
 )
-from gazerig.gaze.types import Face, Percept, Vec3
+from gazerig.gaze.types import Face, Percept, Vec3, body_name
 from gazerig.params import Bounds
 
 Action = Literal["wait", "guard", "attack"]
@@ -189,7 +189,7 @@ class ActionPlanner:
         if self.plan.action != "guard":
             self._since_s = t_s
         self._open = None
-        why = f"{threat.kind} {threat.id} arrives in {threat.contact_s:.2f} s"
+        why = f"{body_name(threat.kind, threat.id)} arrives in {threat.contact_s:.2f} s"
         return Plan("guard", why, threat.id)
 
     def _attack(self, face: Face | None, found: list[HitTarget], t_s: float) -> Plan:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from gazerig.gaze.attention.bottom_up import SalienceRow
 from gazerig.gaze.attention.top_down import RuleTarget
-from gazerig.gaze.types import Bodies, Salience, Target, vec
+from gazerig.gaze.types import Bodies, Salience, Target, body_name, vec
 
 NO_BODY = -1
 """Id of a target that is a point and not a body."""
@@ -45,7 +45,7 @@ class TargetComparison(NamedTuple):
         first, rule_target = saliences[0], self.rule_target
         moving = first.translation + first.looming + first.rotation + first.onset
         by_rule = rule_target is not None and first.rule > 0.0 and first.rule >= moving
-        name = first.kind if first.id < 0 else f"{first.kind} {first.id}"
+        name = body_name(first.kind, first.id)
         if rule_target is not None and by_rule:
             why = f"{name}: rule {rule_target.behaviour} {first.rule:.2f}"
         else:

@@ -25,7 +25,7 @@ from typing import Annotated
 import numpy as np
 
 from gazerig.gaze.angles import add, angle_between, direction, norm, scale, sub, wrap, yaw_pitch
-from gazerig.gaze.types import Angles2, Target, Vec3
+from gazerig.gaze.types import Angles2, Target, Vec3, body_name
 from gazerig.params import Bounds
 
 LOST = "lost, waiting"
@@ -230,7 +230,7 @@ class Idle:
             here + step,
             min(radians(45.0), max(-radians(45.0), to_pitch)),
         )
-        self._look("search", place, norm(rel), t_s, f"looking for {gone.kind} {gone.id}")
+        self._look("search", place, norm(rel), t_s, f"looking for {body_name(gone.kind, gone.id)}")
         until_s = t_s + self._time_s(par.search_fixation_ms, rng)
         self._until_s = min(until_s, max(self._search_until_s, t_s + _SHORTEST_S))
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
-from gazerig.gaze.types import ORDERED, PART_NAMES, Target
+from gazerig.gaze.types import ORDERED, PART_NAMES, Target, body_name
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.kinematics import gaze_error
 from gazerig.robot.model.leader import Leader, leader_of, sentence, title
@@ -47,7 +47,7 @@ def camera_conditions(tick: Tick) -> tuple[str, ...]:
 def target_name(target: Target) -> str:
     """Return a target's name for users, e.g. "face 3: left eye"."""
     kind = "motion" if target.kind == "thing" else target.kind
-    name = kind if target.id < 0 else f"{kind} {target.id}"
+    name = body_name(kind, target.id)
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 
 

@@ -33,8 +33,10 @@ class TrackParams:
     coast_person_ms: Annotated[float, Bounds(0, 10000),
         "a person whose face is not visible is still reported for this long: detector.people_hz searches seldom"] = 1200.0
     forget_ms: Annotated[float, Bounds(0, 60000),
-        "a track without a detection is deleted after this long; what returns later gets a new id"] = 1500.0
+        "a track without a detection is deleted after this long; a thing that returns later gets a new id"] = 1500.0
     remember_face_s: Annotated[float, Bounds(0, 3600),
         "a face out of sight for longer is remembered for this time: it is known again where it was, within gate_m, and looked at if no "
         "face is visible"] = 20.0
+    remember_person_s: Annotated[float, Bounds(0, 3600),
+        "a person who comes back within this time keeps the number, if position, height and clothes allow it"] = 300.0
     # fmt: on

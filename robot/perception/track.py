@@ -11,6 +11,7 @@ from gazerig.gaze.angles import add, angle_between, compose, rotate
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.kalman import TrackFilter
+from gazerig.robot.perception.returning_people import Person
 
 _EYES_HELD_S = 0.12
 """Time for which the eyes' gaze holds if the next frames show a mesh, but not the irises."""
@@ -241,6 +242,8 @@ class Track:
     speech: of a face, recent motion of the mouth
     eyes: of a face, last seen state of the eyes
     clothes: of a person, as learned
+    returned: the person whose number a person's new track has got, None for a new number;
+        numbered: whether that is final, as the clothes are known
     box_m, lower_face: as of a detection, usual values of the face; bare: number of frames with
         them; lower_var: relative variance from frame to frame
     covered: number of frames with a covered lower half of the face; covered_s: capture time of the
@@ -262,6 +265,8 @@ class Track:
     faced_s: float = -inf
     frames: int = 1
     clothes: KnownClothes = field(default_factory=KnownClothes)
+    returned: Person | None = None
+    numbered: bool = False
     box_m: float = 0.0
     lower_face: float = 0.0
     lower_var: float = _SHAPE_SD * _SHAPE_SD

@@ -6,13 +6,14 @@ these terms (data_association), and a Kalman filter of direction and range (kalm
 track with its detection.
 
 People who were confused while hidden get their numbers back by the colours of their clothes,
-learned over many frames.
+learned over many frames. People count from 1; a person who comes back keeps the number
+(returning_people). Things have numbers of their own.
 """
 
 from math import inf, sqrt
 
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
-from gazerig.gaze.types import Mat3, Vec3
+from gazerig.gaze.types import FIRST_THING, Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.data_association import (
     FORBIDDEN,
@@ -25,6 +26,7 @@ from gazerig.robot.perception.data_association import (
     pair_costs,
 )
 from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, sight
+from gazerig.robot.perception.returning_people import Person, find_returned
 from gazerig.robot.perception.track import FACE, UNNAMED, KnownClothes, LocalisedDetection, Track
 
 # Number of frames with clothes after which they identify a person; number below which the person
@@ -118,6 +120,7 @@ def _renumber(tracks: list[Track], seen: list[Track], params: TrackParams) -> No
         if one is not people[k]:
             one.id = number
             one.clothes = KnownClothes(colours, frames, lost_sight=one.clothes.lost_sight)
+            one.returned, one.numbered = None, True
             if one.seen_s < one.at_s and frames < _OWN:
                 tracks.remove(one)  # no new person came: it was this one
 
@@ -132,6 +135,9 @@ def _reachable(one: Track, other: Track, params: TrackParams) -> bool:
 
 _FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
 _PROVED = 3
+# A person in fewer frames than this may be a false detection, whose number is given again. Number
+# of frames with clothes that settle the number. Largest number of people who left.
+_KNOWN, _CLOTHED, _MOST_LEFT = 10, 5, 30
 # The lower half of a face is covered if it is below this part of its usual size, and by this number
 # of standard deviations of a frame.
 _COVERED, _COVERED_SDS = 0.8, 4.0
@@ -147,7 +153,9 @@ class Tracker:
 
     def __init__(self, params: TrackParams) -> None:
         self._tracks: list[Track] = []
-        self._next_id = 1
+        self._next_person, self._next_thing = 1, FIRST_THING
+        self._free: set[int] = set()
+        self._left: list[Person] = []
         self._worn: list[list[float]] | None = None
         self.retune(params)
 
@@ -162,7 +170,7 @@ class Tracker:
 
     def forget(self) -> None:
         """End all identities, as the scene has changed. Numbers are not used again."""
-        self._tracks = []
+        self._tracks, self._left = [], []
 
     @property
     def params(self) -> TrackParams:
@@ -187,7 +195,9 @@ class Tracker:
         for i, j in pairs:
             self._update(self._tracks[i], detections[j], p_world_camera_m)
         if self._worn is not None:
+            given = {t.id for t in self._tracks if t.is_person and t.returned is None}
             settle(self._tracks, self._worn, dict(pairs), detections, self._params)
+            self._free |= given - {t.id for t in self._tracks}
         taken = {j for _, j in pairs}
         renamed = {
             found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
@@ -197,14 +207,22 @@ class Tracker:
         for j, detection in enumerate(detections):
             if j not in taken:
                 track = self._begin(detection, p_world_camera_m, t_s)
-                if detection.kind != UNNAMED:
+                if detection.kind not in (UNNAMED, FACE):
                     track.id = ids.pop(detection.mark, track.id)
                 self._tracks.append(track)
-        self._tracks = [
+        for track in self._tracks:
+            if track.is_person and not track.numbered and track.clothes.frames >= _CLOTHED:
+                self._number(track)
+                track.numbered = True
+        kept = [
             t
             for t in self._tracks
             if t_s - t.seen_s <= self._kept_s(t) and not _is_another_now(t, renamed)
         ]
+        for track in self._tracks:
+            if track.is_person and track not in kept:
+                self._leave(track)
+        self._tracks = kept
         return tuple([t for t in self._tracks if t_s - t.seen_s <= self._coasts_s(t)])
 
     def shows_face(self, track: Track) -> bool:
@@ -220,7 +238,8 @@ class Tracker:
     def _kept_s(self, track: Track) -> float:
         """Return the time for which a track is kept without a detection."""
         par = self._params
-        return max(par.forget_ms / 1e3, par.remember_face_s if track.is_person else 0.0)
+        known = track.is_person and track.frames >= _KNOWN
+        return max(par.forget_ms / 1e3, par.remember_face_s if known else 0.0)
 
     def _is_remembered(self, track: Track) -> bool:
         """Return whether a track is out of sight for a long time, so that it is assumed to stay."""
@@ -271,7 +290,7 @@ class Tracker:
 
     def _begin(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
         track = Track(
-            self._next_id,
+            0,
             detection,
             TrackFilter(
                 detection.p_world_m,
@@ -286,12 +305,56 @@ class Tracker:
             detection.face_length,
             faced_s=t_s if detection.R_world_face is not None else -inf,
         )
-        self._next_id += 1
         self._learn_size(track, detection, 1.0)
         _learn_shape(track, detection)
         track.clothes.learn(detection.clothing)
         _correct_velocity(track, detection)
+        if track.is_person:
+            self._number(track)
+        else:
+            track.id, self._next_thing = self._next_thing, self._next_thing + 1
         return track
+
+    def _number(self, track: Track) -> None:
+        """Give a person's new track the number of the person who has come back, or a free one."""
+        par, now_s = self._params, track.at_s
+        if track.returned is not None:
+            self._left.append(track.returned)
+        gone = [
+            one
+            for one in self._tracks
+            if one.is_person and one is not track and self._is_remembered(one)
+        ]
+        before, known = track.returned, [*self._left, *map(_person, gone)]
+        recent = [one for one in known if now_s - one.seen_s <= par.remember_person_s]
+        track.returned = back = find_returned(recent, _person(track))
+        if back is None:
+            if before is not None or not track.id:
+                track.id = self._new_number()
+            return
+        if before is None and track.id:
+            self._free.add(track.id)
+        track.id = back.id
+        self._left = [one for one in self._left if one.id != back.id]
+        self._tracks = [one for one in self._tracks if one not in gone or one.id != back.id]
+
+    def _new_number(self) -> int:
+        """Return the lowest number that no person has or had."""
+        if self._free:
+            number = min(self._free)
+            self._free.remove(number)
+            return number
+        self._next_person += 1
+        return self._next_person - 1
+
+    def _leave(self, track: Track) -> None:
+        """Remember a person who left; a false detection gives its number back."""
+        if track.frames >= _KNOWN:
+            self._left = [*self._left, _person(track)][-_MOST_LEFT:]
+        elif track.returned is not None:
+            self._left.append(track.returned)
+        else:
+            self._free.add(track.id)
 
     def _update(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
         """Update a track with a detection."""
@@ -334,6 +397,16 @@ class Tracker:
         gain = 1.0 if track.depth_s is None else gain
         track.face_size += gain * (1.0 / detection.size_depth - track.face_size)
         track.depth_s = track.at_s
+
+
+def _person(track: Track) -> Person:
+    """Return the features of the person of a track."""
+    before, worn = track.returned, track.clothes.colours
+    size = None if track.depth_s is None else track.face_size
+    if before is not None:
+        size = before.face_size if size is None else size
+        worn = before.colours if worn is None else worn
+    return Person(track.id, track.p_world_m, track.seen_s, size, worn)
 
 
 def _is_covered(track: Track, found: LocalisedDetection) -> bool:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
-from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3
+from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3, body_name
 from gazerig.robot.control.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import REPEATED, Command, Jog, Stop
@@ -221,7 +221,7 @@ class GazeAnglesBuilder:
 
 def target_text(target: Target) -> str:
     """Return kind and id of a target, e.g. "face 3"."""
-    return target.kind if target.id < 0 else f"{target.kind} {target.id}"
+    return body_name(target.kind, target.id)
 
 
 def command_text(command: Command) -> str:

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from gazerig.gaze.types import Salience
+from gazerig.gaze.types import Salience, body_name
 from gazerig.robot.dashboard.widgets.html import PHASES, chip, heading, note, pill
 from gazerig.robot.model.types import Snapshot
 
@@ -101,7 +101,7 @@ def _row(salience: Salience, full: float, *, winner: bool) -> str:
     )
     return (
         f"<div class='body{' first' if winner else ''}'>"
-        f"<div><span>{escape(salience.kind)} {salience.id}</span>"
+        f"<div><span>{escape(body_name(salience.kind, salience.id))}</span>"
         f"<span>{salience.habituation:.2f} &times;&ensp;{salience.total:.2f}</span></div>"
         f"<div class='bar' aria-hidden='true'>{bars}</div>"
         f"<div class='small'>{figures}</div></div>"
