@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, overload
 
+from gazerig.config.schema import layers_of
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.local_head import LocalHead, RunningHead, SimulatedHead
@@ -77,9 +78,11 @@ def open(
         say: receives one line per message; None: ``logging.getLogger("gazerig")``.
 
     Raises:
-        Error: the options do not fit together. Errors of the rig or its servos (``ConfigError``,
-            ``SetupError``) are raised at the start of the block.
+        ConfigError: there is no such rig, profile or character. Faults in it, and errors of its
+            servos (``SetupError``), are raised at the start of the block.
+        Error: the options do not fit together.
     """
+    layers_of(rig, character, profile)
     own = camera if not isinstance(camera, int | str) else None
     seen = camera if isinstance(camera, int | str) else None
     sees = any(one is not None for one in (scene, world, video, seen)) or oak

@@ -1,6 +1,11 @@
 """Errors of the drivers, grouped by what the caller can do about them."""
 
+from pathlib import Path
+
 from gazerig.errors import Error
+
+_CLONE = Path(__file__).resolve().parents[1]
+"""Folder of the repository if the program runs from a clone of it."""
 
 
 class DriverError(Error):
@@ -49,4 +54,11 @@ def extra_hint(package: str, extra: str, error: ImportError) -> str:
     """
     absent = isinstance(error, ModuleNotFoundError) and error.name == package.replace("-", "_")
     reason = "is not installed" if absent else f"cannot be loaded ({' '.join(str(error).split())})"
-    return f"{package} {reason}: pip install 'gazerig[{extra}]'"
+    return f"{package} {reason}: {install_command(extra)}"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra of gazerig: from the clone it runs from, if any."""
+    if not (_CLONE / "pyproject.toml").is_file():
+        return f"pip install 'gazerig[{extra}]'"
+    return f"pip install -e '{'.' if Path.cwd() == _CLONE else _CLONE}[{extra}]'"

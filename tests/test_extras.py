@@ -9,7 +9,7 @@ import pytest
 from features_there import needs_all_features
 from light_python import LightPython
 
-from gazerig.drivers.errors import extra_hint
+from gazerig.drivers.errors import extra_hint, install_command
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -65,8 +65,8 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
             "copy.yaml",
         ),  # fmt: skip
     )
-    draws = "matplotlib is not installed: pip install 'gazerig[report]'"
-    sees = "depthai is not installed: pip install 'gazerig[oak]'"
+    draws = f"matplotlib is not installed: pip install -e '{ROOT}[report]'"
+    sees = f"depthai is not installed: pip install -e '{ROOT}[oak]'"
     assert (codes, said) == (["2"] * 4, [draws, draws, draws, sees])
     assert not list(tmp_path.iterdir())
 
@@ -84,11 +84,22 @@ def test_the_head_runs_without_extras(python: LightPython, tmp_path: Path) -> No
     assert (tmp_path / "run.json").is_file()
 
 
+def test_a_clone_installs_an_extra_from_its_own_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(ROOT)
+    assert install_command("world") == "pip install -e '.[world]'"
+    monkeypatch.chdir(tmp_path)
+    assert install_command("world") == f"pip install -e '{ROOT}[world]'"
+    monkeypatch.setattr("gazerig.drivers.errors._CLONE", tmp_path)
+    assert install_command("world") == "pip install 'gazerig[world]'"
+
+
 def test_a_package_that_is_there_and_does_not_load_is_told_with_the_reason() -> None:
     broken = ImportError("libstdc++.so.6: cannot open\nshared object file", name="depthai")
     assert extra_hint("depthai", "oak", broken) == (
         "depthai cannot be loaded (libstdc++.so.6: cannot open shared object file): "
-        "pip install 'gazerig[oak]'"
+        f"{install_command('oak')}"
     )
     within = ModuleNotFoundError("No module named 'numpy.core'", name="numpy.core")
     assert extra_hint("depthai", "oak", within).startswith("depthai cannot be loaded (No module")

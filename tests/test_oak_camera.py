@@ -30,7 +30,7 @@ from gazerig.drivers.camera.oak.pipeline import (
     set_controls,
 )
 from gazerig.drivers.camera.oak.source import OakSource
-from gazerig.drivers.errors import CameraError
+from gazerig.drivers.errors import CameraError, install_command
 
 GO_ON = threading.Event()
 PARAMS = OakParams(width_px=320, height_px=240, rate_hz=60.0, silence_ms=3000.0)
@@ -270,7 +270,7 @@ def test_depthai_that_is_not_there_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "depthai", None)
     with pytest.raises(CameraError) as told:
         load_depthai()
-    assert str(told.value) == "depthai is not installed: pip install 'gazerig[oak]'"
+    assert str(told.value) == f"depthai is not installed: {install_command('oak')}"
 
 
 # Exposure, flicker and focus from the rig's file to the camera, and what is refused

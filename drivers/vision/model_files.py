@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.errors import ModelFileError, install_command
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 FOLDER_VARIABLE = "GAZERIG_MODELS"
@@ -195,7 +195,7 @@ def detector_status(params: FaceDetectorParams) -> DetectorStatus:
             has_yunet = YUNET.state() == "there"
         kind = "auto (YuNet and MTCNN)" if has_yunet else "auto (MTCNN alone)"
         lacks += [] if has_yunet else [YUNET.cure]
-    runs, litert = [], [] if find_spec("ai_edge_litert") else ["pip install 'gazerig[people]'"]
+    runs, litert = [], [] if find_spec("ai_edge_litert") else [install_command("people")]
     for network, rate_hz, also in (
         (PEOPLE, params.people_hz, "people also turned away"),
         (PALMS, params.hands_hz, "palms"),

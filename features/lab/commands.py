@@ -1,6 +1,6 @@
 """The lab's entries in the list of commands; a light module, because every command imports it."""
 
-from gazerig.robot.cli.command_list import CommandEntry
+from gazerig.robot.cli.command_list import SPECIALIST, CommandEntry
 
 REPORT = CommandEntry(
     "gazerig.features.lab.cli.report",
@@ -24,7 +24,7 @@ COMPARE = CommandEntry(
 SWEEP = CommandEntry(
     "gazerig.features.lab.cli.sweep",
     "Vary parameters over many simulated runs; write a table and a figure of the responses.",
-    "Look back",
+    SPECIALIST,
     examples={
         "sweep": (
             ("sweep --set gaze.head.comfort_deg=4:16:7 --seeds 8", "a table and curves of 56 runs"),
@@ -40,6 +40,7 @@ SWEEP = CommandEntry(
 FIT_SCANPATH = CommandEntry(
     "gazerig.features.lab.cli.fit_scanpath",
     "Fit a walk over the face to an eye-tracker recording; write it as YAML for gazerig run.",
+    SPECIALIST,
     examples={
         "fit-scanpath": (
             ("fit-scanpath gaze.csv --parts boxes.yaml", "a walk from an eye tracker's samples"),

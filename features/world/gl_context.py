@@ -12,7 +12,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any, Literal, TypeVar
 
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import SetupError, install_command
 
 Backend = Literal["egl", "osmesa", "glfw"]
 
@@ -95,9 +95,8 @@ def import_mujoco() -> ModuleType:
         try:
             return import_module("mujoco")
         except ImportError as error:
-            raise SetupError(
-                f"a world needs MuJoCo ({_line(error)}): pip install 'gazerig[world]'"
-            ) from error
+            hint = install_command("world")
+            raise SetupError(f"a world needs MuJoCo ({_line(error)}): {hint}") from error
 
 
 @contextmanager

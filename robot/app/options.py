@@ -136,6 +136,8 @@ class RunOptions:
             SetupError: they contradict each other.
         """
         _ = self.page_address
+        if self.fast and not self.mock:
+            raise SetupError("--fast needs --mock: real servos cannot be hurried")
         if self.name is not None and not _NAME.fullmatch(self.name):
             raise SetupError(f"--name {self.name}: a letter, then at most 31 of a-z A-Z 0-9 _ -")
         self._refuse_bus()
@@ -191,8 +193,6 @@ class RunOptions:
         world, camera = self.world is not None, self.camera is not None or self.oak
         if self.port is not None and self.mock:
             raise SetupError("--port and --mock exclude each other: --mock has a port of its own")
-        if self.fast and not self.mock:
-            raise SetupError("--fast needs --mock: real servos cannot be hurried")
         if self.fast and camera:
             raise SetupError("--fast needs a scene, a film or a recording: a camera has real time")
         if world and not self.mock:

@@ -12,7 +12,7 @@ from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.drivers.camera.double_buffer import PoseBuffer
 from gazerig.drivers.plugins import EmulatedJoint
-from gazerig.drivers.serial.list_ports import check_owner, serial_ports
+from gazerig.drivers.serial.list_ports import check_exists, check_owner, serial_ports
 from gazerig.drivers.types import ServoBus
 from gazerig.robot.app.bus_wiring import (
     bus_names,
@@ -209,6 +209,7 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
     if not options.mock:
         paths, here = bus_ports(rig, options.port), serial_ports()
         for name, path in paths.items():
+            check_exists(path)
             check_owner(path, rig.bus_named(name).kind, here)
         return RunBus(guarded_rig_bus(rig, paths))
     if options.bus == "ideal":

@@ -33,6 +33,9 @@ class CommandEntry(NamedTuple):
     examples: Mapping[str, Examples] = MappingProxyType({})
 
 
+SPECIALIST = "For specialists"
+"""Panel of commands that a first head does without."""
+
 PANELS: dict[str, dict[str, CommandEntry]] = {
     "Run": {
         "run": CommandEntry(
@@ -68,6 +71,12 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "rig_check",
             "Check a rig's YAML and list all faults at once; no servo is contacted.",
         ),
+        "models": CommandEntry(
+            "models",
+            "List and download model files that detect faces, people, hands and eyes.",
+        ),
+    },
+    SPECIALIST: {
         "describe": CommandEntry(
             "describe",
             "Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them.",
@@ -80,10 +89,6 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         "schema": CommandEntry(
             "rig_check",
             "Export the JSON Schema of rig files, for editors; also of studies and questionnaires.",
-        ),
-        "models": CommandEntry(
-            "models",
-            "List and download model files that detect faces, people, hands and eyes.",
         ),
         "emulate": CommandEntry(
             "emulate",

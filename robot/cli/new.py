@@ -19,7 +19,7 @@ from gazerig.config.new_rig import (
     rig_text,
     usual_port,
 )
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import SetupError, install_command
 from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
@@ -169,7 +169,7 @@ def next_steps(rig: NewRig, file: str) -> Iterable[str]:
     yield "next:"
     yield from (f"  {command:{wide}}  {what}" for command, what in steps)
     if rig.camera == "oak" and find_spec("depthai") is None:
-        yield "an OAK-D needs one more package: pip install 'gazerig[oak]'"
+        yield f"an OAK-D needs one more package: {install_command('oak')}"
 
 
 def _plugged_in(board: str) -> str:

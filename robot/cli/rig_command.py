@@ -27,7 +27,12 @@ class RigCommand(TyperCommand):
         options = [one for one in self.params if isinstance(one, TyperOption)]
         parser = TyperCommand(self.name, params=list(options)).make_parser(ctx)
         _, given, _ = parser.parse_args(list(args))
-        if all(one.nargs == 1 for one in positional):
-            return len(given) >= len(positional)
         first = given[0] if given else ""
-        return first in shipped_names("rigs") or "/" in first or first.endswith((".yaml", ".yml"))
+        named = first in shipped_names("rigs") or "/" in first or first.endswith((".yaml", ".yml"))
+        if not all(one.nargs == 1 for one in positional):
+            return named
+        missing = positional[1 + len(given) - named :]
+        if missing and given and missing[0].required and not ctx.resilient_parsing:
+            needed = [f"{one.metavar} ({(one.help or '').rstrip('.')})" for one in positional[1:]]
+            ctx.fail(f"needs {', '.join(needed)}: there is no {missing[0].metavar}")
+        return len(given) >= len(positional)

@@ -75,6 +75,11 @@ def run(
     asked = RunOptions(**locals())  # what a person can ask for is a field of the same name
     asked = replace(asked, camera=parse_camera(camera))
     with clear_errors(rig, port, mock):
+        if port is not None and not mock:
+            from gazerig.drivers.serial.list_ports import check_exists
+
+            for one in port.split(","):
+                check_exists(one.rpartition("=")[2])
         asked = asked.check_and_complete()
         refuse_existing(*asked.output_files, force=force)
         shows = status if not fast and sys.stderr.isatty() else None

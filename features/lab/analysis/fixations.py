@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import SetupError, install_command
 from gazerig.features.lab.analysis.eye_tracker_csv import FixationTable, Samples
 from gazerig.gaze.scanpath.fit import PartFixation
 from gazerig.gaze.types import PARTS, Floats
@@ -138,7 +138,7 @@ def _find_fixations(t_s: Floats, places: Floats, least: int, widest: float) -> l
         from pymovements.events import idt  # type: ignore[import-untyped]
     except ImportError:
         raise SetupError(
-            "finding fixations in samples needs pymovements: pip install 'gazerig[fit]'"
+            f"finding fixations in samples needs pymovements: {install_command('fit')}"
         ) from None
     frame = idt(places, minimum_duration=least, dispersion_threshold=widest).frame
     found = []
