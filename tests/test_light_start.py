@@ -32,7 +32,7 @@ with run.powered() as loop:
         assert loop.step() is None
     names = set(sys.modules)
     run.stopped_by = "seconds"
-composed.made.close()
+composed.assembly.close()
 packages = {{name.partition(".")[0] for name in names}} - sys.stdlib_module_names
 print("PACKAGES", *(name for name in packages if not name.startswith("_")))
 print("LATER", *(name for name in {later!r} if name in names))

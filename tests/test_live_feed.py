@@ -22,7 +22,15 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.control.tick_text import perception_text
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections, ground
-from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, RunState, drain, gaze_pixel
+from gazerig.robot.dashboard.feed.live_feed import (
+    GAZE_KEPT_S,
+    GazeHistory,
+    LiveFeed,
+    LiveRig,
+    RunState,
+    drain,
+    gaze_pixel,
+)
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
@@ -167,13 +175,23 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     lens, poses = found.located.intrinsics, page.live._poses
     assert poses is not None
     R, p_m = ran.made.shown_rig().mount.pose(*poses.head_pose(found.captured_s))
-    for gaze_px in (None, gaze_pixel(tick, R, p_m, lens)):
+    for gaze_px in (None, gaze_pixel(tick.gaze.gaze_point_world_m, R, p_m, lens)):
         drawn = draw_detections(ground(found, depth), found, gaze_px, lens, faces=False)
         if np.array_equal(drawn, news.image):
             break
     else:
         raise AssertionError("another image is drawn")
     assert drain(page.feed, page.live).image is None
+
+
+def test_a_late_frame_is_drawn_with_the_gaze_of_its_capture() -> None:
+    history = GazeHistory()
+    for n in range(1000):
+        history.add(0.005 * n, (0.001 * n, 0.0, 0.0))
+    assert history.at(4.9)[0] == pytest.approx(0.98) and history.at(9.0)[0] == pytest.approx(0.999)
+    assert history.at(0.0)[0] == pytest.approx(0.999 - 0.2 * GAZE_KEPT_S, abs=0.002)  # oldest
+    history.add(1.0, (7.0, 0.0, 0.0))  # the rig was started again
+    assert history.at(4.9) == (7.0, 0.0, 0.0)
 
 
 def test_a_simulated_scene_is_drawn_as_its_camera_sees_it(ran: Run, page: Page) -> None:

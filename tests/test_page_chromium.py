@@ -239,6 +239,39 @@ def test_the_head_looks_at_the_pointer_until_it_rests(at_the_rig: tuple[Rig, Per
     assert rig.orders[before:] == []
 
 
+def test_the_head_follows_a_finger_and_the_view_does_not_turn(
+    at_the_rig: tuple[Rig, Person],
+) -> None:
+    rig, person = at_the_rig
+    toggle = "document.querySelector('#pointer')"
+    box = "document.querySelector('#view').getBoundingClientRect()"
+    width, height = cast(Any, person.run(f"[{box}.width, {box}.height]"))
+    left, top = cast(Any, person.run(f"[{box}.x, {box}.y]"))
+
+    def touch(kind: str, *across: float) -> None:
+        points = [{"x": left + x * width, "y": top + 0.5 * height} for x in across]
+        person.tab.ask("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+    person.click(toggle)
+    touch("touchStart", 0.45)
+    points = []
+    for across in (0.48, 0.55):
+        before = len(rig.orders)
+        touch("touchMove", across)
+        wait_for(lambda n=before: len(rig.orders) > n, "the finger's point")  # type: ignore[misc]
+        look = rig.orders[-1]
+        assert isinstance(look, LookAt) and look.pointer
+        points.append(present(look.p_world_m))
+    # Farther to the right in the same view: to the head's left.
+    assert points[1][1] > points[0][1] and abs(points[1][0] - points[0][0]) < 0.02
+    touch("touchEnd")
+    person.wait_for_frames(UNHURRIED_FRAMES)
+    before = len(rig.orders)
+    person.wait_for_frames(UNHURRIED_FRAMES)
+    assert len(rig.orders) == before
+    person.click(toggle)
+
+
 def test_the_space_bar_stops_in_the_frame_of_the_view_too(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     view = "document.querySelector('#view')"

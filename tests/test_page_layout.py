@@ -1,5 +1,6 @@
 """The page in every state on a desk, a laptop and a phone: all in sight, nothing cut off."""
 
+import itertools
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,7 +21,14 @@ from gazerig.robot.model.types import Snapshot
 
 pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 
-SIZES = {"desk": (1600, 1000), "laptop": (1280, 720), "phone": (390, 844)}
+SIZES = {
+    "desk": (1600, 1000),
+    "laptop": (1280, 720),
+    "phone": (390, 844),
+    "least": (640, 480),
+    "small": (800, 600),
+    "narrow": (1000, 700),
+}
 TABS = ("watch", "steer", "tune", "health", "report")
 MENUS = {"gesture": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("awake",)}
 LEADS = {
@@ -137,10 +145,44 @@ def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, 
         width, height = SIZES[size]
         if size == "phone":
             assert right - left == width and bottom - top > 0.2 * height
+        elif size in ("least", "small", "narrow"):
+            assert right - left >= 0.4 * width and bottom - top > 0.4 * height
         else:
             assert right - left >= 0.6 * width and bottom - top > 0.6 * height
     finally:
         shown.tab(tab)
+
+
+def test_a_message_does_not_move_the_head(shown: Shown, size: str) -> None:
+    shown.state("awake")
+    still = boxes(shown.browser)["stage"]
+    for state in ("busy", "stopped", "hold", "bus lost"):
+        shown.state(state)
+        assert boxes(shown.browser)["stage"] == still, state
+    shown.state("awake")
+
+
+@pytest.mark.parametrize("size", ["laptop"], indirect=True)
+def test_what_is_not_new_is_grey_and_has_its_age(shown: Shown, size: str) -> None:
+    script = """['#stage', '#camera .picture'].map(name => {
+      const part = document.querySelector(name), age = part.querySelector('.age');
+      return [part.matches('.stale'), age.checkVisibility() ? age.textContent : ''];
+    })"""
+
+    def stale() -> bool:
+        (view, view_age), (picture, picture_age) = value(shown.browser, script)
+        words = view_age.startswith("as it was ") and view_age.endswith(" s ago")
+        return bool(view and words and picture and picture_age.endswith(" s old"))
+
+    wait_for(stale, "the age of what is shown")
+    greys = itertools.cycle(range(100, 140))
+
+    def fresh() -> bool:
+        shown.state("awake")
+        shown.page.show_frame(encode(np.full((400, 640, 3), next(greys), np.uint8)))
+        return bool(value(shown.browser, script) == [[False, ""], [False, ""]])
+
+    wait_for(fresh, "the new view and picture")
 
 
 @pytest.mark.parametrize("size", ["phone"], indirect=True)
@@ -254,7 +296,7 @@ BAD = """(() => {
   const bad = document.createElement('div');
   bad.id = 'bad';
   bad.innerHTML = '<button style="position:fixed;left:-20px;top:100px;width:40px"></button>' +
-    '<p style="position:fixed;top:200px;font-size:9px;color:#999;background:#aaa">words</p>' +
+    '<p style="position:fixed;z-index:3;top:200px;font-size:9px;color:#999;background:#aaa">words</p>' +
     '<div style="position:fixed;inset:auto 0 0 0;height:200px;z-index:9"></div>';
   document.body.append(bad);
 })()"""

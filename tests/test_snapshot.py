@@ -240,3 +240,15 @@ def test_joints_whose_names_nobody_knows_are_numbered() -> None:
     nameless = tick._replace(guard_result=tick.guard_result._replace(joints=()))
     assert snapshot(nameless, 200.0, "", "").joints[:2] == ("joint 1", "joint 2")
     assert snapshot(nameless, 200.0, "", "", rig=shown_rig()).joints == GAZE_JOINTS
+
+
+def test_ticks_that_a_busy_page_did_not_take_make_no_busy_computer() -> None:
+    ticks = visit()[2]
+    snapshots = SnapshotBuilder(RATE_HZ)
+    for tick in (*ticks[:50], *ticks[-300:]):
+        snapshots.update(tick)
+    own = snapshots.take(SnapshotTexts())
+    assert own is not None and own.timing is not None and own.busy  # nothing better is known
+    figures = own.timing._replace(overruns=0, late_share=0.0, latest_ms=0.4)
+    told = snapshots.take(SnapshotTexts(timing=figures))
+    assert told is not None and told.timing == figures and not told.busy

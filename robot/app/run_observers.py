@@ -32,6 +32,7 @@ from gazerig.robot.dashboard.requests.pointer_to_look import ClickToLook
 from gazerig.robot.dashboard.requests.request_handler import PageRequestHandler
 from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
+from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.client import rig_name
 from gazerig.robot.remote.live_server import LiveServer
@@ -40,6 +41,7 @@ from gazerig.sim_mock.scenes.scene import ScenePicture
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
 
+_STATES_PER_FIGURES = 3
 STEER = "steer"
 """Name of the menu with the page's steps of a calibration (dashboard/panels/controls.py)."""
 
@@ -85,6 +87,8 @@ class RunObservers:
     ) -> None:
         self._steer, self._lent = steer, False
         self._made, self._fast, self._say = assembly, options.fast, say
+        self._states = 0
+        self._figures: LoopFigures | None = None
         self._timing = LoopTiming(assembly.loop.rate_hz)
         self._emulated = options.mock and steer is None
         computed = options.no_pictures or (assembly.scene is not None and not options.pixels)
@@ -179,9 +183,12 @@ class RunObservers:
             menus = robot.menus()
             character = self._tuning.character_name if self._tuning is not None else ""
             in_force = menus["behaviour"][0], menus["conversation"][0], character
+        self._states += 1
+        if self._states % _STATES_PER_FIGURES == 1:  # they take half a millisecond
+            self._figures = self._timing.figures()
         return RunState(
             errors, *in_force, robot.perception.residual(), start_s,
-            [other.seen() for other in self._made.other_heads],
+            [other.seen() for other in self._made.other_heads], self._figures,
         )  # fmt: skip
 
     def _record_world(self, tick: Tick) -> None:

@@ -109,8 +109,8 @@ def chosen() -> list[str]:
 def row(load: int, args: argparse.Namespace) -> str:
     """Return one row."""
     began_s = time.monotonic()
-    options = args.options or chosen()
     busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(load)]
+    options = args.options or chosen()
     start = "from gazerig.robot.cli.entry_point import main; main()"
     words = [sys.executable, "-c", start, "run", "--mock", *options]
     summary = Path(tempfile.mkdtemp()) / "summary.json"

@@ -192,7 +192,7 @@ def looping(asked: dict[str, Any]) -> dict[str, Any]:
             used = (time.process_time() - cpu_s) / (time.monotonic() - wall_s)
             skipped = (loop._overruns - overruns) / (len(begun_s) + loop._overruns - overruns)
             run.stopped_by = "seconds"
-        composed.made.close()
+        composed.assembly.close()
         if client is not None:
             client.kill()
             client.wait()

@@ -36,7 +36,7 @@ with run.powered() as loop:
     lines = open("/proc/self/status").read().splitlines()
     kb = {{line.split()[0]: int(line.split()[1]) for line in lines if line.startswith("VmRSS")}}
     run.stopped_by = "seconds"
-composed.made.close()
+composed.assembly.close()
 import json
 print(json.dumps([begun, imported - begun, made - imported, ticked - made, ticked, kb["VmRSS:"] / 1e3]))
 """

@@ -28,8 +28,24 @@ function write(element, text) {
 const LASTING = /, for \d.*$/; // duration of the control
 let state = {};
 
+const STALE_MS = 2500; // the door sends a heartbeat every second
+const AGE_MS = 500;
+let freshAt = performance.now();
+
+/** Show the view in grey, with its age, when nothing new has come. */
+function age() {
+  const old = performance.now() - freshAt, stale = old > STALE_MS && !state.recording;
+  const note = $("#stage .age");
+  $("#stage").classList.toggle("stale", stale);
+  note.hidden = !stale;
+  if (stale) write(note, `as it was ${Math.round(old / 1000)} s ago`);
+}
+setInterval(age, AGE_MS);
+
 function show(now) {
   state = now;
+  if (!state.silent) freshAt = performance.now();
+  age();
   const led = state.leads && state.leads !== "gaze";
   const headline = state.silent ? "nothing comes from the rig"
     : state.headline || state.leads_words || (state.recording ? "a recording is shown" : "awake");
@@ -85,10 +101,16 @@ const following = () => $("#pointer").getAttribute("aria-pressed") === "true";
 let pointer = null; // over the view: {x, y, aspect}
 let moved = false, movedAt = 0, sentAt = 0;
 let takesOver = false; // the button was pressed: replace any control
+let held = false; // a finger is on the view
 
 function pointed(event) {
-  // Dragging turns the view, except with a finger, which cannot point otherwise.
-  if (event.buttons && event.pointerType !== "touch") return;
+  // Dragging turns the view; a finger, which cannot point otherwise, is followed instead.
+  if (event.pointerType === "touch") {
+    if (!following()) return;
+    if (!event.isPrimary) return;
+    held = true;
+    event.stopImmediatePropagation();
+  } else if (event.buttons) return;
   const { innerWidth, innerHeight } = event.view;
   const x = event.clientX / innerWidth, y = event.clientY / innerHeight;
   if (!(x >= 0 && x <= 1 && y >= 0 && y <= 1)) return;
@@ -97,12 +119,13 @@ function pointed(event) {
   movedAt = performance.now();
 }
 
-const pointerGone = () => { pointer = null; };
+const pointerGone = () => { pointer = null; held = false; };
 
 setInterval(() => {
   const now = performance.now();
   if (state.leads === "pointer") takesOver = false;
-  if (!pointer || !following() || document.hidden || now - movedAt > RESTED_MS) return;
+  if (!pointer || !following() || document.hidden) return;
+  if (!held && now - movedAt > RESTED_MS) return;
   if (state.stopped || state.recording || !(takesOver || FREE.has(state.leads ?? ""))) return;
   if (!moved && now - sentAt < AGAIN_MS) return;
   moved = false;
@@ -123,6 +146,15 @@ $("#pointer").addEventListener("click", () => { takesOver = toggled($("#pointer"
 function watchPointer() {
   const inside = $("#view").contentWindow;
   for (const kind of ["pointermove", "pointerdown"]) inside.addEventListener(kind, pointed, true);
+  for (const kind of ["pointerup", "pointercancel"]) {
+    inside.addEventListener(kind, (event) => {
+      if (event.pointerType === "touch" && event.isPrimary) pointerGone();
+    }, true);
+  }
+  // Else the browser scrolls by the finger, and sends no more of its places.
+  inside.addEventListener("touchmove", (event) => {
+    if (following() && event.touches.length === 1) event.preventDefault();
+  }, { passive: false });
   inside.document.documentElement.addEventListener("pointerleave", pointerGone);
 }
 $("#view").addEventListener("load", watchPointer);

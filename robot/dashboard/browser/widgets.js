@@ -48,6 +48,7 @@ const KEYS_MS = 250;
 const NOTICE_MS = 8000, REFUSED_MS = 14000;
 const NUMBER_BYTES = 4;
 const PICK_STEP = 0.04;
+const STALE_MS = 2000, AGE_MS = 500;
 
 /** @type {(name: string, props?: Record<string, any>, ...children: Node[]) => any} */
 function make(name, props = {}, ...children) {
@@ -116,7 +117,17 @@ const KINDS = {
   image() {
     const image = make("img", { decoding: "async", draggable: false });
     const mark = make("span", { className: "mark", hidden: true });
-    const node = make("div", { className: "picture", hidden: true }, image, mark);
+    const age = make("p", { className: "age", hidden: true });
+    const node = make("div", { className: "picture", hidden: true }, image, mark, age);
+    let paintedAt = 0, lives = false; // other pictures change seldom
+    const timer = window.setInterval(() => {
+      if (paintedAt && !node.isConnected) return window.clearInterval(timer);
+      const old = performance.now() - paintedAt;
+      const stale = lives && old > STALE_MS && !node.hidden && !document.body.matches(".recording");
+      node.classList.toggle("stale", stale);
+      age.hidden = !stale;
+      if (stale) age.textContent = `${Math.round(old / 1000)} s old`;
+    }, AGE_MS);
     let at = [0.5, 0.5], pick = false;
     const ask = () => {
       window.rig.ask({ pick: { x: at[0], y: at[1] } })
@@ -143,7 +154,7 @@ const KINDS = {
     return {
       node,
       show(props) {
-        pick = props.pick;
+        pick = lives = props.pick;
         image.alt = props.label;
         image.classList.toggle("pick", pick);
         if (!pick) return;
@@ -152,6 +163,7 @@ const KINDS = {
         image.title = "click: the head looks there (or move the cross by the arrow keys, and Enter)";
       },
       paint(data) {
+        paintedAt = performance.now();
         const url = URL.createObjectURL(data), before = image.src;
         image.src = url;
         node.hidden = false;

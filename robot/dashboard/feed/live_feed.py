@@ -47,7 +47,7 @@ from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.scene_view import PinholeView, SceneView
-from gazerig.robot.model.types import Level, OtherHead, Snapshot
+from gazerig.robot.model.types import Level, LoopFigures, OtherHead, Snapshot
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
@@ -91,6 +91,8 @@ class RunState(NamedTuple):
     residual: see ``ResidualFigures``
     scene_start_s: when a simulated scene or world began, None before that and without one
     others: the other heads of the same world, as fields of ``OtherHead``
+    timing: the loop's own figures, as fields of ``LoopFigures``; None: unknown. Ticks that a busy
+        page did not take would look late in the page's own.
     """
 
     errors: dict[str, int]
@@ -100,6 +102,7 @@ class RunState(NamedTuple):
     residual: tuple[float | None, float | None, int]
     scene_start_s: float | None = None
     others: Sequence[tuple[str, str, Level]] = ()
+    timing: Sequence[Any] | None = None
 
 
 class FrameHead(NamedTuple):
@@ -190,7 +193,7 @@ class LiveFeed:
         self._picture: SceneView | None = None
         self._world: WorldShapes | None = None
         self._detector = ""
-        self._trail = GazeTrail()
+        self._trail, self._gaze = GazeTrail(), GazeHistory()
         self._builder: SnapshotBuilder | None = None
         self._poses: PoseHistory | None = None
         self._percept: Percept | None = None
@@ -248,6 +251,7 @@ class LiveFeed:
                 state.character,
                 state.conversation,
                 tuple(OtherHead(*other) for other in state.others),
+                LoopFigures(*state.timing) if state.timing is not None else None,
             )
         )
 
@@ -288,7 +292,9 @@ class LiveFeed:
         return draw_detections(
             ground(found, self._wants_depth),
             found,
-            gaze_pixel(tick, R, p_m, lens) if self.choices.gaze else None,
+            gaze_pixel(self._gaze.at(found.captured_s), R, p_m, lens)
+            if self.choices.gaze
+            else None,
             lens,
             # Without an image only the detections can be drawn.
             faces=self.choices.faces or _blank(found),
@@ -313,6 +319,7 @@ class LiveFeed:
             self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
             self._newest, self.shown_s = tick, tick.t_s
             self._trail.add(tick.t_s, tick.gaze.gaze_point_world_m)
+            self._gaze.add(tick.t_s, tick.gaze.gaze_point_world_m)
         self._new_ticks = True
 
     def _take_frame(self, head: FrameHead, fd: int, pixels: bytes | None = None) -> None:
@@ -345,9 +352,9 @@ def _blank(found: Detections) -> bool:
     return found.image is None and found.depth_m is None
 
 
-def gaze_pixel(tick: Tick, R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[float, float] | None:
-    """Return where in the image of a camera at (R, p_m) the gaze goes, None when it is outside."""
-    found = pixels(np.array([tick.gaze.gaze_point_world_m]), R, p_m, lens).tolist()
+def gaze_pixel(point_m: Vec3, R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[float, float] | None:
+    """Return where in the image of a camera at (R, p_m) a gaze point is, None when it is behind."""
+    found = pixels(np.array([point_m]), R, p_m, lens).tolist()
     return (found[0][0], found[0][1]) if found else None
 
 
@@ -355,6 +362,29 @@ def pixels(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics) -> Floa
     """Return where points (n, 3) are in the image of a camera at (R, p_m); without those behind."""
     seen: Floats = (points_world_m - np.array(p_m)) @ np.array(R)
     return np.asarray(project(seen[seen[:, 2] >= _NEAREST_M], lens), np.float64).reshape(-1, 2)
+
+
+GAZE_KEPT_S = 2.0
+"""Age of the oldest frame that is drawn with the gaze of its capture, s."""
+
+
+class GazeHistory:
+    """Gaze points of the last seconds, for frames that arrive later than they were captured."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[float, Vec3]] = deque()
+
+    def add(self, t_s: float, point_m: Vec3) -> None:
+        """Add a gaze point; an earlier time than the last one's resets the history."""
+        if self._points and t_s < self._points[-1][0]:
+            self._points.clear()
+        self._points.append((t_s, point_m))
+        while t_s - self._points[0][0] > GAZE_KEPT_S:
+            self._points.popleft()
+
+    def at(self, t_s: float) -> Vec3:
+        """Return the gaze point nearest to a time; there must be one."""
+        return min(self._points, key=lambda one: abs(one[0] - t_s))[1]
 
 
 KEPT_S, EVERY_S = 12.0, 0.05

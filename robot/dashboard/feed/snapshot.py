@@ -66,6 +66,7 @@ class SnapshotTexts(NamedTuple):
     """State that a tick does not contain: bus errors, perception, present choices, as text.
 
     others: the other heads of the same world
+    timing: the loop's own figures; None: those of the ticks that arrived
     """
 
     health: str = ""
@@ -74,6 +75,7 @@ class SnapshotTexts(NamedTuple):
     character: str = ""
     conversation: str = ""
     others: tuple[OtherHead, ...] = ()
+    timing: LoopFigures | None = None
 
 
 class SnapshotBuilder:
@@ -130,7 +132,7 @@ class SnapshotBuilder:
         t_s = self._newest.t_s
         if t_s - self._figures_s >= _TIMING_S:
             self._figures, self._figures_s = self._timing.figures(), t_s
-        timing = self._figures
+        timing = said.timing if said.timing is not None else self._figures
         busy = busy_text(timing)
         plain = snapshot(
             self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,

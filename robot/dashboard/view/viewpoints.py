@@ -21,8 +21,8 @@ HALF_WIDTH = 0.84
 
 HEAD_SHARE = 0.64
 """Share of the canvas's height that the head fills in the view of the face."""
-_FACE_RAD, _FACE_UP_RAD = radians(-28.0), radians(4.0)
-"""Direction of the view of the face: angles to the head's right and above."""
+_FACE_UP_RAD = radians(4.0)
+"""Elevation of the view of the face, from straight ahead: the head looks at whoever sees it."""
 _FACE_AWAY = 10.5
 """Distance of the view of the face, in eye distances: near, without a distorted nose."""
 _FACE_WIDTH = 3.3
@@ -74,8 +74,7 @@ def view(name: str, snapshot: Snapshot | None = None) -> View:
     unit = measures.interocular_m
     middle = add(eyes_m, measures.scaled(_FACE_MIDDLE))
     away = _FACE_AWAY * unit
-    level = away * cos(_FACE_UP_RAD)
-    off = (level * cos(_FACE_RAD), level * sin(_FACE_RAD), away * sin(_FACE_UP_RAD))
+    off = (away * cos(_FACE_UP_RAD), 0.0, away * sin(_FACE_UP_RAD))
     half_height = 0.5 * measures.height_m / HEAD_SHARE
     return View(
         add(middle, off), middle, 2.0 * atan(half_height / away), 0.5 * _FACE_WIDTH * unit / away
