@@ -7,7 +7,7 @@ from present import present
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.entry_point import QUICK, is_quick
-from gazerig.robot.cli.lead import read_look
+from gazerig.robot.cli.look_and_stop import read_look
 from gazerig.robot.cli.tune import app, read_pairs, read_value
 from gazerig.robot.model.commands import (
     LookAt,

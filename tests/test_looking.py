@@ -14,6 +14,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose
 from gazerig.robot.app.session import run as run_session
+from gazerig.robot.model.client_control import ARRIVED_RAD
 from gazerig.robot.model.command_json import as_json, check, from_json
 from gazerig.robot.model.commands import (
     Command,
@@ -25,8 +26,7 @@ from gazerig.robot.model.commands import (
     LookAtPixel,
     Stop,
 )
-from gazerig.robot.model.lead import ARRIVED_RAD
-from gazerig.robot.model.leader import NOBODY_LEADS
+from gazerig.robot.model.control_source import NO_CLIENT_CONTROL
 from gazerig.robot.recording.read import RunRecording
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -164,7 +164,7 @@ def test_a_lead_ends_after_its_time_and_says_so(rig: Running) -> None:
 
 
 def test_leads_are_counted_and_their_ends_have_reasons(rig: Running) -> None:
-    assert rig.go(0.006)[-1].lead == NOBODY_LEADS
+    assert rig.go(0.006)[-1].lead == NO_CLIENT_CONTROL
     assert rig.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].lead == 1
     reply, ticks = rig.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
     assert reply.lead == 2 and ticks[0].lead.number == 2 and not ticks[0].lead.arrived

@@ -34,8 +34,8 @@ from gazerig.robot.dashboard.feed.page_process import (
 from gazerig.robot.dashboard.feed.publisher import ParamFeed
 from gazerig.robot.dashboard.panels.controls import (
     ESTIMATED,
+    GazeTargetPanel,
     JogPanel,
-    LeadPanel,
     estimated_joints_note,
 )
 from gazerig.robot.dashboard.panels.param_panel import (
@@ -431,7 +431,7 @@ class Scene:
 
 def test_menus_become_buttons_that_ask(place: Container) -> None:
     mouth, freed = Mouth(), []
-    lead = LeadPanel(place, Scene(), mouth, lambda: freed.append(True))  # type: ignore[arg-type]
+    lead = GazeTargetPanel(place, Scene(), mouth, lambda: freed.append(True))  # type: ignore[arg-type]
     lead.offer("behaviour", ["wait", "guard"])
     lead.offer("steer", ["left", "right"])
     lead.characters(["none", "calm"], "none")

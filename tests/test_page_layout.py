@@ -16,7 +16,7 @@ from shown_page import SNAPSHOT, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.dashboard.feed.page_process import REPLAY, PageProcess
-from gazerig.robot.model.leader import Leader, sentence
+from gazerig.robot.model.control_source import ControlSource, sentence
 from gazerig.robot.model.types import Snapshot
 
 pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
@@ -32,13 +32,13 @@ SIZES = {
 TABS = ("watch", "steer", "tune", "health", "report")
 MENUS = {"gesture": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("awake",)}
 LEADS = {
-    "awake": Leader(),
-    "stopped": Leader("stopped", "", "STOP was pressed on the page (browser 1a2b)"),
-    "jogging": Leader("joint", "browser 1a2b", "neck_yaw at 17.2 deg", ("neck_yaw",), 0.0),
-    "led by a click": Leader("person", "browser 1a2b", "look at 0.9 0.1 0.25", (), 0.0),
-    "hold": Leader(),
-    "bus lost": Leader(),
-    "busy": Leader(),
+    "awake": ControlSource(),
+    "stopped": ControlSource("stopped", "", "STOP was pressed on the page (browser 1a2b)"),
+    "jogging": ControlSource("joint", "browser 1a2b", "neck_yaw at 17.2 deg", ("neck_yaw",), 0.0),
+    "led by a click": ControlSource("person", "browser 1a2b", "look at 0.9 0.1 0.25", (), 0.0),
+    "hold": ControlSource(),
+    "bus lost": ControlSource(),
+    "busy": ControlSource(),
 }
 CHANGES: dict[str, dict[str, Any]] = {
     "busy": {"busy": "the computer is too busy: 12% of ticks came late (worst 38 ms)"},

@@ -82,8 +82,8 @@ from gazerig.robot.dashboard.view.scene_node import along, turned_up
 from gazerig.robot.dashboard.widgets.widget import Html, Widget
 from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.description.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from gazerig.robot.model.control_source import ControlSource
 from gazerig.robot.model.frames import quaternion
-from gazerig.robot.model.leader import Leader
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import (
     CommandedPose,
@@ -179,7 +179,7 @@ def test_why_it_won_is_said_in_a_plain_sentence(terms: Terms, said: str) -> None
     first = Salience(3, "face", *terms, 1.0, sum(terms))
     shot = replace(snapshot(), saliences=(first,), behaviour="wait")
     assert reason(shot) == said and escape(said) in winner(shot)
-    led = replace(shot, leader=Leader("person", "ann", "look at 1 0 0"))
+    led = replace(shot, leader=ControlSource("person", "ann", "look at 1 0 0"))
     assert reason(led) == shot.why
 
 

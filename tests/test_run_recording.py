@@ -41,7 +41,7 @@ from gazerig.robot.control.tick_stream import TickBatch, TickStream
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import commands
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
-from gazerig.robot.model.leader import GestureState, LeadState
+from gazerig.robot.model.control_source import ControlState, GestureState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.read import RunRecording
@@ -390,7 +390,7 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
 
 def test_leads_and_gestures_come_back(recorded: Recorded) -> None:
     gesture = GestureState(2, "nod", "", "somebody", 3.5)
-    lead = LeadState(4, True, False, 0.01, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
+    lead = ControlState(4, True, False, 0.01, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
     tick = recorded.ticks[-1]._replace(lead=lead, gesture=gesture, percept=None)
     data = orjson.loads(orjson.dumps(moments.as_json(handed_over(tick)[1])))
     back = moments.from_json(data, {}).tick

@@ -10,7 +10,7 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.gesture.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
-from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import NO_GESTURE

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors
 from gazerig.robot.remote.client import RobotClient
 

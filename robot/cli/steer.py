@@ -9,7 +9,7 @@ import typer
 
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.angles import Angles2
-from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say, status
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.commands import LookAtDirection

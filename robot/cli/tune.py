@@ -14,9 +14,9 @@ from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli import animation as cli_animation
 from gazerig.robot.cli import fault as cli_fault
-from gazerig.robot.cli import lead as cli_lead
+from gazerig.robot.cli import look_and_stop
 from gazerig.robot.cli import steer as cli_steer
-from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.look_and_stop import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.parameter import JsonValue, Parameter
 from gazerig.robot.remote.client import RobotClient, running
@@ -35,13 +35,13 @@ def choose(context: typer.Context, rig: PidOption = None) -> None:
         context.default_map = {name: {"pid": rig} for name in context.command.commands}
 
 
-ctl.add_typer(cli_lead.app)
+ctl.add_typer(look_and_stop.app)
 ctl.add_typer(cli_animation.app)
 ctl.add_typer(cli_steer.app)
 ctl.add_typer(cli_fault.app)
 app = typer.Typer()
 app.add_typer(ctl)
-app.command()(cli_lead.stop)
+app.command()(look_and_stop.stop)
 _OLD_S = 1.0
 """A loop that has not ticked for so long does not do as it should."""
 _LAST_SAID = 5

@@ -13,13 +13,14 @@ from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.look_point import LookPoints
 from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
+from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.commands import (
     NO_GESTURE,
     Ask,
     Command,
+    ControlCommand,
     Express,
     Jog,
-    Leading,
     LookAtPerson,
     Play,
     Renew,
@@ -29,7 +30,6 @@ from gazerig.robot.model.commands import (
     Tune,
 )
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.lead import Lead
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.safety.guard import Guard
@@ -60,7 +60,7 @@ class CommandExecutor:
     def __init__(
         self,
         body: Body,
-        lead: Lead,
+        lead: ClientControl,
         stop: StopControl,
         menus: Menus,
         attention: TargetChooser,
@@ -107,7 +107,7 @@ class CommandExecutor:
                 return self.execute(Play("" if name == NO_GESTURE else name), t_s)
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
-            case _ if isinstance(command, Leading):
+            case _ if isinstance(command, ControlCommand):
                 if self._stop.why:
                     return CommandReply(f"stopped ({self._stop.why}): resume first")
                 reply = self._take_control(command, t_s)
@@ -133,7 +133,7 @@ class CommandExecutor:
                 self._messages += self._tune(command, t_s)
         return CommandReply()
 
-    def _take_control(self, command: Leading, t_s: float) -> CommandReply:
+    def _take_control(self, command: ControlCommand, t_s: float) -> CommandReply:
         """Give a client control of gaze or joints."""
         if isinstance(command, Jog):
             return self._jog(command, t_s)

@@ -4,7 +4,7 @@ from collections import deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from gazerig.robot.model.commands import Command, Leading, Resume, SetLevel, Stop, Tune
+from gazerig.robot.model.commands import Command, ControlCommand, Resume, SetLevel, Stop, Tune
 from gazerig.robot.model.reply import CommandReply, Ticket
 
 MAX_WAITING = 64
@@ -77,7 +77,7 @@ class CommandQueue:
         """Refuse commands before a stop that would move the head; keep the others."""
         for _ in range(len(self._commands)):
             waiting = self._commands.popleft()
-            if isinstance(waiting.command, Leading | Resume):
+            if isinstance(waiting.command, ControlCommand | Resume):
                 waiting.ticket.answer(CommandReply("it has been stopped since"))
             else:
                 self._commands.append(waiting)

@@ -4,7 +4,7 @@ from typing import Literal, NamedTuple, get_args
 
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import target_name
-from gazerig.robot.model.lead import GONE_S
+from gazerig.robot.model.client_control import GONE_S
 
 EventKind = Literal[
     "message", "saccade_start", "saccade_landing", "blink", "target", "person_arrived",

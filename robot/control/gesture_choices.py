@@ -8,6 +8,7 @@ import numpy as np
 from gazerig.gaze.gesture.gesture import Gesture, GestureParams
 from gazerig.gaze.gesture.gesture_player import GesturePlayer
 from gazerig.robot.model.commands import Play
+from gazerig.robot.model.control_source import NO_GESTURE, GestureState
 from gazerig.robot.model.gesture_fit import (
     FittedGesture,
     GestureFit,
@@ -16,7 +17,6 @@ from gazerig.robot.model.gesture_fit import (
     motions,
 )
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.leader import NO_GESTURE, GestureState
 from gazerig.robot.model.reply import CommandReply, GestureReply
 from gazerig.robot.model.types import JointAngles
 

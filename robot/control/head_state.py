@@ -15,7 +15,13 @@ from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
 from gazerig.robot.control.gaze_events import EventKind
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, leader, target_name
-from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, Leader, LeadState
+from gazerig.robot.model.control_source import (
+    NO_CLIENT_CONTROL,
+    NO_GESTURE,
+    ControlSource,
+    ControlState,
+    GestureState,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,10 +189,10 @@ class HeadState:
     reasons: tuple[str, ...]
     stopped: str
     led: str
-    lead: LeadState = field(default=NOBODY_LEADS)
+    lead: ControlState = field(default=NO_CLIENT_CONTROL)
     gesture: GestureState = field(default=NO_GESTURE)
     frame_s: float | None = None
-    leader: Leader = field(default=Leader())
+    leader: ControlSource = field(default=ControlSource())
     headline: str = ""
 
 
@@ -237,10 +243,10 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
         )
         for one in data["people"]
     )
-    made["lead"] = LeadState(**_known_fields(LeadState, data["lead"]))
+    made["lead"] = ControlState(**_known_fields(ControlState, data["lead"]))
     made["gesture"] = GestureState(**_known_fields(GestureState, data["gesture"]))
     if "leader" in data:
-        made["leader"] = Leader(**_known_fields(Leader, data["leader"]))
+        made["leader"] = ControlSource(**_known_fields(ControlSource, data["leader"]))
     return HeadState(**made)
 
 

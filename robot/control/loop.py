@@ -28,12 +28,12 @@ from gazerig.robot.control.real_time import freeze_objects
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import stopped_result
+from gazerig.robot.model.client_control import ClientControl
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import check
 from gazerig.robot.model.commands import Ask, Command, Jog, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.lead import Lead
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.types import JointAngles
@@ -106,7 +106,7 @@ class Robot:
         self._guard = guard
         self._gaze_m: Vec3 | None = None
         self._commands = CommandQueue()
-        self._lead = Lead()
+        self._lead = ClientControl()
         self._messages: list[str] = messages if messages is not None else []
         self._stop = StopControl(self._messages)
         self._looks = LookPoints(pixels)

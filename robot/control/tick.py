@@ -5,7 +5,12 @@ from typing import NamedTuple
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
 from gazerig.robot.model.commands import Command
-from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.control_source import (
+    NO_CLIENT_CONTROL,
+    NO_GESTURE,
+    ControlState,
+    GestureState,
+)
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
@@ -36,7 +41,7 @@ class Tick(NamedTuple):
     commands: tuple[Command, ...] = ()
     stopped: str = ""
     led: str = ""
-    lead: LeadState = NOBODY_LEADS
+    lead: ControlState = NO_CLIENT_CONTROL
     gesture: GestureState = NO_GESTURE
     parking: bool = False
 

@@ -18,7 +18,7 @@ from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Mat3, Perce
 from gazerig.robot.control.observers import failure_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_json import as_recorded
-from gazerig.robot.model.leader import GestureState, LeadState
+from gazerig.robot.model.control_source import ControlState, GestureState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 LIVE_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
@@ -74,7 +74,7 @@ class TickRow(NamedTuple):
     commands: list[dict[str, Any]]
     stopped: str
     led: str
-    lead: LeadState
+    lead: ControlState
     gesture: GestureState
     parking: bool
     before: list[Any]

@@ -8,8 +8,8 @@ from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import ORDERED, PART_NAMES, Target, body_name
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.control_source import ControlSource, control_source, sentence, title
 from gazerig.robot.model.kinematics import gaze_error
-from gazerig.robot.model.leader import Leader, leader_of, sentence, title
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
@@ -67,9 +67,9 @@ class Doing(NamedTuple):
     phase: str
 
 
-def leader(tick: Tick) -> Leader:
+def leader(tick: Tick) -> ControlSource:
     """Return the source of control of the head."""
-    return leader_of(tick.stopped, tick.parking, tick.lead, tick.gesture)
+    return control_source(tick.stopped, tick.parking, tick.lead, tick.gesture)
 
 
 def doing(tick: Tick) -> Doing:
@@ -110,7 +110,7 @@ def _gaze_text(target: Target) -> str:
             return f"looks at a {kind}"
 
 
-def lead_text(tick: Tick) -> str:
+def control_text(tick: Tick) -> str:
     """Return the client's command and the gaze's distance from its point, "" without one.
 
     e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"

@@ -28,7 +28,7 @@ from gazerig.robot.dashboard.view.people import PeopleView
 from gazerig.robot.dashboard.view.viewpoints import NAMES, Viewpoints
 from gazerig.robot.dashboard.view.world_view import WorldView
 from gazerig.robot.dashboard.widgets.widgets import Widgets
-from gazerig.robot.model.leader import Leader, sentence
+from gazerig.robot.model.control_source import ControlSource, sentence
 from gazerig.robot.model.types import Snapshot
 
 _REFUSED = "refused: "
@@ -103,7 +103,9 @@ class PageView:
             self._newest = news.snapshots[-1]
             shot = self._newest
             if self._replay is not None:  # it can neither be stopped nor resumed
-                self._tell({"recording": True, **leads_state(Leader("recording"), shot)})
+                self._tell(
+                    {"recording": True, **control_state_json(ControlSource("recording"), shot)}
+                )
             else:
                 self._tell({
                     "stopped": shot.stopped,
@@ -112,7 +114,7 @@ class PageView:
                     "without_feedback": len(shot.estimated),
                     "emulated": self.emulated,
                     "refused": refused_moves(self._menus, shot.joints),
-                    **leads_state(shot.leader, shot),
+                    **control_state_json(shot.leader, shot),
                 })  # fmt: skip
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
@@ -193,7 +195,7 @@ class PageView:
             self._tell({"stopped": "", "silent": True})
 
 
-def leads_state(leader: Leader, shot: Snapshot) -> dict[str, object]:
+def control_state_json(leader: ControlSource, shot: Snapshot) -> dict[str, object]:
     """Return the source of control and the activity of the head, for the page's headline."""
     return {
         "leads": leader.kind,

@@ -10,9 +10,9 @@ from gazerig.robot.model.commands import (
     COMMANDS,
     Ask,
     Command,
+    ControlCommand,
     Express,
     Jog,
-    Leading,
     Look,
     LookAt,
     LookAtDirection,
@@ -36,7 +36,7 @@ MAX_JOINTS = 64
 """Largest number of joints in a command."""
 MAX_WORDS = 200
 """Longest name or reason in a command, in characters."""
-MAX_LEAD_S = 86400.0
+MAX_CONTROL_S = 86400.0
 """Longest duration of a client's control."""
 MAX_PIXEL = 20000.0
 """Largest coordinate of a pixel."""
@@ -55,7 +55,7 @@ def check(command: Command) -> None:
                 raise ValueError("menu and choice are names")
         case LookAt() | LookAtInHead() | LookAtDirection() | LookAtPerson() | LookAtPixel():
             _check_look(command)
-            _check_lead(command)
+            _check_control(command)
         case Jog(angles):
             if not isinstance(angles, tuple) or len(angles) > MAX_JOINTS:
                 raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
@@ -68,7 +68,7 @@ def check(command: Command) -> None:
                     )
                 if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
                     raise ValueError(f"{pair[0]!r:.40} is not a joint name such as neck_yaw or jaw")
-            _check_lead(command)
+            _check_control(command)
         case Express(expression, strength):
             _check_share("an expression", "strength", expression, strength)
         case SetLevel(level, value):
@@ -144,11 +144,11 @@ def _check_distance(distance: object) -> None:
         raise ValueError(f"a distance is above 0 and at most {MAX_COORDINATE_M:g} m")
 
 
-def _check_lead(command: Leading) -> None:
+def _check_control(command: ControlCommand) -> None:
     _check_who(command.who, command.stay)
     for_s = command.for_s
-    if for_s is not None and not (_within(for_s, MAX_LEAD_S) and for_s > 0.0):
-        raise ValueError(f"for_s is above 0 and at most {MAX_LEAD_S:g} s")
+    if for_s is not None and not (_within(for_s, MAX_CONTROL_S) and for_s > 0.0):
+        raise ValueError(f"for_s is above 0 and at most {MAX_CONTROL_S:g} s")
 
 
 def _check_who(who: object, flag: object = False) -> None:
@@ -226,7 +226,7 @@ def from_recording(data: dict[str, object]) -> Command:
 
 def signed(command: Command, who: str) -> Command:
     """Return a command with its client's name; commands without that field stay unchanged."""
-    if isinstance(command, Leading | Play | Renew | Stop | Resume):
+    if isinstance(command, ControlCommand | Play | Renew | Stop | Resume):
         return command._replace(who=who[:MAX_WORDS])
     return command
 

@@ -208,9 +208,9 @@ class Tune(NamedTuple):
 
 
 Look = LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel
-Leading = Look | Jog
+ControlCommand = Look | Jog
 """Commands that take control of gaze or joints."""
-Command = Ask | Leading | Express | SetLevel | Play | Renew | Stop | Resume | Tune
+Command = Ask | ControlCommand | Express | SetLevel | Play | Renew | Stop | Resume | Tune
 
 REPEATED = (Renew, SetLevel)
 """Commands that programs send many times per second; they give no message and no mark."""

@@ -2,8 +2,13 @@
 
 from typing import Literal, NamedTuple
 
-from gazerig.robot.model.lead import ARRIVED_RAD
-from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.client_control import ARRIVED_RAD
+from gazerig.robot.model.control_source import (
+    NO_CLIENT_CONTROL,
+    NO_GESTURE,
+    ControlState,
+    GestureState,
+)
 from gazerig.robot.model.reply import CommandReply
 
 Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]
@@ -28,7 +33,7 @@ class Progress(NamedTuple):
         led: Client that controls gaze or joints, and its command; "" without one.
     """
 
-    lead: LeadState = NOBODY_LEADS
+    lead: ControlState = NO_CLIENT_CONTROL
     gesture: GestureState = NO_GESTURE
     led: str = ""
 

@@ -52,7 +52,7 @@ class GestureReply(NamedTuple):
         slow_joint: Joint whose limits need this factor.
         smaller: (joint, share of its motion that its range leaves).
         left_out: Joints of the gesture that the rig lacks.
-        number: Number of the gesture (``gazerig.robot.model.leader.GestureState``).
+        number: Number of the gesture (``gazerig.robot.model.control_source.GestureState``).
     """
 
     name: str
@@ -86,7 +86,7 @@ class CommandReply(NamedTuple):
         joints: Joints that cannot reach their angles; for a jog, all commanded joints.
         error_rad: Angle between the point and the line of sight at the end of the motion, of the
             worse eye, or of the mean line of sight if one linkage pans both eyes.
-        lead: Number of the control that it started (``gazerig.robot.model.leader.LeadState``),
+        lead: Number of the control that it started (``ControlState``),
             0 for none.
         gesture: Gesture that is played, None for other commands.
     """

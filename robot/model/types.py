@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from gazerig.gaze.angles import Mat3, Vec3
-from gazerig.robot.model.leader import Leader
+from gazerig.robot.model.control_source import ControlSource
 
 if TYPE_CHECKING:
     from gazerig.gaze.types import Salience
@@ -375,7 +375,7 @@ class Snapshot:
     conversation: str = ""
     stopped: str = ""
     led: str = ""
-    leader: Leader = Leader()
+    leader: ControlSource = ControlSource()
     leads_words: str = ""
     headline: str = ""
     frame_age_s: float | None = None

@@ -24,7 +24,12 @@ from gazerig.gaze.types import (
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickRow
 from gazerig.robot.model.command_json import from_recording as command_from_json
-from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.control_source import (
+    NO_CLIENT_CONTROL,
+    NO_GESTURE,
+    ControlState,
+    GestureState,
+)
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
@@ -75,9 +80,9 @@ _BODY_RECORDS: dict[str, type[BodyRecord]] = {
 _BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
 _NESTED: dict[str, Any] = {
     "joints": JointState, "pose": GazeState, "target": Target, "gaze": GazeCommand,
-    "guard_result": GuardResult, "lead": LeadState, "gesture": GestureState,
+    "guard_result": GuardResult, "lead": ControlState, "gesture": GestureState,
 }  # fmt: skip
-_NOTHING = {"lead": list(NOBODY_LEADS), "gesture": list(NO_GESTURE)}
+_NOTHING = {"lead": list(NO_CLIENT_CONTROL), "gesture": list(NO_GESTURE)}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
@@ -155,7 +160,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         tuple([command_from_json(command) for command in data["commands"]]),
         data["stopped"],
         data["led"],
-        _build(LeadState, data["lead"]) if "lead" in data else NOBODY_LEADS,
+        _build(ControlState, data["lead"]) if "lead" in data else NO_CLIENT_CONTROL,
         _build(GestureState, data["gesture"]) if "gesture" in data else NO_GESTURE,
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])

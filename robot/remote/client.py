@@ -24,9 +24,9 @@ from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     Ask,
     Command,
+    ControlCommand,
     Express,
     Jog,
-    Leading,
     LookAt,
     Play,
     Renew,
@@ -154,7 +154,7 @@ class ClientConnection:
 _EVERY_S = 0.25 * HEARTBEAT_S
 
 
-class LeadHeartbeat:
+class ControlHeartbeat:
     """Renews manual control until another client takes it or it ends.
 
     Args:
@@ -214,7 +214,7 @@ class RobotClient:
         self._connection = ClientConnection(wire, pid, self._end_heartbeat)
         self.who = who
         self._dial = dial
-        self._heartbeat: LeadHeartbeat | None = None
+        self._heartbeat: ControlHeartbeat | None = None
         self.pid = pid
 
     @classmethod
@@ -461,14 +461,14 @@ class RobotClient:
         if command == LookAt(None, self.who):
             self._end_heartbeat()
         reply = self._command(command)
-        if not isinstance(command, Leading) or not reply.lead:
+        if not isinstance(command, ControlCommand) or not reply.lead:
             return reply
         if command.stay or self._dial is None:
             self._end_heartbeat()
         elif not self.leads:
             self._end_heartbeat()
             try:
-                self._heartbeat = LeadHeartbeat(self._dial, self.who)
+                self._heartbeat = ControlHeartbeat(self._dial, self.who)
             except OSError:
                 raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
         return reply

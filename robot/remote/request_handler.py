@@ -30,11 +30,11 @@ from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
-from gazerig.robot.control.tick_text import camera_conditions, doing, lead_text, leader
+from gazerig.robot.control.tick_text import camera_conditions, control_text, doing, leader
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.command_json import signed
 from gazerig.robot.model.commands import REPEATED, Command
-from gazerig.robot.model.leader import sentence
+from gazerig.robot.model.control_source import sentence
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.remote.socket_io import VERSION
@@ -105,7 +105,7 @@ class Pulse:
             "age_s": self._clock.now_s() - tick.t_s,
             "stopped": tick.stopped,
             "led": tick.led,
-            "lead": lead_text(tick),
+            "lead": control_text(tick),
             "leads": leads.kind,
             "leads_words": sentence(leads, tick.t_s),
             "headline": does.headline,

@@ -12,13 +12,13 @@ from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import doing, lead_text, leader
+from gazerig.robot.control.tick_text import control_text, doing, leader
 from gazerig.robot.description.build import RigShape
+from gazerig.robot.model.control_source import sentence
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.leader import sentence
 from gazerig.robot.model.types import (
     CommandedPose,
     JointState,
@@ -206,7 +206,7 @@ def snapshot(
         target_id=-1 if leads.led else target.id,
         target_part=None if leads.led else target.part,
         stopped=tick.stopped,
-        led=lead_text(tick),
+        led=control_text(tick),
         leader=leads,
         leads_words=sentence(leads, tick.t_s),
         headline=does.headline,

@@ -29,7 +29,7 @@ class Controls:
     def __init__(self, widgets: Widgets, scene: viser.SceneApi, outbox: Outbox) -> None:
         self._steer, self._tune = widgets.panel("steer"), widgets.panel("tune")
         self._jog = JogPanel(self._steer.section("joints", order=40), outbox)
-        self._lead = LeadPanel(self._steer, scene, outbox, self._jog.let_go)
+        self._lead = GazeTargetPanel(self._steer, scene, outbox, self._jog.let_go)
         self._tuning = ParamState(widgets, self._tune, outbox)
         self._face = AnimationPanel(self._steer, outbox)
 
@@ -73,7 +73,7 @@ class Controls:
         self._tuning.answered(who)
 
 
-class LeadPanel:
+class GazeTargetPanel:
     """Controls of the gaze, with a target to drag through the scene, and menus."""
 
     def __init__(

@@ -9,14 +9,14 @@ from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.robot.dashboard.requests.inbox import BEAT, MESSAGE_BYTES, PICTURE, request_message
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import as_json
-from gazerig.robot.model.commands import COMMANDS, Command, Leading
+from gazerig.robot.model.commands import COMMANDS, Command, ControlCommand
 from gazerig.robot.remote.socket_io import parse_json
 
 DOOR = "door"
 """Name of the sender for the stop button and clicks in the image."""
 ASKED_BYTES = 2048
 """Longest request, bytes; a stop with its reason has a hundred."""
-_LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, Leading))
+_LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, ControlCommand))
 _SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
 """Commands with the name of the client."""
 _PER_S, _BURST = 100.0, 200.0
@@ -41,7 +41,7 @@ class Outbox:
 
     def command(self, command: Command, who: str) -> bool:
         """Send a command; return False if the rig does not accept it now."""
-        if isinstance(command, Leading):
+        if isinstance(command, ControlCommand):
             self._leads(self.name(who))
             command = command._replace(who=self.name(who))
         return self.ask(as_json(command), who)

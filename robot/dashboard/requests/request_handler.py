@@ -16,7 +16,7 @@ from gazerig.robot.control.command_handler import (
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.command_json import signed
-from gazerig.robot.model.commands import Command, Leading, LookAt, Resume
+from gazerig.robot.model.commands import Command, ControlCommand, LookAt, Resume
 from gazerig.robot.model.reply import CommandTaker, Ticket
 
 _REPLY_S = 1.0
@@ -119,7 +119,7 @@ class PageRequestHandler:
 
     def _reply_text(self, given: PendingCommand) -> str | None:
         """Return a command's restrictions as text, None if there are none or no client waits."""
-        if given.ticket is None or not isinstance(given.command, Leading | Resume):
+        if given.ticket is None or not isinstance(given.command, ControlCommand | Resume):
             return None
         reply = given.ticket.wait(_REPLY_S)
         if reply is None:

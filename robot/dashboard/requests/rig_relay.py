@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazerig.robot.control.command_handler import CHANGES
-from gazerig.robot.model.leader import GestureState, LeadState
+from gazerig.robot.model.control_source import ControlState, GestureState
 from gazerig.robot.model.outcome import Progress
 from gazerig.robot.remote.client import CONNECT_S
 from gazerig.robot.remote.socket_io import ANSWER_BYTES, MalformedMessage, Wire, dial
@@ -160,7 +160,7 @@ class StateFeed:
             case _:  # busy, starting or gone
                 return None
         progress = Progress(
-            LeadState(**state["lead"]), GestureState(**state["gesture"]), state["led"]
+            ControlState(**state["lead"]), GestureState(**state["gesture"]), state["led"]
         )
         lines = tuple(_line({"event": event}) for event in events)
         return HeadNews(_line({"state": state}), lines, progress)

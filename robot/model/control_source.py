@@ -5,7 +5,7 @@ The page, the status line, other programs and Python all use these texts.
 
 from typing import Literal, NamedTuple
 
-LeaderKind = Literal[
+ControlKind = Literal[
     "gaze", "person", "pointer", "joint", "gesture", "stopped", "parking", "recording"
 ]
 """gaze: no client, the head chooses; person: a person or program chose the target; pointer: the
@@ -16,7 +16,7 @@ _WORTH_TELLING_S = 1.0
 _MINUTE_S = 60.0
 
 
-class LeadState(NamedTuple):
+class ControlState(NamedTuple):
     """The newest control by a client, after a tick.
 
     Attributes:
@@ -63,11 +63,11 @@ class GestureState(NamedTuple):
     since_s: float = 0.0
 
 
-NOBODY_LEADS = LeadState()
+NO_CLIENT_CONTROL = ControlState()
 NO_GESTURE = GestureState()
 
 
-class Leader(NamedTuple):
+class ControlSource(NamedTuple):
     """The source of control, and its command.
 
     Attributes:
@@ -78,7 +78,7 @@ class Leader(NamedTuple):
         since_s: Start of the control on the rig's clock, None if unknown.
     """
 
-    kind: LeaderKind = "gaze"
+    kind: ControlKind = "gaze"
     who: str = ""
     what: str = ""
     joints: tuple[str, ...] = ()
@@ -90,7 +90,9 @@ class Leader(NamedTuple):
         return self.kind not in ("gaze", "gesture")
 
 
-def leader_of(stopped: str, parking: bool, lead: LeadState, gesture: GestureState) -> Leader:
+def control_source(
+    stopped: str, parking: bool, lead: ControlState, gesture: GestureState
+) -> ControlSource:
     """Return the source of control.
 
     Args:
@@ -100,18 +102,18 @@ def leader_of(stopped: str, parking: bool, lead: LeadState, gesture: GestureStat
         gesture: The newest gesture.
     """
     if stopped:
-        return Leader("stopped", "", stopped)
+        return ControlSource("stopped", "", stopped)
     if parking:
-        return Leader("parking")
+        return ControlSource("parking")
     if lead.active:
         who = lead.who or "a client"
-        return Leader(lead.by, who, lead.what, lead.joints, lead.since_s)
+        return ControlSource(lead.by, who, lead.what, lead.joints, lead.since_s)
     if gesture.name:
-        return Leader("gesture", gesture.who, gesture.name, (), gesture.since_s)
-    return Leader()
+        return ControlSource("gesture", gesture.who, gesture.name, (), gesture.since_s)
+    return ControlSource()
 
 
-def title(leader: Leader) -> str:
+def title(leader: ControlSource) -> str:
     """Return the source of control in two or three words, e.g. "neck_yaw held", "stopped"."""
     match leader.kind:
         case "gaze":
@@ -128,7 +130,7 @@ def title(leader: Leader) -> str:
             return leader.kind
 
 
-def sentence(leader: Leader, t_s: float) -> str:
+def sentence(leader: ControlSource, t_s: float) -> str:
     """Return the source of control as a sentence, "ann holds neck_yaw at 17.2 deg, for 3 s".
 
     Args:

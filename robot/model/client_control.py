@@ -11,8 +11,8 @@ from gazerig.gaze.angles import add, scale
 from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
+    ControlCommand,
     Jog,
-    Leading,
     Look,
     LookAt,
     LookAtDirection,
@@ -20,8 +20,8 @@ from gazerig.robot.model.commands import (
     LookAtPixel,
     Renew,
 )
+from gazerig.robot.model.control_source import NO_CLIENT_CONTROL, ControlState
 from gazerig.robot.model.kinematics import gaze_error
-from gazerig.robot.model.leader import NOBODY_LEADS, LeadState
 from gazerig.robot.model.types import JointAngles
 
 ARRIVED_RAD = radians(1.0)
@@ -30,7 +30,7 @@ GONE_S = 2.0
 """A control that follows a person ends when the person has not been seen for this time."""
 
 
-class Lead:
+class ClientControl:
     """The present control of the head by a client.
 
     Attributes:
@@ -46,7 +46,7 @@ class Lead:
         self.person: int | None = None
         self.pose_rad: JointAngles = ()
         self.words = ""
-        self.state = NOBODY_LEADS
+        self.state = NO_CLIENT_CONTROL
         self._shifts = 0
         self._jogged: dict[str, float] = {}
         self._jogged_at: tuple[int, ...] = ()
@@ -176,7 +176,7 @@ class Lead:
 
     def measure(
         self, target: Target, pose: GazeState, joints_rad: JointAngles, converges: bool, t_s: float
-    ) -> LeadState:
+    ) -> ControlState:
         """Return the state of the control after a tick.
 
         Args:
@@ -198,7 +198,7 @@ class Lead:
         self.state = self.state._replace(arrived=arrived, error_rad=error)
         return self.state
 
-    def _start(self, command: Leading, t_s: float) -> None:
+    def _start(self, command: ControlCommand, t_s: float) -> None:
         self._who, self._stay, self._renewed_s = command.who, command.stay, t_s
         self._until_s = None if command.for_s is None else t_s + command.for_s
         if isinstance(command, LookAt):
@@ -211,7 +211,7 @@ class Lead:
         if self.words:
             self.state = self._new_state(self.state.number + 1, t_s)
 
-    def _new_state(self, number: int, t_s: float) -> LeadState:
+    def _new_state(self, number: int, t_s: float) -> ControlState:
         """Return the state of a control that begins or changes its target."""
         joints = tuple(self._jogged)
         by: Literal["person", "pointer", "joint"] = (
@@ -223,7 +223,7 @@ class Lead:
         if joints:
             angles = (f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
             what = ", ".join(angles)
-        return LeadState(
+        return ControlState(
             number, True, by=by, who=self._who, what=what, joints=joints, since_s=self._since_s
         )
 
@@ -233,7 +233,7 @@ class Lead:
         self.pose_rad = ()
         self._jogged.clear()
         if self.state.active:
-            self.state = LeadState(self.state.number, arrived=self.state.arrived, ended=why)
+            self.state = ControlState(self.state.number, arrived=self.state.arrived, ended=why)
 
     def _describe(self) -> None:
         """Update the text of client and command."""

@@ -13,7 +13,7 @@ from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
 from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
-from gazerig.robot.model.leader import Leader, sentence
+from gazerig.robot.model.control_source import ControlSource, sentence
 from gazerig.robot.model.types import Snapshot
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -31,7 +31,7 @@ def shown(tick: Tick) -> Snapshot:
 
 def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
     tick = running.go(0.1)[-1]
-    assert leader(tick) == Leader() and not leader(tick).led
+    assert leader(tick) == ControlSource() and not leader(tick).led
     shot = shown(tick)
     assert shot.headline.startswith("looks at person 1") and shot.target_kind == "face"
     assert shot.leads_words == "nobody leads: it chooses by itself what to look at"
@@ -101,7 +101,7 @@ def test_a_person_who_was_chosen_and_a_gesture(running: Running) -> None:
     tick = running.go(0.2)[-1]
     assert leader(tick)[:3] == ("gesture", "ben", "nod")
     assert doing(tick).headline.startswith("it plays nod for ben, and looks at person 1")
-    assert leader(running.go(4.0)[-1]) == Leader()
+    assert leader(running.go(4.0)[-1]) == ControlSource()
 
 
 def test_stopped_says_that_and_nothing_else(running: Running) -> None:
@@ -113,7 +113,7 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     assert shot.headline == shot.why == "stopped: STOP was pressed; the torque is off"
     running.go(2.0)
     running.order(Resume("ann"))
-    assert leader(running.go(0.1)[-1]) == Leader()
+    assert leader(running.go(0.1)[-1]) == ControlSource()
 
 
 def test_a_head_without_torque_looks_at_nobody(running: Running) -> None:
@@ -141,7 +141,7 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
     ticks: list[Tick] = []
     assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
     assert {leader(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
-    assert doing(ticks[-1]).headline == sentence(Leader("parking"), 0.0)
+    assert doing(ticks[-1]).headline == sentence(ControlSource("parking"), 0.0)
     yaw = [
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
     ]
