@@ -295,6 +295,9 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
             continue
+        messages = r"/api/v1/|\?|\{|\"stay|\$XDG|/tmp/|Auth"
+        if paper.name == "connect-your-program.md" and re.match(messages, span):
+            continue  # read by test_programs
         if named := re.match(r"(?:PYTHONPATH=\S+ )?python (\S+\.py)", span):
             assert (ROOT / named[1]).exists(), f"{paper.name}: {span}"
             continue

@@ -3,11 +3,14 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 import socket
 import subprocess
+import sys
 import tempfile
 import time
+import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,8 +19,9 @@ from urllib.parse import urlsplit
 import jsonschema
 import pytest
 from branch import Branch, gazerig
+from browser import browsing
 from page_visitor import fetch
-from shown_page import free_port
+from shown_page import free_port, wait_for
 from slow_rigs import at_rate
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -27,6 +31,7 @@ from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.command_handler import CHANGES, ORDERS, QUESTIONS
 from gazerig.robot.control.gaze_events import EVENT_KINDS
 from gazerig.robot.dashboard.door import programs
+from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.client import RobotClient
 from gazerig.robot.remote.openapi import api_description
 
@@ -472,6 +477,94 @@ def test_the_page_lists_every_message(rig: Rig) -> None:
     assert all(f"<td>{verb}<td>" in text for verb in (*QUESTIONS, *CHANGES, *ORDERS))
 
 
+DOCS = ROOT / "docs" / "connect-your-program.md"
+
+
+def test_the_page_of_the_docs_lists_every_message_and_its_fields() -> None:
+    text = DOCS.read_text(encoding="utf-8")
+    rows = re.findall(
+        r"^\| ([a-z_, ]+) \| ?(.*?) ?\| .*\|$", text.split("## Messages")[1], re.MULTILINE
+    )
+    listed = {verb: fields for verbs, fields in rows for verb in verbs.split(", ")}
+    assert listed.pop("do") == "fields"
+    schemas = api_description("/api/v1")["components"]["schemas"]
+    assert set(listed) == {*QUESTIONS, *CHANGES, *ORDERS}
+    for verb, fields in listed.items():
+        known = set(schemas[verb]["properties"]) - {"do", "tag", "who", "stay", "for_s", "pointer"}
+        known -= {"p_world_m"} if verb == "look_at_pixel" else set()
+        assert known == {name for name in known if name in fields}, verb
+
+
+def test_every_message_of_the_docs_is_one() -> None:
+    found = re.findall(r'\{"do": "(?:[^{}]|\{\})*?\}', DOCS.read_text(encoding="utf-8"))
+    components = api_description("/api/v1")["components"]
+    assert len(found) >= 10
+    for text in found:
+        message = json.loads(text.replace('"who": ...', '"who": "me"'))
+        whole = {"$ref": f"#/components/schemas/{message['do']}", "components": components}
+        jsonschema.Draft202012Validator(whole).validate(message)
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
+def test_the_lines_for_curl_work(rig: Rig) -> None:
+    lines = blocks("sh")[0].splitlines()[1:]
+    given = {**os.environ, "RIG": rig.base, "TOKEN": rig.token}
+    for line in lines:
+        done = subprocess.run(line, shell=True, env=given, capture_output=True, check=True)
+        assert "ok" in json.loads(done.stdout), line
+    assert rig.client.status()["stopped"] == "a hand"
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+def test_the_lines_for_node_work(rig: Rig, tmp_path: Path) -> None:
+    node = shutil.which("node")
+    assert node is not None
+    network, local = (tmp_path / "network.mjs", tmp_path / "local.mjs")
+    for file, text in zip((network, local), blocks("js"), strict=True):
+        file.write_text(text, encoding="utf-8")
+        assert len(text.splitlines()) <= 5
+    words = [node, str(network), f"{rig.url}/?token={rig.token}"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "arrived"
+    path = remote_socket.folder(os.environ, os.getuid()) / f"{rig.client.pid}.sock"
+    process = subprocess.Popen([node, str(local), str(path)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        said = ""
+        while '"gesture":{"name":"nod"' not in said:
+            assert (line := process.stdout.readline())
+            said += line
+        assert '"version":1' in said
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_the_bridge_for_arduino_turns_the_gaze(rig: Rig, tmp_path: Path) -> None:
+    (text,) = blocks("python")
+    assert len(text.splitlines()) <= 11
+    file = tmp_path / "bridge.py"
+    file.write_text(text, encoding="utf-8")
+    board, line = os.openpty()
+    tty.setraw(line)
+    process = subprocess.Popen([sys.executable, str(file), os.ttyname(line)])
+    try:
+        end_s = time.monotonic() + PATIENCE_S
+        while not rig.client.status()["led"].startswith("a knob"):
+            assert time.monotonic() < end_s
+            os.write(board, b"7\r\n\xff5\r\n20\r\n")
+            time.sleep(0.1)
+    finally:
+        process.kill()
+        process.wait()
+        os.close(board)
+        os.close(line)
+
+
 # Examples
 
 
@@ -489,4 +582,26 @@ def test_the_node_example_follows_a_person(rig: Rig) -> None:
     finally:
         process.kill()
         process.communicate()
+    rig.until(lambda now: not now["led"])
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("size_px", [(1000, 900), (390, 800)], ids=str)
+def test_the_browser_example_shows_the_head_and_commands_it(
+    rig: Rig, size_px: tuple[int, int], tmp_path: Path
+) -> None:
+    file = ROOT / "examples" / "browser.html"
+    assert len(file.read_text(encoding="utf-8").splitlines()) <= 100
+    with browsing(size_px) as browser:
+        browser.go(f"{file.as_uri()}#{rig.url}/?token={rig.token}")
+        wait_for(lambda: "look" in browser.words().splitlines()[0], "the headline")
+        click = "new MouseEvent('click', {clientX: 200, clientY: 150})"
+        browser.run(f"document.querySelector('canvas').dispatchEvent({click})")
+        led = rig.until(lambda now: now["led"])["led"]
+        assert led.startswith("browser.html at 127.0.0.1")
+        wait_for(lambda: "look_at 1: " in browser.words(), "the outcome")
+        Path(tmp_path / f"{size_px[0]}.png").write_bytes(browser.photograph())
+        browser.run("document.querySelector('#stop').click()")
+        rig.until(lambda now: now["stopped"])
+        wait_for(lambda: "stopped: browser.html" in browser.words(), "the stop")
     rig.until(lambda now: not now["led"])

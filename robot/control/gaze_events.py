@@ -2,6 +2,7 @@
 
 from typing import Literal, NamedTuple, get_args
 
+from gazerig.gaze.types import ORDERED, Target
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import target_name
 from gazerig.robot.model.client_control import GONE_S
@@ -45,16 +46,13 @@ class GazeEvents:
         ballistic = last.gaze.phase == "saccade", gaze.phase == "saccade"
         other = gaze.saccades != last.gaze.saccades
         if ballistic[0] and (other or not ballistic[1]):
-            name = target_name(last.target)
-            found.append(Change(f"the eyes land at {name}", "saccade_landing", name))
+            found.append(_change("the eyes land at", "saccade_landing", last.target))
         if target is not last.target and target[3:5] + (target.part,) != (
             last.target[3:5] + (last.target.part,)
         ):
-            name = target_name(target)
-            found.append(Change(f"the target is {name}", "target", name))
+            found.append(_change("the target is", "target", target))
         if ballistic[1] and (other or not ballistic[0]):
-            name = target_name(target)
-            found.append(Change(f"saccade to {name}", "saccade_start", name))
+            found.append(_change("saccade to", "saccade_start", target))
         if gaze.blink and not last.gaze.blink:
             found.append(Change("blink", "blink", ""))
         was, now = last.gesture, tick.gesture
@@ -76,3 +74,9 @@ class GazeEvents:
                 del self._seen_s[person]
                 found.append(Change(f"person {person} has left", "person_left", person))
         return found
+
+
+def _change(text: str, kind: EventKind, target: Target) -> Change:
+    name = target_name(target)
+    shown = "the chosen point" if target.kind == ORDERED else name
+    return Change(f"{text} {shown}", kind, name)
