@@ -12,6 +12,7 @@ from exported_run import RATE_HZ, Run, seen
 from present import present
 from scipy.spatial.transform import Rotation
 
+import gazerig
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
 from gazerig.robot.control.tick import Tick
@@ -21,6 +22,7 @@ from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
 from gazerig.robot.recording.gaze_angles import (
     MOVEMENTS,
+    GazeAnglesBuilder,
     GazeTarget,
     LabelledInterval,
     collect_gaze_angles,
@@ -228,6 +230,23 @@ def test_a_gaze_that_is_up_turns_about_the_upright_axis_by_less(
     t = np.arange(0.0, 1.0, 0.005)
     gaze = np.column_stack([80.0 * t, np.full(len(t), pitch_deg)])
     assert speed_deg_s(t, gaze) == pytest.approx(np.full(len(t), 80.0 * share))
+
+
+def test_a_gaze_carried_by_the_head_is_no_fixation() -> None:
+    building = GazeAnglesBuilder()
+    with gazerig.open("desk", fast=True) as head:
+        for seconds, aside_m in ((0.5, 0.0), (3.0, 1.0)):
+            if aside_m:
+                head.look_at(0.2, aside_m, 0.3)
+            for _ in range(round(seconds * RATE_HZ)):
+                head.step()
+                building.update(head._feed.newest)
+    run = building.trace()
+    movement = label_samples(run).movement
+    late = run.time_s > 2.5
+    carried = (run.time_s > 0.9) & (np.abs(run.planned_deg[:, 0] - run.cyclopean_deg[:, 0]) > 10.0)
+    assert np.count_nonzero(carried) > 50
+    assert not np.any(movement[carried] == 1) and np.all(movement[late] == 1)
 
 
 def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
