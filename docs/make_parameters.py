@@ -20,7 +20,7 @@ and how to add one.
 """
 
 
-_TABLE = "| key | default | unit, range | meaning |\n|---|---|---|---|\n"
+_TABLE = "|key|default|unit, range|meaning|\n|---|---|---|---|\n"
 
 
 def text() -> str:
@@ -39,7 +39,7 @@ def _rows(params: type, above: str, listed: dict[type, str]) -> Iterator[tuple[s
     """Yield the section and the row of each key, those of a section before its inner sections'."""
     section = above.split(".")[0] or "rig"
     if (same := listed.setdefault(params, above)) != above:
-        yield section, f"| `{above}` | | | the keys of {same} |\n"
+        yield section, f"|`{above}`|||the keys of {same}|\n"
         return
     nested: list[tuple[str, type]] = []
     defaults = {f.name: _default(f) for f in fields(params)}
@@ -52,7 +52,7 @@ def _rows(params: type, above: str, listed: dict[type, str]) -> Iterator[tuple[s
             nested.append((f"{key}.*", inner.params))
         else:
             cells = (f"`{key}`", defaults[name], _limits(shape), _cell(shape.description))
-            yield section, f"| {' | '.join(cells)} |\n"
+            yield section, f"|{'|'.join(cells)}|\n"
     for key, inside in nested:
         yield from _rows(inside, key, listed)
 
